@@ -1,0 +1,13 @@
+"""What goes wrong with a curve, a field, a map or a gain."""
+
+
+class ControllerError(ValueError):
+    """Base of the errors of this package: says what is wrong and what would be right."""
+
+
+class ParameterError(ControllerError):
+    """A gain or a length that is negative, not finite, or out of its interval."""
+
+
+class CurveError(ControllerError):
+    """A curve that cannot be followed: too few samples, no length, not finite, outside the workspace."""

@@ -1,0 +1,1 @@
+"""The figure: 57 degrees of freedom, de Leva's segments."""

@@ -1,0 +1,1 @@
+"""Motion capture: clips, readers, writer, retargeting, authoring."""

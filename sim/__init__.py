@@ -1,0 +1,1 @@
+"""The loop: world, servo, devices, users, recorder, viewer."""
