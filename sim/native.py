@@ -1,0 +1,71 @@
+"""MuJoCo's C functions, callable from compiled code by their symbol.
+
+``numba.types.ExternalFunction`` refers to a function by name, so a loop that calls it is cached on disk and valid in the
+next process; an address held as a global would defeat the cache. Models and data are passed as addresses
+(``MjModel._address``, ``MjData._address``); arrays as ``array.ctypes``. The signatures are those of mujoco.h.
+"""
+
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import mujoco
+from numba import types
+
+from sim.errors import SimError
+
+_address = types.uintp
+_double = types.CPointer(types.float64)
+_int = types.intc
+_void = types.void
+
+
+def _load_library() -> None:
+    """Make the symbols of the wheel's libmujoco known to the just-in-time linker."""
+    folder = Path(mujoco.__file__).parent
+    libraries = sorted(
+        path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)
+    )
+    if not libraries:
+        raise SimError(f"no MuJoCo library in {folder}; reinstall the mujoco package")
+    llvm.load_library_permanently(str(libraries[0]))
+
+
+_load_library()
+
+mj_step = types.ExternalFunction("mj_step", _void(_address, _address))
+"""mj_step(m, d): advance one physics step."""
+
+mj_forward = types.ExternalFunction("mj_forward", _void(_address, _address))
+"""mj_forward(m, d): everything but the integration."""
+
+mj_fwd_position = types.ExternalFunction("mj_fwdPosition", _void(_address, _address))
+"""mj_fwdPosition(m, d): all that depends on positions."""
+
+mj_fwd_velocity = types.ExternalFunction("mj_fwdVelocity", _void(_address, _address))
+"""mj_fwdVelocity(m, d): all that depends on velocities, after `mj_fwd_position`."""
+
+mj_kinematics = types.ExternalFunction("mj_kinematics", _void(_address, _address))
+"""mj_kinematics(m, d): positions of bodies, geoms and sites."""
+
+mj_com_pos = types.ExternalFunction("mj_comPos", _void(_address, _address))
+"""mj_comPos(m, d): centres of mass and motion axes, after `mj_kinematics`."""
+
+mj_full_m = types.ExternalFunction("mj_fullM", _void(_address, _address, _double))
+"""mj_fullM(m, d, M): dense mass matrix, shape (nv, nv)."""
+
+mj_rne = types.ExternalFunction("mj_rne", _void(_address, _address, _int, _double))
+"""mj_rne(m, d, with_acceleration, result): M a + c (or c alone), without armature and passive forces."""
+
+mj_jac = types.ExternalFunction("mj_jac", _void(_address, _address, _double, _double, _double, _int))
+"""mj_jac(m, d, jacp, jacr, point, body): Jacobians (3, nv) of a point of a body."""
+
+mj_differentiate_pos = types.ExternalFunction(
+    "mj_differentiatePos", _void(_address, _double, types.float64, _double, _double)
+)
+"""mj_differentiatePos(m, dv, dt, q1, q2): the velocity that carries q1 to q2 in dt."""
+
+mj_integrate_pos = types.ExternalFunction("mj_integratePos", _void(_address, _double, _double, types.float64))
+"""mj_integratePos(m, q, v, dt): move q along v for dt, in place."""
+
+mj_apply_ft = types.ExternalFunction("mj_applyFT", _void(_address, _address, _double, _double, _double, _int, _double))
+"""mj_applyFT(m, d, force, torque, point, body, qfrc): add a wrench at a point to generalised forces."""
