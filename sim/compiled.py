@@ -1,8 +1,8 @@
 """Where compiled code is kept between processes, so that no stale kernel is ever run.
 
-numba notices a change only in the file of the function it cached, not in the files of the functions that one calls. So the
-kernels of ``models`` and ``controllers`` are not cached by themselves; the entry points of ``sim`` are, with everything they
-call linked in, in a folder named by a hash of every source file of the four packages that can hold a kernel. Any change
+numba notices a change only in the file of the function it cached, not in the files of the functions that one calls.
+So the kernels of ``models`` and ``controllers`` are not cached by themselves; the entry points of ``sim`` are, with
+everything they call linked in, in a folder named by a hash of every source file that can hold a kernel. Any change
 there is another folder.
 """
 
@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import llvmlite
 import mujoco
@@ -46,7 +46,7 @@ config.CACHE_DIR = str(CACHE_FOLDER)  # pyright: ignore[reportAttributeAccessIss
 
 def entry_point(function: _Function) -> _Function:
     """Compile without the GIL and cache on disk: for the few functions of ``sim`` that are called from Python."""
-    return njit(nogil=True, cache=True)(function)
+    return cast(_Function, njit(nogil=True, cache=True)(function))
 
 
 def is_cached() -> bool:

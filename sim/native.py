@@ -1,7 +1,7 @@
 """MuJoCo's C functions, callable from compiled code by their symbol.
 
-``numba.types.ExternalFunction`` refers to a function by name, so a loop that calls it is cached on disk and valid in the
-next process; an address held as a global would defeat the cache. Models and data are passed as addresses
+``numba.types.ExternalFunction`` refers to a function by name, so a loop that calls it is cached on disk and valid in
+the next process; an address held as a global would defeat the cache. Models and data are passed as addresses
 (``MjModel._address``, ``MjData._address``); arrays as ``array.ctypes``. The signatures are those of mujoco.h.
 """
 

@@ -1,0 +1,1 @@
+"""Devices: the simulated Phantom, a replayed recording, real hardware. One protocol for all."""
