@@ -1,0 +1,305 @@
+"""BVH: a reader for anybody's files, and a writer whose channels are exactly the figure's 57.
+
+The writer's files are Y up, facing +Z, left = +X, in centimetres, as most programs expect of BVH: with world (x, y, z)
+in metres, the file's (X, Y, Z) is 100 (y, z, x), an exchange of axes that loses no digit. The order of each joint's
+rotations is chosen so that its middle angle, which locks at ±90°, is the one that moves least; a locked pose is still
+written exactly.
+"""
+
+import re
+from array import array
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import SEGMENTS, figure_model
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from models.mocap.motion_file import (
+    FRAME_LIMIT,
+    JOINT_LIMIT,
+    VALUE_LIMIT,
+    MotionFileError,
+    count,
+    number,
+    numbers,
+    quoted,
+    read_lines,
+)
+from models.mocap.source_motion import SourceMotion
+
+Array = npt.NDArray[np.float64]
+
+_CENTIMETRES = 100.0
+_TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
+         "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
+_TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
+_TO_WORLD = [2, 0, 1]
+_CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
+
+
+@dataclass
+class _Joint:
+    """A joint while its block is read; positions and rotations are pairs (axis, column of the frame's line)."""
+
+    name: str
+    parent: int
+    line: int
+    offset: list[float] | None = None
+    tip: list[float] | None = None
+    positions: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    rotations: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+
+
+def read_bvh(path: Path) -> SourceMotion:
+    """Read a BVH file.
+
+    Position channels replace the joint's OFFSET, on any joint; each joint may have its own channels in its own order.
+
+    Raises
+    ------
+    MotionFileError
+        If the file is not a BVH, or breaks off, or its counts do not agree.
+    """
+    lines = read_lines(path)
+    joints, n_columns, motion_line = _read_hierarchy(lines, path)
+    frames, fps = _read_frames(lines, motion_line, n_columns, path)
+    offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
+    tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
+    translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
+    rotations = np.zeros((len(frames), len(joints), 4))
+    rotations[..., 0] = 1.0
+    for index, joint in enumerate(joints):
+        for axis, column in joint.positions:
+            translations[:, index, axis] = frames[:, column]
+        for axis, column in joint.rotations:
+            turn = quaternions.about_axis(axis, np.deg2rad(frames[:, column]))
+            rotations[:, index] = quaternions.product(rotations[:, index], turn)
+    names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
+    return SourceMotion(path.stem, names, parents, offsets, tips, rotations, translations, fps)
+
+
+class _Tokens:
+    """Words of the hierarchy with the lines they stand on."""
+
+    def __init__(self, lines: list[str], path: Path) -> None:
+        self.path = path
+        self.line = 0
+        self._words = ((index + 1, word) for index, line in enumerate(lines) for word in line.split())
+
+    def next(self, expected: str) -> str:
+        """The next word."""
+        line, word = next(self._words, (self.line, ""))
+        if not word:
+            raise MotionFileError(self.path, line, "file ends in the hierarchy", expected)
+        self.line = line
+        return word
+
+    def name(self) -> str:
+        """Words up to the opening brace: names such as `Bip01 L Thigh` have blanks."""
+        words: list[str] = []
+        while (word := self.next("a name and {")) != "{":
+            words.append(word)
+            if len(words) > 8 or len(word) > 200:
+                raise MotionFileError(
+                    self.path, self.line, f"name {quoted(' '.join(words))} does not end", "a { after it"
+                )
+        return " ".join(words)
+
+    def vector(self) -> list[float]:
+        """Three numbers."""
+        return [number(self.next("three numbers"), self.path, self.line) for _ in range(3)]
+
+    def error(self, what: str, expected: str) -> MotionFileError:
+        """An error at the last word."""
+        return MotionFileError(self.path, self.line, what, expected)
+
+
+def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int, int]:
+    """Joints in the file's order, number of channels, and the line of MOTION."""
+    tokens = _Tokens(lines, path)
+    if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
+        raise tokens.error(f"file begins with {quoted(word)}", "HIERARCHY: is this a BVH file?")
+    if (word := tokens.next("ROOT")).upper() != "ROOT":
+        raise tokens.error(f"found {quoted(word)}", "ROOT")
+    joints = [_Joint(tokens.name(), -1, tokens.line)]
+    open_joints, n_columns = [0], 0
+    while open_joints:
+        joint = joints[open_joints[-1]]
+        word = tokens.next("}")
+        keyword = word.upper()
+        if keyword == "OFFSET":
+            joint.offset = tokens.vector()
+        elif keyword == "CHANNELS":
+            if joint.positions or joint.rotations:
+                raise tokens.error(f"joint {quoted(joint.name)} has CHANNELS twice", "one line of CHANNELS a joint")
+            n_columns = _read_channels(tokens, joint, n_columns)
+        elif keyword == "JOINT":
+            if len(joints) >= JOINT_LIMIT:
+                raise tokens.error("too many joints", f"at most {JOINT_LIMIT}")
+            open_joints.append(len(joints))
+            joints.append(_Joint(tokens.name(), open_joints[-2], tokens.line))
+        elif keyword == "END":
+            tip = _read_end_site(tokens)
+            joint.tip = joint.tip or tip
+        elif word == "}":
+            open_joints.pop()
+            if joint.offset is None:
+                raise tokens.error(f"joint {quoted(joint.name)} (line {joint.line}) has no OFFSET", "OFFSET x y z")
+        else:
+            raise tokens.error(f"found {quoted(word)}", "OFFSET, CHANNELS, JOINT, End Site or }")
+    if (word := tokens.next("MOTION")).upper() != "MOTION":
+        raise tokens.error(f"found {quoted(word)} after the root's }}", "MOTION")
+    return joints, n_columns, tokens.line
+
+
+def _read_channels(tokens: _Tokens, joint: _Joint, column: int) -> int:
+    """Note which columns drive which axes of a joint; returns the next free column."""
+    for _ in range(count(tokens.next("a number of channels"), 6, "number of channels", tokens.path, tokens.line)):
+        word = tokens.next("a channel such as Xrotation")
+        match = _CHANNEL.fullmatch(word)
+        if match is None:
+            raise tokens.error(f"channel {quoted(word)}", "Xposition … Zposition, Xrotation … Zrotation")
+        channels = joint.positions if match[2].lower() == "position" else joint.rotations
+        axis = "xyz".index(match[1].lower())
+        if channels is joint.positions and axis in dict(channels):
+            raise tokens.error(f"channel {quoted(word)} stands twice in one joint", "each position once")
+        channels.append((axis, column))
+        column += 1
+    return column
+
+
+def _read_end_site(tokens: _Tokens) -> list[float]:
+    tokens.name()
+    tip = [0.0, 0.0, 0.0]
+    while (word := tokens.next("OFFSET or }")) != "}":
+        if word.upper() != "OFFSET":
+            raise tokens.error(f"found {quoted(word)} in an End Site", "OFFSET or }")
+        tip = tokens.vector()
+    return tip
+
+
+def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path) -> tuple[Array, float]:
+    """The frames' channels, shape (frames, channels), and their rate."""
+    rest = ((index + 1, lines[index]) for index in range(motion_line, len(lines)) if lines[index].strip())
+    line, text = next(rest, (len(lines), ""))
+    match = re.fullmatch(r"\s*Frames\s*:\s*(\S+)\s*", text, re.IGNORECASE)
+    if match is None:
+        raise MotionFileError(path, line, f"found {quoted(text.strip())} after MOTION", "Frames: n")
+    n_frames = count(match[1], FRAME_LIMIT, "number of frames", path, line)
+    if n_frames == 0 or n_frames * n_columns > VALUE_LIMIT:
+        what = f"{n_frames} frames of {n_columns} channels"
+        raise MotionFileError(path, line, what, f"at least 1 frame and at most {VALUE_LIMIT} numbers")
+    line, text = next(rest, (len(lines), ""))
+    match = re.fullmatch(r"\s*Frame\s+Time\s*:\s*(\S+)\s*", text, re.IGNORECASE)
+    if match is None:
+        raise MotionFileError(path, line, f"found {quoted(text.strip())} after Frames", "Frame Time: seconds")
+    fps = _frame_rate(match[1], path, line)
+    values, found = array("d"), 0
+    for line, text in rest:
+        tokens = text.split()
+        found += 1
+        if found > n_frames:
+            raise MotionFileError(
+                path, line, f"more lines than the {n_frames} frames declared", "as many as Frames says"
+            )
+        if len(tokens) != n_columns:
+            raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
+        values.extend(numbers(tokens, path, line))
+    # A skeleton without channels has nothing to say in its frames.
+    if found < n_frames and n_columns:
+        raise MotionFileError(path, len(lines), f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
+    return np.array(values).reshape(n_frames, n_columns), fps
+
+
+def _frame_rate(token: str, path: Path, line: int) -> float:
+    """Frames per second: a whole number when the frame time is one's reciprocal in as many digits as the file gives."""
+    seconds = number(token, path, line)
+    if not 1e-5 <= seconds <= 1e4:
+        raise MotionFileError(path, line, f"frame time is {quoted(token)} s", "between 0.00001 and 10000 s")
+    decimals = len(token.partition(".")[2]) if "e" not in token.lower() else 17
+    whole = round(1.0 / seconds)
+    near = whole > 0 and abs(1.0 / whole - seconds) <= min(10.0**-decimals, 1e-3 * seconds)
+    return float(whole) if near else 1.0 / seconds
+
+
+def _rotation_order(joint: str) -> tuple[int, int, int]:
+    """File axes of a joint's rotations, first to last. World x, y, z are the file's Z, X, Y."""
+    if joint == "root":
+        return (1, 2, 0)  # turn, lean, then somersault: locks only when lying on a side
+    if joint.endswith("shoulder"):
+        return (2, 0, 1)  # raise, twist, swing: a twist rarely reaches 90°
+    return (0, 2, 1)  # bend, lean, turn
+
+
+def _euler_angles(q: Array, order: tuple[int, int, int]) -> Array:
+    """Angles [rad] of intrinsic rotations about three different axes, shape (n, 3).
+
+    Bernardes & Viollet (2022), without their threshold: where the middle angle locks, the split between the other two
+    is arbitrary but their product with it is still the rotation.
+    """
+    k, j, i = order  # intrinsic rotations are extrinsic ones in reverse
+    sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
+    w, x, y, z = q[:, 0], q[:, 1 + i], q[:, 1 + j], sign * q[:, 1 + k]
+    a, b, c, d = w - y, x + z, y + w, z - x
+    middle = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - np.pi / 2
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    first, last = sign * (half_sum + half_difference), half_sum - half_difference
+    return np.unwrap(np.column_stack((first, middle, last)), axis=0)
+
+
+def write_bvh(clip: Clip, path: Path) -> None:
+    """Write a clip, so that reading it again gives the same poses to 1e-9 rad.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    lines, columns = ["HIERARCHY"], [clip.poses[:, _TO_FILE] * _CENTIMETRES]
+    model = figure_model()
+    open_segments: list[int] = []
+    for index, segment in enumerate(SEGMENTS):
+        while open_segments and open_segments[-1] != segment.parent:
+            open_segments.pop()
+            lines.append("\t" * len(open_segments) + "}")
+        order = _rotation_order(segment.joint)
+        channels = " ".join(f"{'XYZ'[axis]}rotation" for axis in order)
+        indent = "\t" * len(open_segments)
+        # The pelvis of the model stands at its rest height; a BVH root starts from the origin.
+        offset = model.body(segment.body).pos if index else np.zeros(3)
+        positions = "3" if index else "6 Xposition Yposition Zposition"
+        lines += [f"{indent}{'JOINT' if index else 'ROOT'} {segment.joint}", f"{indent}{{",
+                  f"{indent}\tOFFSET {_vector(offset)}", f"{indent}\tCHANNELS {positions} {channels}"]  # fmt: skip
+        if segment.joint in _TIPS:
+            tip = _vector(np.array(_TIPS[segment.joint]))
+            lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {tip}", f"{indent}\t}}"]
+        open_segments.append(index)
+        quaternion = clip.poses[:, 3 + 4 * index : 7 + 4 * index]
+        angles = _euler_angles(quaternion[:, [0, *(1 + axis for axis in _TO_FILE)]], order)
+        columns.append(np.rad2deg(angles))
+    lines += ["\t" * depth + "}" for depth in reversed(range(len(open_segments)))]
+    lines += ["MOTION", f"Frames: {clip.n_frames}", f"Frame Time: {1.0 / clip.fps!r}"]
+    lines += [" ".join(f"{value:.9f}" for value in row) for row in np.hstack(columns)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _vector(world: Array) -> str:
+    return " ".join(f"{value:.6f}" for value in world[_TO_FILE] * _CENTIMETRES)
+
+
+def own_clip(motion: SourceMotion) -> Clip | None:
+    """The clip in a file that `write_bvh` wrote (same joints, same bones); None for any other skeleton."""
+    if motion.joints != tuple(segment.joint for segment in SEGMENTS):
+        return None
+    if motion.parents != tuple(segment.parent for segment in SEGMENTS):
+        return None
+    model = figure_model()
+    bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:, _TO_FILE] * _CENTIMETRES
+    if np.abs(motion.offsets[1:] - bones).max() > 1e-4:
+        return None
+    quaternion = motion.rotations[..., [0, *(1 + axis for axis in _TO_WORLD)]]
+    position = motion.translations[:, 0, _TO_WORLD] / _CENTIMETRES
+    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.name)

@@ -1,0 +1,100 @@
+"""The text of a motion file, read within limits, and the error that says where it is wrong."""
+
+import math
+import re
+from pathlib import Path
+
+from models.errors import ModelError
+
+FILE_LIMIT = 128_000_000  # bytes
+JOINT_LIMIT = 1_000
+FRAME_LIMIT = 1_000_000
+VALUE_LIMIT = 16_000_000  # numbers in one file; 128 MB as float64
+MAGNITUDE_LIMIT = 1e7  # of a length or an angle in the file's own unit
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?")
+_COUNT = re.compile(r"\d{1,12}")
+
+
+class MotionFileError(ModelError):
+    """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line."""
+
+    def __init__(self, path: Path | str, line: int, what: str, expected: str) -> None:
+        super().__init__(f"{_one_line(str(path), 4096)}:{line}: {_one_line(what, 300)}; expected {expected}")
+
+
+def _one_line(text: str, limit: int) -> str:
+    text = "".join(character if character.isprintable() else "?" for character in text)
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+def quoted(text: str) -> str:
+    """A piece of the file for an error message: quoted, and cut when long."""
+    return repr(text if len(text) <= 40 else text[:39] + "…")
+
+
+def read_lines(path: Path) -> list[str]:
+    """Lines of a text file, without their endings (LF, CR LF or CR, also mixed).
+
+    Raises
+    ------
+    MotionFileError
+        If the file cannot be opened, is empty, binary or larger than `FILE_LIMIT`.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(FILE_LIMIT + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise MotionFileError(path, 0, f"cannot be opened ({reason})", "a readable motion file") from None
+    if len(content) > FILE_LIMIT:
+        raise MotionFileError(path, 0, "file is too large", f"at most {FILE_LIMIT // 1_000_000} MB")
+    if b"\0" in content:
+        line = content[: content.index(b"\0")].count(b"\n") + 1
+        raise MotionFileError(path, line, "binary content (a zero byte)", "a text file")
+    if not content.strip():
+        raise MotionFileError(path, 1, "file is empty", "a motion")
+    # Joint names come in many encodings; the numbers and keywords are ASCII in all of them.
+    text = content.decode("utf-8-sig", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def number(token: str, path: Path, line: int) -> float:
+    """A plain decimal number.
+
+    Raises
+    ------
+    MotionFileError
+        If the token is anything else (NaN, infinity, digits grouped by underscores) or beyond `MAGNITUDE_LIMIT`.
+    """
+    value = float(token) if _NUMBER.fullmatch(token, endpos=400) else math.nan
+    if math.isnan(value):
+        raise MotionFileError(path, line, f"{quoted(token)} is not a number", "a decimal number")
+    if abs(value) > MAGNITUDE_LIMIT:
+        raise MotionFileError(path, line, f"number {quoted(token)} is too large", f"at most {MAGNITUDE_LIMIT:.0e}")
+    return value
+
+
+def numbers(tokens: list[str], path: Path, line: int) -> list[float]:
+    """Plain decimal numbers: `number` of each token, quickly."""
+    try:
+        values = [float(token) for token in tokens]
+    except ValueError:
+        return [number(token, path, line) for token in tokens]
+    # float() also takes underscores and names of non-numbers: max() and the slow path settle those.
+    if not all(abs(value) <= MAGNITUDE_LIMIT for value in values) or any("_" in token for token in tokens):
+        return [number(token, path, line) for token in tokens]
+    return values
+
+
+def count(token: str, limit: int, what: str, path: Path, line: int) -> int:
+    """A count from 0 to `limit`, checked before anything of that size is made.
+
+    Raises
+    ------
+    MotionFileError
+        If the token is not a count, or above the limit.
+    """
+    if not _COUNT.fullmatch(token) or int(token) > limit:
+        raise MotionFileError(path, line, f"{what} is {quoted(token)}", f"a whole number up to {limit}")
+    return int(token)

@@ -1,0 +1,77 @@
+"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm, signs that do not jump."""
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def product(q: Array, r: Array) -> Array:
+    """Hamilton product q r: first the rotation r, then q; shapes (..., 4) broadcast."""
+    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
+    rw, rx, ry, rz = np.moveaxis(r, -1, 0)
+    return np.stack(
+        (
+            qw * rw - qx * rx - qy * ry - qz * rz,
+            qw * rx + qx * rw + qy * rz - qz * ry,
+            qw * ry - qx * rz + qy * rw + qz * rx,
+            qw * rz + qx * ry - qy * rx + qz * rw,
+        ),
+        axis=-1,
+    )
+
+
+def conjugate(q: Array) -> Array:
+    """The inverse rotation q* of unit quaternions, shape (..., 4)."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotated(q: Array, v: Array) -> Array:
+    """Vectors q v q*, shapes (..., 4) and (..., 3) broadcast: v + 2 w u × v + 2 u × (u × v)."""
+    u = q[..., 1:]
+    twice = 2.0 * np.cross(u, v)
+    return v + q[..., :1] * twice + np.cross(u, twice)
+
+
+def about_axis(axis: int, angle: Array) -> Array:
+    """Rotations by angles [rad] of shape (...) about a coordinate axis (0, 1, 2), shape (..., 4)."""
+    q = np.zeros((*np.shape(angle), 4))
+    q[..., 0] = np.cos(angle / 2)
+    q[..., 1 + axis] = np.sin(angle / 2)
+    return q
+
+
+def logarithm(q: Array) -> Array:
+    """Rotation vectors [rad] of the shortest turn, shape (..., 3)."""
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    # s/w to first order is half the angle: near zero the quotient of angle and sine is 2.
+    scale = np.where(s > 1e-12, 2.0 * np.arctan2(s, q[..., :1]) / np.maximum(s, 1e-12), 2.0)
+    return scale * q[..., 1:]
+
+
+def sign_continuous(q: Array) -> Array:
+    """The same rotations, each quaternion in the hemisphere of the one before (axis 0 is time; the first has w ≥ 0)."""
+    signs = np.ones(q.shape[:-1])
+    signs[1:] = np.where(np.sum(q[1:] * q[:-1], axis=-1) < 0.0, -1.0, 1.0)
+    signs[0] = np.where(q[0, ..., 0] < 0.0, -1.0, 1.0)
+    return q * np.cumprod(signs, axis=0)[..., None]
+
+
+def shortest_arc(u: Array, v: Array) -> Array:
+    """The smallest rotation that turns direction u into direction v, shape (4,)."""
+    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
+    cosine = float(u @ v)
+    if cosine < -1.0 + 1e-12:
+        other = np.array([0.0, 0.0, 1.0]) if abs(u[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+        axis = np.cross(u, other)
+        return np.append(0.0, axis / np.linalg.norm(axis))
+    q = np.append(1.0 + cosine, np.cross(u, v))
+    return q / np.linalg.norm(q)
+
+
+def slerped(q: Array, r: Array, share: float) -> Array:
+    """Rotations a share of the way from q to r along the shortest turn, shape (..., 4)."""
+    half = share / 2 * logarithm(product(conjugate(q), r))
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    return product(q, np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1))

@@ -1,0 +1,70 @@
+"""A motion on the skeleton it was recorded or authored for: what the readers return, before any retargeting."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap import quaternions
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SourceMotion:
+    """Joint rotations and offsets per frame, in the file's own axes and unit of length.
+
+    With all rotations zero every joint's frame is parallel to the file's axes, so a joint's global rotation is its
+    rotation from that zero pose.
+
+    Attributes
+    ----------
+    name : str
+        What the motion is called.
+    joints : tuple of str
+        Names as the file gives them; a parent comes before its children.
+    parents : tuple of int
+        Index of each joint's parent; −1 for the first.
+    offsets : array of shape (joints, 3)
+        From the parent to the joint in the zero pose, in the file's unit.
+    tips : array of shape (joints, 3)
+        From the joint to the end of its segment (End Site, ASF bone); zero where the file gives none.
+    rotations : array of shape (frames, joints, 4)
+        Rotation of each joint relative to its parent, unit quaternions wxyz.
+    translations : array of shape (frames, joints, 3)
+        From the parent to the joint in the parent's frame: the offset, unless the file moves the joint.
+    fps : float
+        Frames per second [1/s].
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array
+    tips: Array
+    rotations: Array
+    translations: Array
+    fps: float
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames."""
+        return len(self.rotations)
+
+    def global_rotations(self) -> Array:
+        """Rotation of every joint from the zero pose in the file's axes, shape (frames, joints, 4)."""
+        rotations = np.empty_like(self.rotations)
+        for joint, parent in enumerate(self.parents):
+            local = self.rotations[:, joint]
+            rotations[:, joint] = local if parent < 0 else quaternions.product(rotations[:, parent], local)
+        return rotations
+
+    def global_positions(self, rotations: Array) -> Array:
+        """Positions of the joints in the file's axes and unit, from global rotations; shape (frames, joints, 3)."""
+        positions = np.empty_like(self.translations)
+        for joint, parent in enumerate(self.parents):
+            step = self.translations[:, joint]
+            if parent >= 0:
+                step = positions[:, parent] + quaternions.rotated(rotations[:, parent], step)
+            positions[:, joint] = step
+        return positions
