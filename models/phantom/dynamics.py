@@ -2,8 +2,8 @@ r"""Dynamics of the Phantom in closed form, compiled, and symbolic through ``.py
 
 .. math:: M(\theta)\,\ddot\theta + C(\theta, \dot\theta)\,\dot\theta + N(\theta) = \tau
 
-τ are the torques at the joints (motor torque × capstan ratio). Source of M and N: Çavuşoğlu, Feygin & Tendick 2002. C is derived from M
-by Christoffel symbols, since a transcription of the published one has a sign wrong; so Ṁ − 2C is skew.
+τ are the torques at the joints (motor torque × capstan ratio). Source of M and N: Çavuşoğlu, Feygin & Tendick 2002. C is
+derived from M by Christoffel symbols, since a transcription of the published one has a sign wrong; so Ṁ − 2C is skew.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ L2 = _P.l2
 L3 = _P.l3
 M_A = _P.m_a
 M_C = _P.m_c
-# Bars along z at θ = 0 (be, c) turn with θ2, bars along y (df, a) with θ3: what each group adds about the vertical, lying and upright.
+# Bars be and c turn with θ2, df and a with θ3: what each pair adds about the vertical at angle 0 (yy) and 90° (zz).
 UPPER_YY = _P.inertia_be[1] + _P.inertia_c[1]
 UPPER_ZZ = _P.inertia_be[2] + _P.inertia_c[2]
 FORE_YY = _P.inertia_df[1] + _P.inertia_a[1]

@@ -1,10 +1,10 @@
-"""Kinematics of the Phantom in closed form (Çavuşoğlu, Feygin & Tendick 2002), compiled, and symbolic through ``.py_func``.
+"""Kinematics of the Phantom in closed form (Çavuşoğlu, Feygin & Tendick 2002), compiled; symbolic through ``.py_func``.
 
-θ = (θ1, θ2, θ3): turret about y, upper arm above the horizontal, forearm from hanging straight down; θ3 is absolute, thanks to the
-parallelogram. Frame P is the device's: x right, y up, z to the user, origin at the tip for θ = 0. Frame H has the same origin and
-the world's axes (x away from the user, y left, z up). S is the stylus: its axes are parallel to H when all six joints are zero.
-Angles and points come in as anything with three elements (array, tuple, CasADi vector) and go out as tuples of scalars, so the
-same source runs in the servo loop and inside a certificate.
+θ = (θ1, θ2, θ3): turret about y, upper arm above the horizontal, forearm from hanging straight down; θ3 is absolute,
+thanks to the parallelogram. Frame P is the device's: x right, y up, z to the user, origin at the tip for θ = 0. Frame H
+has the same origin and the world's axes (x away from the user, y left, z up). S is the stylus: its axes are parallel to
+H when all six joints are zero. Angles and points come in as anything with three elements (array, tuple, CasADi vector)
+and go out as tuples of scalars, so the same source runs in the servo loop and inside a certificate.
 """
 
 import numpy as np
@@ -82,10 +82,10 @@ def jacobian(theta: Vec3) -> Matrix3:
 
 @njit
 def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
-    """Joint angles that put the gimbal centre at a point; the inverse of `forward_kinematics` on everything within the limits.
+    """Joint angles that put the gimbal centre at a point: the inverse of `forward_kinematics` within the limits.
 
-    With d the distance from the pivot, sin(θ3 − θ2) = (d² − l1² − l2²) / (2 l1 l2). Out of reach, the angles are those of the
-    straight (or folded) arm pointing at the target: finite, and marked.
+    With d the distance from the pivot, sin(θ3 − θ2) = (d² − l1² − l2²) / (2 l1 l2). Out of reach, the angles are those
+    of the straight (or folded) arm pointing at the target: finite, and marked.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
 """Every number of the PHANToM Premium 1.5, with where it comes from.
 
-Sources: [C] Çavuşoğlu, Feygin & Tendick, "A Critical Study of the Mechanical and Electrical Properties of the PHANToM Haptic
-Interface", Presence 11(6), 2002, and the technical report of 2001 behind it; [S] SensAble's data sheet of the Premium 1.5;
-[M] Maxon's catalogue, RE 25; [O] an open C++ model of the Premium 1.5 built on mahi-util; [E] an estimate of ours.
+Sources: [C] Çavuşoğlu, Feygin & Tendick, "A Critical Study of the Mechanical and Electrical Properties of the PHANToM
+Haptic Interface", Presence 11(6), 2002, and the technical report of 2001 behind it; [S] SensAble's data sheet of the
+Premium 1.5; [M] Maxon's catalogue, RE 25; [O] an open C++ model of the Premium 1.5 built on mahi-util; [E] an estimate
+of ours.
 """
 
 from dataclasses import dataclass
@@ -23,8 +24,8 @@ def _deg(low: float, high: float) -> Pair:
 class PhantomParameters:
     """Geometry, inertia, drives, sensors and limits of a three-motor Phantom.
 
-    Bars: ``be`` is the upper arm b with what rides behind its pivot e; ``df`` the short driven link d with its counterweight f;
-    ``c`` the long thin rod; ``a`` the forearm. At θ = 0, be and c lie along z of the device frame, df and a along y.
+    Bars: ``be`` is the upper arm b with what rides behind its pivot, e; ``df`` the short driven link d with its
+    counterweight f; ``c`` the long thin rod; ``a`` the forearm. At θ = 0, be and c lie along z, df and a along y.
 
     Attributes
     ----------
@@ -39,7 +40,7 @@ class PhantomParameters:
     inertia_a, inertia_c : (float, float, float)
         xx, yy, zz about the bar's centre of mass [kg m²] [C].
     inertia_be, inertia_df : (float, float, float)
-        xx, yy, zz about the pivot; xx includes the reflected rotor (it breaks the triangle inequality otherwise) [kg m²] [C].
+        xx, yy, zz about the pivot; xx breaks the triangle inequality, so it includes the reflected rotor [kg m²] [C].
     inertia_base_yy : float
         Turret with its motor about the vertical axis [kg m²] [C].
     capstan : (float, float, float)

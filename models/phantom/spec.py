@@ -5,7 +5,7 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-from models.phantom.parameters import PREMIUM_1_5, Pair, Triple
+from models.phantom.parameters import GRAVITY, PREMIUM_1_5, Pair, Triple
 
 MOTOR_JOINTS = ("theta1", "theta2", "theta3")
 CLOSING_JOINTS = ("elbow", "twin")
@@ -74,5 +74,8 @@ def phantom_spec() -> mujoco.MjSpec:
 
 
 def phantom_model() -> mujoco.MjModel:
-    """The Phantom alone, compiled, with gravity along −y of its own frame P."""
-    return phantom_spec().compile()
+    """The Phantom alone, compiled, with gravity along −y of its own frame P, which is the world's here."""
+    spec = phantom_spec()
+    spec.option.gravity = np.array([0.0, -GRAVITY, 0.0])
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    return spec.compile()
