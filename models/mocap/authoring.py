@@ -1,7 +1,7 @@
 """Authoring engine: readable key poses and footsteps in, C² motion of the figure out.
 
-The body above the hips is keyed in anatomical words and interpolated by cubic splines; the feet follow their own
-tracks of footsteps, exact rests on the floor joined by quintic swings; the legs between the two are solved in closed form.
+The body above the hips is keyed in anatomical words and interpolated by cubic splines; the feet follow their own tracks
+of footsteps, exact rests on the floor joined by quintic swings; the legs between the two are solved in closed form.
 Angles of keys are in degrees, lengths in metres, times in seconds.
 """
 
@@ -318,7 +318,7 @@ def poses_at(choreography: Choreography, t: Array, sway: Array | None = None) ->
     Returns
     -------
     array, shape (n, 75)
-        MuJoCo's qpos, quaternions of one sign along each joint's path.
+        MuJoCo's qpos; the signs of the quaternions are left to `Clip`.
 
     Raises
     ------
@@ -346,8 +346,5 @@ def poses_at(choreography: Choreography, t: Array, sway: Array | None = None) ->
     poses = np.empty((len(t), N_POSE))
     poses[:, :3] = root
     for k, rotation in enumerate((pelvis, *(joints[name] for name in JOINTS))):
-        quaternion = rotation.as_quat(scalar_first=True)
-        flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
-        quaternion[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
-        poses[:, 3 + 4 * k : 7 + 4 * k] = quaternion
+        poses[:, 3 + 4 * k : 7 + 4 * k] = rotation.as_quat(scalar_first=True)
     return poses

@@ -1,0 +1,210 @@
+"""Key poses of the embedded dances and gestures; `models.mocap.authoring` makes motion of them.
+
+Angles in degrees, lengths in metres, times in seconds; the figure faces +x, its left is +y.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from models.mocap.authoring import Arm, Choreography, Key, Lap, Step
+from models.mocap.balance import balanced_clip
+from models.mocap.clip import Clip
+
+FPS = 60.0
+
+
+def angry() -> Choreography:
+    """One-armed anger: two stabs with a pointing arm, a shaken fist, a stamp of the foot."""
+    aimed = Arm(raised=88, plane=8, turn=10, elbow=12, pronation=20)
+    drawn = Arm(raised=62, plane=25, turn=10, elbow=88, pronation=20)
+    fist = Arm(raised=72, plane=62, turn=-25, elbow=112, pronation=-10, wrist=10)
+    shaken = replace(fist, raised=80, elbow=82)
+    down = Arm(raised=34, plane=40, turn=20, elbow=22, pronation=30)
+    tense = Arm(raised=24, plane=95, turn=25, elbow=48, pronation=20, wrist=15)
+    bent = replace(tense, raised=30, elbow=66)
+    return Choreography(
+        "angry",
+        3.6,
+        [
+            Key(0.0, x=-0.01, y=0.0, height=0.885, yaw=0, lean=4, tilt=0, trunk=(6, 0, -14), head=(4, 0, 6),
+                right_arm=Arm(raised=48, plane=50, turn=10, elbow=95, pronation=20), left_arm=tense),
+            Key(0.38, x=0.05, y=0.02, height=0.86, yaw=8, lean=9, trunk=(16, 2, 16), head=(6, -4, -4), right_arm=aimed,
+                left_arm=bent),
+            Key(0.68, x=0.03, y=0.02, height=0.87, trunk=(11, 1, 2), right_arm=drawn),
+            Key(0.98, x=0.07, y=0.03, height=0.85, yaw=9, lean=11, trunk=(19, 3, 18), head=(9, -6, -4), right_arm=aimed,
+                left_arm=tense),
+            Key(1.25, x=0.06, y=0.02, trunk=(18, 3, 17), right_arm=replace(aimed, elbow=8)),
+            Key(1.60, x=0.01, y=-0.01, height=0.885, yaw=0, lean=4, trunk=(5, -2, -6), head=(2, 6, 8), right_arm=fist,
+                left_arm=bent),
+            Key(1.76, right_arm=shaken),
+            Key(1.92, right_arm=fist, head=(0, 4, 4)),
+            Key(2.08, right_arm=shaken, trunk=(8, -3, -4)),
+            Key(2.24, right_arm=fist, head=(4, 6, 8)),
+            Key(2.40, y=-0.05, height=0.885, right_arm=shaken, left_arm=bent),
+            Key(2.58, yaw=-3, lean=3, trunk=(2, -4, -8), head=(0, 4, 6), right_arm=replace(fist, raised=95)),
+            Key(2.92, x=0.04, y=-0.02, height=0.855, yaw=2, lean=9, trunk=(18, 0, 8), head=(8, 0, 0), right_arm=down,
+                left_arm=tense),
+            Key(3.25, x=0.01, height=0.88, trunk=(10, 0, -2), right_arm=Arm(raised=30, plane=55, turn=15, elbow=55)),
+        ],
+        [Step(0.0, 0.02, 0.13, yaw=12), Step(2.42, 0.02, 0.13, yaw=12), Step(2.64, 0.03, 0.13, z=0.13, yaw=12, pitch=8, rest=False),
+         Step(2.86, 0.02, 0.13, yaw=12)],
+        [Step(0.0, -0.04, -0.13, yaw=-18)],
+        Lap(),
+    )  # fmt: skip
+
+
+def cheer() -> Choreography:
+    """Both arms thrown up, twice pumped, with a bounce in the knees and up to the toes."""
+    low = Arm(raised=38, plane=55, turn=10, elbow=85, pronation=0, wrist=0)
+    thrown = Arm(raised=152, plane=72, turn=0, elbow=14, pronation=0, wrist=-10)
+    pumped = Arm(raised=112, plane=68, turn=-35, elbow=82)
+    spread = replace(thrown, raised=158, plane=80, elbow=8)
+
+    def both(arm: Arm) -> dict[str, Arm]:
+        return {"left_arm": arm, "right_arm": arm}
+
+    crouch, tall = 0.80, 0.925
+    return Choreography(
+        "cheer",
+        3.0,
+        [
+            Key(0.0, x=-0.02, y=0.0, height=crouch, yaw=0, lean=10, tilt=0, trunk=(16, 0, 0), head=(2, 0, 0), **both(low)),
+            Key(0.45, x=0.0, height=tall, lean=-1, trunk=(-9, 0, 0), head=(-18, 0, 0), **both(thrown)),
+            Key(0.80, height=0.87, lean=3, trunk=(0, 3, 4), head=(-8, 4, 8), **both(pumped)),
+            Key(1.10, height=tall, trunk=(-8, 5, 6), head=(-16, 4, 10), **both(spread)),
+            Key(1.45, height=0.87, lean=3, trunk=(0, -3, -4), head=(-8, -4, -8), **both(pumped)),
+            Key(1.75, height=tall, lean=-1, trunk=(-8, -5, -6), head=(-16, -4, -10), **both(spread)),
+            Key(2.10, height=0.90, trunk=(-4, 0, 0), head=(-10, 0, 0), **both(replace(thrown, raised=140, elbow=25))),
+            Key(2.60, height=0.84, lean=7, trunk=(10, 0, 0), head=(0, 0, 0), **both(replace(low, raised=55, elbow=60))),
+        ],
+        *(
+            [
+                Step(0.0, 0.0, side * 0.14, yaw=side * 12),
+                Step(0.25, 0.0, side * 0.14, yaw=side * 12),
+                Step(0.47, 0.0, side * 0.14, yaw=side * 12, pitch=16),
+                Step(0.72, 0.0, side * 0.14, yaw=side * 12),
+            ]
+            for side in (1, -1)
+        ),
+        Lap(),
+    )  # fmt: skip
+
+
+def spin() -> Choreography:
+    """A dancer's turn to the left in eight quick steps, arms out, the head holding its gaze and then whipping round."""
+    lap, steps = 3.6, 8
+    beat, turn = lap / steps, 360 / steps
+    radius = 0.13
+
+    def track(side: int) -> list[Step]:
+        track = []
+        for k in range(0 if side > 0 else 1, steps, 2):
+            heading = k * turn
+            where = np.deg2rad(heading)
+            x, y = -radius * side * np.sin(where), radius * side * np.cos(where)
+            yaw = heading + side * 10
+            track += [Step(k * beat, x, y, yaw=yaw), Step((k + 2) * beat - 0.34, x, y, yaw=yaw)]
+        return track
+
+    wide = Arm(raised=84, plane=78, turn=-10, elbow=22, pronation=-5, wrist=-8)
+    high = Arm(raised=122, plane=72, turn=-10, elbow=34, wrist=-8)
+    low = Arm(raised=62, plane=66, turn=0, elbow=24, wrist=-8)
+    return Choreography(
+        "spin",
+        lap,
+        [
+            Key(0.0, x=0.0, y=0.0, height=0.895, yaw=0, lean=1, tilt=0, trunk=(-2, -4, 6), head=(0, 4, 4), left_arm=high, right_arm=low),
+            Key(0.6, head=(0, 3, -50)),
+            Key(0.9, height=0.895, trunk=(-3, 0, 10), head=(0, 2, -62), left_arm=wide, right_arm=wide),
+            Key(1.8, height=0.895, trunk=(-2, 6, 6), head=(2, -4, 0), left_arm=low, right_arm=high),
+            Key(2.7, height=0.895, trunk=(-3, 0, 10), head=(0, -2, 62), left_arm=wide, right_arm=wide),
+            Key(3.0, head=(0, 0, 54)),
+        ],
+        track(1),
+        track(-1),
+        Lap(yaw=360),
+    )  # fmt: skip
+
+
+def squat_dance() -> Choreography:
+    """The Russian dance: deep in the knees, arms folded, legs kicked forwards in turn."""
+    beat = 0.8
+    folded_left = Arm(raised=68, plane=12, turn=38, elbow=104, pronation=35)
+    folded_right = Arm(raised=58, plane=12, turn=38, elbow=104, pronation=35)
+    low, high = 0.47, 0.56
+
+    def track(side: int, first: float) -> list[Step]:
+        track = []
+        for start in (first, first + 2 * beat):
+            track += [
+                Step(start - beat + 0.08, 0.0, side * 0.09, yaw=side * 22, pitch=22, knee=18),
+                Step(start + 0.02, 0.0, side * 0.09, yaw=side * 22, pitch=22, knee=18),
+                Step.in_air(start + 0.36, (0.66, side * 0.13, 0.30), yaw=side * 8, pitch=-28),
+            ]
+        return track
+
+    keys = []
+    for k in range(4):
+        side = 1 if k % 2 == 0 else -1
+        t = k * beat
+        keys += [
+            Key(t, x=-0.02, y=0.0, height=high, yaw=0, lean=4, tilt=0, trunk=(14, 0, 0), head=(-4, 0, 0),
+                left_arm=folded_left, right_arm=folded_right),
+            Key(t + 0.4, height=low, yaw=-4 * side, lean=2, tilt=0, trunk=(22, 0, 6 * side), head=(-6, 4 * side, 4 * side)),
+        ]
+    return Choreography("squat_dance", 4 * beat, keys, track(1, 0.0), track(-1, beat), Lap())  # fmt: skip
+
+
+def ginga() -> Choreography:
+    """Capoeira's ginga: the triangle of steps behind low guarding arms; the second step behind swings out into a kick."""
+    guard = Arm(raised=62, plane=-8, turn=20, elbow=112, pronation=20)
+    open_guard = Arm(raised=52, plane=35, turn=10, elbow=92, pronation=20)
+    back = Arm(raised=38, plane=125, turn=10, elbow=40, pronation=10)
+    return Choreography(
+        "ginga",
+        4.0,
+        [
+            Key(0.0, x=0.0, y=0.05, height=0.74, yaw=0, lean=12, tilt=0, trunk=(16, 0, 0), head=(-8, 0, 0),
+                left_arm=open_guard, right_arm=open_guard),
+            Key(0.55, x=-0.08, y=0.06, height=0.68, yaw=-16, lean=18, trunk=(18, 4, 8), head=(-12, 0, 12), left_arm=back,
+                right_arm=guard),
+            Key(1.10, x=0.0, y=-0.02, height=0.75, yaw=0, lean=12, trunk=(16, 0, 0), head=(-8, 0, 0), left_arm=open_guard,
+                right_arm=open_guard),
+            Key(1.65, x=-0.08, y=-0.08, height=0.68, yaw=16, lean=18, trunk=(18, -4, -8), head=(-12, 0, -12),
+                left_arm=guard, right_arm=back),
+            Key(2.10, x=0.02, y=-0.2, height=0.80, yaw=4, lean=4, trunk=(8, 0, -4), left_arm=open_guard,
+                right_arm=open_guard),
+            Key(2.50, x=0.0, y=-0.24, height=0.86, yaw=-6, lean=-14, trunk=(4, 0, 6), head=(6, 0, 6), left_arm=back,
+                right_arm=guard),
+            Key(3.05, x=0.0, y=-0.16, height=0.80, yaw=0, lean=6, trunk=(12, 0, 0), head=(-4, 0, 0), left_arm=open_guard,
+                right_arm=guard),
+            Key(3.55, x=0.0, y=0.0, height=0.75, yaw=0, lean=12, trunk=(16, 0, 0), head=(-8, 0, 0),
+                left_arm=open_guard, right_arm=open_guard),
+        ],
+        [
+            Step(0.0, 0.0, 0.25, yaw=14, knee=8),
+            Step(1.28, 0.0, 0.25, yaw=14, knee=8),
+            Step(1.62, -0.5, 0.14, yaw=14, pitch=34, knee=6),
+            Step(1.96, -0.5, 0.14, yaw=14, pitch=34, knee=6),
+            Step.in_air(2.24, (0.15, 0.12, 0.5), yaw=4, pitch=10),
+            Step.in_air(2.50, (0.78, 0.08, 1.0), yaw=0, pitch=-62),
+            Step.in_air(2.76, (0.30, 0.18, 0.5), yaw=4, pitch=-5),
+            Step(3.10, 0.0, 0.25, yaw=14, knee=8),
+        ],
+        [
+            Step(0.18, 0.0, -0.25, yaw=-14, knee=8),
+            Step(0.52, -0.5, -0.14, yaw=-14, pitch=34, knee=6),
+            Step(0.78, -0.5, -0.14, yaw=-14, pitch=34, knee=6),
+            Step(1.12, 0.0, -0.25, yaw=-14, knee=8),
+        ],
+        Lap(),
+    )  # fmt: skip
+
+
+def _clip(choreography: Callable[[], Choreography]) -> Callable[[], Clip]:
+    return lambda: balanced_clip(choreography(), FPS)
+
+
+CLIPS: dict[str, Callable[[], Clip]] = {c.__name__: _clip(c) for c in (angry, cheer, spin, squat_dance, ginga)}
