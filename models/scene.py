@@ -63,7 +63,7 @@ class SceneConfig:
 
 def _add_table(world: mujoco.MjsBody) -> None:
     """A table under the Phantom's base, whose feet stand 0.25 m below the origin of H and 0.23 m beyond it."""
-    top = P_WH + np.array([0.16, 0.0, -0.265])
+    top = (P_WH + np.array([0.16, 0.0, -0.265])).tolist()
     wood = [0.6, 0.48, 0.36, 1.0]
     box = mujoco.mjtGeom.mjGEOM_BOX
     world.add_geom(name="table", type=box, size=[0.3, 0.25, 0.015], pos=top, rgba=wood, contype=0, conaffinity=0)
@@ -81,8 +81,8 @@ def world_spec(config: SceneConfig) -> mujoco.MjSpec:
     spec.option.timestep = config.servo_period / config.substeps()
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
-    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
-    spec.visual.headlight.diffuse = [0.4, 0.4, 0.4]
+    spec.visual.headlight.ambient[:] = 0.35
+    spec.visual.headlight.diffuse[:] = 0.4
     spec.add_texture(
         name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
         rgb1=[0.93, 0.95, 0.97], rgb2=[0.75, 0.8, 0.86], width=64, height=384,
@@ -103,7 +103,7 @@ def world_spec(config: SceneConfig) -> mujoco.MjSpec:
     _add_table(world)
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, R_WP.ravel())
-    spec.attach(phantom_spec(), prefix=PHANTOM, frame=world.add_frame(pos=P_WH, quat=quaternion))
+    spec.attach(phantom_spec(), prefix=PHANTOM, frame=world.add_frame(pos=P_WH.tolist(), quat=quaternion.tolist()))
     spec.attach(figure_spec(config.stature, config.mass), prefix=FIGURE, frame=world.add_frame())
     return spec
 

@@ -185,7 +185,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
         raise ModelError(f"stature is {stature} m; it must lie between 0.5 and 2.5 m")
     if not 5.0 <= mass <= 250.0:
         raise ModelError(f"mass is {mass} kg; it must lie between 5 and 250 kg")
-    spec = mujoco.MjSpec.from_string(files(__package__).joinpath("humanoid.xml").read_text(encoding="utf-8"))
+    spec = mujoco.MjSpec.from_string(files("models.humanoid").joinpath("humanoid.xml").read_text(encoding="utf-8"))
     scale = stature / DEFAULT_STATURE
     for geom in spec.geoms:
         geom.pos, geom.size, geom.fromto = geom.pos * scale, geom.size * scale, geom.fromto * scale
@@ -198,8 +198,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
         body.mass, body.ipos, body.inertia = inertia.mass, inertia.com, inertia.principal
     for segment, limit in zip(SEGMENTS[1:], limits, strict=True):
         for axis, name in enumerate("xyz"):
-            gear = np.zeros(6)
-            gear[axis] = 1.0
+            gear = [float(axis == k) for k in range(3)] + [0.0, 0.0, 0.0]
             spec.add_actuator(
                 name=f"{segment.joint}_{name}", target=segment.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, gear=gear,
                 ctrllimited=True, ctrlrange=(-limit[axis], limit[axis]),
