@@ -1,9 +1,9 @@
 """The figure's skeleton: the one definition of its joints, their order, masses, limits and motors.
 
-A pose is MuJoCo's qpos: root position (3), root quaternion wxyz (4), then 17 unit quaternions = 75 numbers. A tangent is
-MuJoCo's qvel: root velocity in the world (3), root angular velocity in the root frame (3), then 17 angular velocities, each
-in the frame of its own segment = 57 numbers. In the rest pose (T-pose, facing +x, left = +y, z up) every segment's frame is
-parallel to the world, so a segment's global orientation *is* its rotation from rest.
+A pose is MuJoCo's qpos: root position (3), root quaternion wxyz (4), then 17 unit quaternions = 75 numbers. A tangent
+is MuJoCo's qvel: root velocity in the world (3), root angular velocity in the root frame (3), then 17 angular velocities,
+each in the frame of its own segment = 57 numbers. In the rest pose (T-pose, facing +x, left = +y, z up) every segment's
+frame is parallel to the world, so a segment's global orientation *is* its rotation from rest.
 """
 
 from dataclasses import dataclass
@@ -73,8 +73,8 @@ _H = 1.741  # stature of de Leva's mean male subject [m]
 def _arm(side: str, first: int) -> tuple[Segment, ...]:
     """Clavicle to hand of the left arm, named for a side; `first` is the clavicle's index in `SEGMENTS`."""
     return (
-        Segment(f"{side}_clavicle", f"{side}_clavicle", 2, 0.01, 0.16 / _H, (-0.008, 0.05, -0.006), (0.2, 0.3, 0.3), "y",
-                _deg((-20, 45), (-20, 20), (-30, 30)), (120, 80, 120)),
+        Segment(f"{side}_clavicle", f"{side}_clavicle", 2, 0.01, 0.16 / _H, (-0.008, 0.05, -0.006), (0.2, 0.3, 0.3),
+                "y", _deg((-20, 45), (-20, 20), (-30, 30)), (120, 80, 120)),
         Segment(f"{side}_upper_arm", f"{side}_shoulder", first, 0.0271, 0.2817 / _H, (0, 0.5772 * 0.2817 / _H, 0),
                 (0.285, 0.158, 0.269), "y", _deg((-120, 120), (-120, 120), (-150, 80)), (100, 70, 100)),
         Segment(f"{side}_forearm", f"{side}_elbow", first + 1, 0.0162, 0.2689 / _H, (0, 0.4574 * 0.2689 / _H, 0),
