@@ -1,9 +1,9 @@
 """The figure's skeleton: the one definition of its joints, their order, masses, limits and motors.
 
 A pose is MuJoCo's qpos: root position (3), root quaternion wxyz (4), then 17 unit quaternions = 75 numbers. A tangent
-is MuJoCo's qvel: root velocity in the world (3), root angular velocity in the root frame (3), then 17 angular velocities,
-each in the frame of its own segment = 57 numbers. In the rest pose (T-pose, facing +x, left = +y, z up) every segment's
-frame is parallel to the world, so a segment's global orientation *is* its rotation from rest.
+is MuJoCo's qvel: root velocity in the world (3), root angular velocity in the root frame (3), then 17 angular
+velocities, each in the frame of its own segment = 57 numbers. In the rest pose (T-pose, facing +x, left = +y, z up)
+every segment's frame is parallel to the world: a segment's global orientation *is* its rotation from rest.
 """
 
 from dataclasses import dataclass
