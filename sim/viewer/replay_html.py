@@ -1,0 +1,209 @@
+"""The 3D replay of a recording as one HTML page that plays and scrubs without a network or a server.
+
+Drawn from left to right: the animation h(p) (the kinematic figure, as a translucent ghost), the physical figure, and
+the Phantom with stylus, curve, tube and forces. The Phantom is magnified and moved beside the figures, since at its
+true size its curve would be a few pixels wide; its axes stay the world's. A figure that travels is followed: the floor
+moves under it.
+"""
+
+import contextlib
+import io
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from sim.recorder import Channel, Recording
+from sim.viewer.shapes import Shape, body_shapes, tube
+
+Array = npt.NDArray[np.float64]
+Rgb = tuple[int, int, int]
+
+FPS = 30.0
+SECONDS = 120.0  # of a longer run, the beginning is shown
+MAGNIFICATION = 4.0
+PHANTOM_AT = np.array([1.35, -0.55, 1.0])  # where the origin of the hand frame is drawn [m]
+GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
+ARROW = 0.6  # drawn length of the largest force [m]
+TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
+TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
+PUSH = 0.1  # a hand that presses harder than this is pushing [N]
+GREEN: Rgb = (34, 160, 70)
+ORANGE: Rgb = (235, 120, 20)
+SLATE: Rgb = (60, 70, 90)
+BLUE: Rgb = (70, 130, 200)
+# The only notification a replay can give is that the browser renders in software.
+_HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
+
+
+def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
+    """The page.
+
+    Parameters
+    ----------
+    recording : Recording
+        With arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius`` and ``p_WH``, the hand frame's
+        origin in the world; in group ``frames`` the channels t, qpos (nq) and reference (75); in group ``ticks`` the
+        channels t, p, force and user (3 each, hand frame).
+    model : mujoco.MjModel
+        The world that was recorded: bodies named ``phantom/…`` and ``figure/…``.
+
+    Returns
+    -------
+    str
+        A self-contained HTML document.
+    """
+    quiet = io.StringIO()  # viser announces its address and its end, which mean nothing here
+    with contextlib.redirect_stdout(quiet):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        page = _Stage(server.scene, recording, model).play(server)
+    finally:
+        with contextlib.redirect_stdout(quiet):
+            server.stop()
+    return page.replace("</head>", _HEAD + "</head>", 1)
+
+
+class _Actor:
+    """Bodies of the model that are drawn in one style and placed by position and quaternion."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, shapes: list[Shape], scale: float, ghost: bool):
+        self._frames: dict[int, viser.FrameHandle] = {}
+        for i, shape in enumerate(shapes):
+            node = f"/{name}/{shape.body}"
+            if shape.body not in self._frames:
+                self._frames[shape.body] = scene.add_frame(node, show_axes=False)
+            opacity = 0.35 if ghost else shape.rgba[3]
+            scene.add_mesh_simple(
+                f"{node}/{i}",
+                shape.vertices * scale,
+                shape.faces,
+                color=BLUE if ghost else shape.rgba[:3],
+                opacity=None if opacity == 1 else opacity,
+                cast_shadow=not ghost,
+                receive_shadow=False,
+            )
+
+    def pose(self, data: mujoco.MjData, origin: Array, scale: float, at: Array) -> None:
+        """Draw each body at ``at + scale (x − origin)``."""
+        for body, frame in self._frames.items():
+            frame.position = at + scale * (data.xpos[body] - origin)
+            frame.wxyz = data.xquat[body]
+
+
+class _Stage:
+    """Everything that is drawn, and how it moves."""
+
+    def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel):
+        self._scene = scene
+        self._ticks, self._frames = recording.groups["ticks"], recording.groups["frames"]
+        self._data = mujoco.MjData(model)
+        self._model = model
+        self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
+        self._p_WH = np.asarray(recording.arrays["p_WH"], dtype=np.float64)
+        scene.configure_fog(1.0, 2.0, enabled=False)
+        figure = body_shapes(model, "figure/")
+        self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
+        self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
+        self._ghost = _Actor(scene, "ghost", figure, 1.0, ghost=True)
+        peak = max(_largest(self._ticks["force"]), _largest(self._ticks["user"]), 1e-9)
+        self._arrows = {
+            name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", GREEN), ("user", ORANGE))
+        }
+        self._grid = scene.add_grid(
+            "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
+        )
+        self._draw_curve(np.asarray(recording.arrays["curve"]), float(recording.arrays["tube_radius"]))
+        self._label(
+            "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
+        )
+        self._label("figure", "physical figure", np.array([0.0, 0.0, 2.0]))
+        self._label("ghost", "animation h(p)", GHOST_AT + np.array([0.0, 0.0, 2.0]))
+
+    def _label(self, name: str, text: str, position: Array) -> None:
+        self._scene.add_label(
+            f"/labels/{name}", text, position=position, anchor="bottom-center", font_screen_scale=1.25
+        )
+
+    def _arrow(self, name: str, color: Rgb) -> viser.ArrowsHandle:
+        return self._scene.add_arrows(
+            f"/forces/{name}", np.zeros((1, 2, 3)), color, shaft_radius=0.016, head_radius=0.04, head_length=0.09
+        )
+
+    def _draw_curve(self, points: Array, radius: float) -> None:
+        line = PHANTOM_AT + MAGNIFICATION * points
+        vertices, faces = tube(line, 0.004, sides=8)
+        self._scene.add_mesh_simple("/curve/line", vertices, faces, color=SLATE, cast_shadow=False)
+        vertices, faces = tube(line, MAGNIFICATION * radius)
+        self._scene.add_mesh_simple(
+            "/curve/tube",
+            vertices,
+            faces,
+            color=BLUE,
+            opacity=0.16,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def play(self, server: viser.ViserServer) -> str:
+        """Run through the recording and return the page."""
+        camera = server.initial_camera
+        camera.position, camera.look_at, camera.fov = (4.25, -5.15, 1.8), (0.55, -0.1, 0.9), np.deg2rad(31)
+        serializer = server.get_scene_serializer()
+        times, frame_times = self._ticks["t"][:], self._frames["t"][:]
+        n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
+        shown = times[0] + np.arange(n) / FPS
+        ticks, frames = (np.minimum(np.searchsorted(t, shown), len(t) - 1) for t in (times, frame_times))
+        followed = _followed(np.array([self._frames["reference"][int(k)][:2] for k in frames]))
+        piece = int(TRAIL_SECONDS * FPS)
+        for i in range(n):
+            self._show(int(ticks[i]), int(frames[i]), followed[i])
+            if i % piece == 0 and i > 0:
+                self._extend_trail(i // piece, int(ticks[i - piece]), int(ticks[i]))
+            serializer.insert_sleep(1 / FPS)
+        return serializer.as_html()
+
+    def _show(self, tick: int, frame: int, followed: Array) -> None:
+        shift = np.array([*followed, 0.0])
+        self._data.qpos[:] = self._frames["qpos"][frame]
+        mujoco.mj_kinematics(self._model, self._data)
+        self._phantom.pose(self._data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
+        self._figure.pose(self._data, shift, 1.0, np.zeros(3))
+        reference = self._frames["reference"][frame]
+        self._data.qpos[self._root : self._root + len(reference)] = reference
+        mujoco.mj_kinematics(self._model, self._data)
+        self._ghost.pose(self._data, shift, 1.0, GHOST_AT)
+        self._grid.position = -shift % 1.0 * np.array([1.0, 1.0, 0.0])
+        tip = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][tick]
+        for name, (handle, scale) in self._arrows.items():
+            force = self._ticks[name][tick]
+            handle.points = np.array([[tip, tip + scale * force]], dtype=np.float32)
+            handle.visible = bool(np.linalg.norm(force) * scale > 0.02)
+
+    def _extend_trail(self, index: int, start: int, stop: int) -> None:
+        step = max(1, (stop - start) // 12)
+        points = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step]
+        moved = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
+        if np.count_nonzero(moved) < 2:
+            return
+        pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > PUSH
+        vertices, faces = tube(points[moved], 0.007, sides=8)
+        color = ORANGE if pushed else GREEN
+        self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)
+
+
+def _largest(channel: Channel) -> float:
+    """Largest norm of a row."""
+    return max(float(np.max(np.linalg.norm(channel[i : i + 65536], axis=1))) for i in range(0, len(channel), 65536))
+
+
+def _followed(roots: Array) -> Array:
+    """What is subtracted from positions (n, 2): nothing, or the path of a travelling root, smoothed over a second."""
+    if np.max(np.linalg.norm(roots - roots[0], axis=1)) < TRAVEL:
+        return np.zeros_like(roots)
+    window = int(FPS) | 1
+    padded = np.pad(roots, ((window // 2, window // 2), (0, 0)), mode="edge")
+    kernel = np.full(window, 1 / window)
+    return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(2)], axis=1)

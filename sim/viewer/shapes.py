@@ -1,0 +1,103 @@
+"""Triangles and turns for what a viewer draws: the bodies of a MuJoCo model, the tube around a curve."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import trimesh
+from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
+
+Array = npt.NDArray[np.float64]
+
+_FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for looking at
+
+
+class Shape(NamedTuple):
+    """Triangles of one colour that move with one body.
+
+    Attributes
+    ----------
+    body : int
+        Index of the body.
+    vertices : array (v, 3)
+        In the body's frame [m].
+    faces : array (f, 3)
+        Indices of vertices.
+    rgba : tuple of float
+        Colour and opacity, 0 to 1.
+    """
+
+    body: int
+    vertices: Array
+    faces: npt.NDArray[np.int64]
+    rgba: tuple[float, float, float, float]
+
+
+def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
+    """Visible geometry of the bodies whose names begin with a prefix, one `Shape` per body and colour.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    prefix : str
+        Such as ``figure/``.
+    """
+    parts: dict[tuple[int, tuple[float, ...]], list[trimesh.Trimesh]] = {}
+    for geom in range(model.ngeom):
+        body = int(model.geom_bodyid[geom])
+        if model.geom_group[geom] >= _FIRST_HIDDEN_GROUP or not model.body(body).name.startswith(prefix):
+            continue
+        is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
+        mesh = mujoco_mesh_to_trimesh(model, geom) if is_mesh else create_primitive_mesh(model, geom)
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        transform = np.eye(4)
+        transform[:3, :3], transform[:3, 3] = rotation.reshape(3, 3), model.geom_pos[geom]
+        mesh.apply_transform(transform)
+        material = int(model.geom_matid[geom])
+        rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+        parts.setdefault((body, tuple(float(c) for c in rgba)), []).append(mesh)
+    shapes: list[Shape] = []
+    for (body, (red, green, blue, alpha)), meshes in parts.items():
+        whole = trimesh.util.concatenate(meshes)
+        shapes.append(Shape(body, np.asarray(whole.vertices), np.asarray(whole.faces), (red, green, blue, alpha)))
+    return shapes
+
+
+def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Surface of the tube around a polyline, without caps; closed where the last point is the first.
+
+    The rings are carried along by parallel transport, so that the surface does not twist more than the line does.
+
+    Parameters
+    ----------
+    points : array (n, 3)
+    radius : float
+    sides : int
+        Corners of a ring.
+
+    Returns
+    -------
+    vertices : array (n sides, 3)
+    faces : array (2 (n − 1) sides, 3)
+    """
+    closed = bool(np.allclose(points[0], points[-1]))
+    tangents = np.gradient(points, axis=0)
+    if closed:
+        tangents[0] = tangents[-1] = points[1] - points[-2]
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
+    angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    rings = np.empty((len(points), sides, 3))
+    for ring, point, tangent in zip(rings, points, tangents, strict=True):
+        normal = normal - (normal @ tangent) * tangent
+        normal /= np.linalg.norm(normal)
+        ring[:] = point + radius * (
+            np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * np.cross(tangent, normal)
+        )
+    first = np.arange(len(points) * sides).reshape(len(points), sides)
+    a, b = first[:-1], np.roll(first, -1, axis=1)[:-1]
+    c, d = first[1:], np.roll(first, -1, axis=1)[1:]
+    faces = np.concatenate([np.stack([a, b, d], axis=-1).reshape(-1, 3), np.stack([a, d, c], axis=-1).reshape(-1, 3)])
+    return rings.reshape(-1, 3), faces
