@@ -2,8 +2,8 @@ r"""Dynamics of the Phantom in closed form, compiled, and symbolic through ``.py
 
 .. math:: M(\theta)\,\ddot\theta + C(\theta, \dot\theta)\,\dot\theta + N(\theta) = \tau
 
-τ are the torques at the joints (motor torque × capstan ratio). Source of M and N: Çavuşoğlu, Feygin & Tendick 2002. C is
-derived from M by Christoffel symbols, since a transcription of the published one has a sign wrong; so Ṁ − 2C is skew.
+τ are the torques at the joints (motor torque × capstan ratio). Source of M and N: Çavuşoğlu, Feygin & Tendick 2002.
+C is derived from M by Christoffel symbols, since a transcription of the published one has a sign wrong: Ṁ − 2C is skew.
 """
 
 import numpy as np

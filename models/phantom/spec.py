@@ -29,19 +29,19 @@ def _set_range(spec: mujoco.MjSpec, joint: str, limit: Pair) -> None:
 def phantom_spec() -> mujoco.MjSpec:
     """The Premium 1.5 as an editable MuJoCo model, to be attached into a world.
 
-    Its base body is the device frame P (y up): the world turns it so that P's y axis points against gravity. The reflected inertia
-    of the rotors is taken out of the published inertias of turret, be and df and put into the joints' armature: M stays exactly as
-    published, and what remains of the bars obeys the triangle inequality. The gimbal weighs nothing, as in the published model; its
-    joints carry the stylus's inertia as armature.
+    Its base body is the device frame P (y up): the world turns it so that P's y axis points against gravity. The
+    reflected inertia of the rotors is taken out of the published inertias of turret, be and df and put into the joints'
+    armature: M stays exactly as published, and what remains of the bars obeys the triangle inequality. The gimbal
+    weighs nothing, as in the published model; its joints carry the stylus's inertia as armature.
 
     Returns
     -------
     mujoco.MjSpec
-        Joints theta1..3 (motors), elbow, twin (closed by equalities), gimbal1..3; torque motors motor1..3 [N m at the joint];
-        site tip at the gimbal centre, its axes those of the stylus.
+        Joints theta1..3 (motors), elbow, twin (closed by equalities), gimbal1..3; torque motors motor1..3
+        [N m at the joint]; site tip at the gimbal centre, its axes those of the stylus.
     """
     p = PREMIUM_1_5
-    spec = mujoco.MjSpec.from_string(files(__package__).joinpath("phantom.xml").read_text(encoding="utf-8"))
+    spec = mujoco.MjSpec.from_string(files("models.phantom").joinpath("phantom.xml").read_text(encoding="utf-8"))
     rotor = p.armature
     base_yy = p.inertia_base_yy - rotor[0]
     # The turret turns about y only: its mass and its other two moments play no part.

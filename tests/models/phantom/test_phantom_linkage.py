@@ -1,0 +1,138 @@
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques
+from models.phantom.parameters import PREMIUM_1_5
+from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, MOTORS, phantom_spec
+
+
+def _gap(data):
+    return np.linalg.norm(data.site("a_at_c").xpos - data.site("c_at_a").xpos)
+
+
+def test_motors_give_their_continuous_and_peak_force_at_the_tip(linkage):
+    assert np.array(PREMIUM_1_5.continuous_torque)[1] / PREMIUM_1_5.l1 == pytest.approx(1.5, abs=0.02)
+    assert np.array(PREMIUM_1_5.peak_torque)[2] / PREMIUM_1_5.l2 == pytest.approx(8.5, abs=0.02)
+    for motor, joint, peak in zip(MOTORS, MOTOR_JOINTS, PREMIUM_1_5.peak_torque, strict=True):
+        actuator = linkage.model.actuator(motor)
+        assert actuator.trnid[0] == linkage.model.joint(joint).id
+        assert actuator.ctrlrange == pytest.approx([-peak, peak])
+
+
+def test_every_bar_is_a_possible_rigid_body(linkage):
+    for name in ("turret", "be", "df", "a", "c"):
+        xx, yy, zz = linkage.model.body(name).inertia
+        assert xx <= yy + zz
+        assert yy <= xx + zz
+        assert zz <= xx + yy
+
+
+def test_nothing_of_the_device_collides(linkage):
+    assert not linkage.model.geom_contype.any()
+    assert not linkage.model.geom_conaffinity.any()
+
+
+def test_parallelogram_closes_in_every_configuration(linkage, configurations):
+    for theta in configurations[:200]:
+        assert _gap(linkage.place(theta)) < 1e-12
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-4, pytest.param(2.5e-4, marks=pytest.mark.slow)])
+def test_loop_stays_closed_within_a_micrometre_over_a_minute_of_driven_motion_with_8_newton(linkage, step):
+    model, data = linkage.model, linkage.data
+    model.opt.timestep = step
+    stylus = model.body("stylus").id
+    target = np.empty(3)
+    widest, path = 0.0, []
+    for tick in range(round(60.0 / step)):
+        t = tick * step
+        target[:] = 0.6 * np.sin(4.4 * t), 0.4 + 0.5 * np.sin(5.7 * t + 1), 0.5 + 0.5 * np.sin(6.9 * t)
+        data.ctrl[:] = 6.0 * (target - linkage.theta()) - 0.06 * linkage.theta_dot()
+        angle, azimuth = 3.1 * t, 1.7 * t
+        sine = np.sin(angle)
+        data.xfrc_applied[stylus, :3] = 8.0 * sine * np.cos(azimuth), 8.0 * np.cos(angle), 8.0 * sine * np.sin(azimuth)
+        mujoco.mj_step(model, data)
+        widest = max(widest, _gap(data))
+        if tick % 100 == 0:
+            path.append(data.site("tip").xpos.copy())
+    assert (np.ptp(path, axis=0) > 0.15).all(), "it is driven"
+    assert widest < 1e-6
+    assert not data.warning.number.any()
+
+
+def test_tip_follows_the_closed_form_under_load(linkage):
+    linkage.model.opt.timestep = 5e-4
+    linkage.data.ctrl[:] = 0.05, 0.08, -0.03
+    for _ in range(400):
+        mujoco.mj_step(linkage.model, linkage.data)
+    mujoco.mj_forward(linkage.model, linkage.data)
+    assert np.abs(linkage.theta()).max() > 0.05
+    assert np.abs(linkage.data.site("tip").xpos - forward_kinematics(linkage.theta())).max() < 1e-6
+
+
+@pytest.mark.parametrize("direction", np.eye(3))
+def test_backdrive_friction_holds_three_hundredths_of_a_newton_and_yields_to_six(linkage, direction):
+    moved = []
+    for force in (0.03, 0.06):
+        mujoco.mj_resetData(linkage.model, linkage.data)
+        linkage.model.opt.timestep = 5e-4
+        linkage.data.ctrl[:] = np.add(gravity_torques(np.zeros(3)), joint_torques(np.zeros(3), force * direction))
+        for _ in range(400):
+            mujoco.mj_step(linkage.model, linkage.data)
+        moved.append(np.linalg.norm(linkage.data.site("tip").xpos))
+    assert moved[0] < 1e-5
+    assert moved[1] > 1e-3
+
+
+@pytest.mark.parametrize("motor", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_stops_hold_the_continuous_torque(linkage, motor, side):
+    linkage.model.opt.timestep = 5e-4
+    linkage.data.ctrl[motor] = side * PREMIUM_1_5.continuous_torque[motor]
+    for _ in range(2000):
+        mujoco.mj_step(linkage.model, linkage.data)
+    theta = linkage.theta()
+    low, high = np.array(PREMIUM_1_5.limit).T
+    elbow_low, elbow_high = PREMIUM_1_5.elbow_limit
+    slack = np.deg2rad(1.0)
+    assert (theta > low - slack).all()
+    assert (theta < high + slack).all()
+    assert elbow_low - slack < theta[2] - theta[1] < elbow_high + slack
+
+
+def test_attached_upright_in_a_world_gravity_is_the_closed_form_s():
+    world = mujoco.MjSpec()
+    q_WP = np.empty(4)
+    mujoco.mju_mat2Quat(q_WP, np.array(R_HP).ravel())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        world.attach(phantom_spec(), prefix="phantom/", frame=world.worldbody.add_frame(pos=[0.2, -1, 1], quat=q_WP))
+        model = world.compile()
+    data = mujoco.MjData(model)
+    data.joint("phantom/theta2").qpos, data.joint("phantom/elbow").qpos, data.joint("phantom/twin").qpos = (
+        0.3,
+        -0.3,
+        0.3,
+    )
+    mujoco.mj_forward(model, data)
+    held = [data.joint(f"phantom/{name}").qfrc_bias[0] for name in ("theta1", "theta2", "elbow", "theta3", "twin")]
+    gravity = (held[0], held[1] - held[2] + held[4], held[3] + held[2] - held[4])
+    assert gravity == pytest.approx(gravity_torques(np.array([0.0, 0.3, 0.0])), abs=1e-12)
+    assert model.joint("phantom/theta1").range == pytest.approx(PREMIUM_1_5.limit[0])
+    assert data.site("phantom/tip").xmat.reshape(3, 3) == pytest.approx(np.eye(3))
+
+
+def test_a_second_of_noise_on_every_joint_raises_no_warning(linkage):
+    rng = np.random.default_rng(1)
+    linkage.model.opt.timestep = 1e-3
+    dofs = [linkage.model.joint(name).dofadr[0] for name in GIMBAL_JOINTS]
+    for _ in range(1000):
+        linkage.data.ctrl[:] = rng.uniform(-1, 1, 3) * PREMIUM_1_5.peak_torque
+        linkage.data.qfrc_applied[dofs] = rng.uniform(-0.02, 0.02, 3)
+        mujoco.mj_step(linkage.model, linkage.data)
+    assert np.isfinite(linkage.data.qpos).all()
+    assert not linkage.data.warning.number.any()
