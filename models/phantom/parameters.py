@@ -2,7 +2,7 @@
 
 Sources: [C] Çavuşoğlu, Feygin & Tendick, "A Critical Study of the Mechanical and Electrical Properties of the PHANToM
 Haptic Interface", Presence 11(6), 2002, and the technical report of 2001 behind it; [S] SensAble's data sheet of the
-Premium 1.5; [M] Maxon's catalogue, RE 25; [O] an open C++ model of the Premium 1.5 built on mahi-util; [E] an estimate
+Premium 1.5, at second hand; [M] Maxon's catalogue, RE 25; [O] an open C++ model of the Premium 1.5 built on mahi-util; [E] an estimate
 of ours.
 """
 
@@ -46,7 +46,7 @@ class PhantomParameters:
     capstan : (float, float, float)
         Motor turns per joint turn [C].
     rotor_inertia : float
-        Of one motor [kg m²] [M, O].
+        Of one motor [kg m²] [O]; public models of the RE 25 have 1.03e-6 and 1.07e-6.
     torque_constant : float
         [N m/A] [M].
     continuous_motor_torque, stall_motor_torque : float

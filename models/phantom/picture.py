@@ -29,7 +29,7 @@ def render(path: str, theta: tuple[float, float, float], gimbal: tuple[float, fl
     world.add_geom(type=table, size=[0.36, 0.28, 0.01], pos=[0.12, 0.0, -0.26], rgba=[0.86, 0.84, 0.8, 1])
     q_HP = np.empty(4)
     mujoco.mju_mat2Quat(q_HP, np.array(R_HP).ravel())
-    spec.attach(phantom_spec(), prefix="phantom/", frame=world.add_frame(quat=q_HP))
+    spec.attach(phantom_spec(), prefix="phantom/", frame=world.add_frame(quat=q_HP.tolist()))
     model = spec.compile()
     data = mujoco.MjData(model)
     t1, t2, t3 = theta

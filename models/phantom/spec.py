@@ -60,9 +60,8 @@ def phantom_spec() -> mujoco.MjSpec:
         item.damping = np.array([p.viscous_friction[axis], 0.0, 0.0])
         _set_range(spec, joint, p.limit[axis])
         peak = p.peak_torque[axis]
-        gear = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         spec.add_actuator(
-            name=motor, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, gear=gear,
+            name=motor, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, gear=[1, 0, 0, 0, 0, 0],
             ctrllimited=True, ctrlrange=(-peak, peak),
         )  # fmt: skip
     _set_range(spec, "elbow", p.elbow_limit)
