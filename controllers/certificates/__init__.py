@@ -1,0 +1,1 @@
+"""Certificates: proofs about the laws that run, by CasADi; the only place that imports it."""

@@ -1,0 +1,1 @@
+"""Curves in the space of stylus poses, and the closest point on them."""

@@ -1,0 +1,1 @@
+"""Force fields: what the hand feels along its curves."""

@@ -1,0 +1,1 @@
+"""Haptic maps: every stylus pose is a pose of something with many joints."""

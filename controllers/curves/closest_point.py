@@ -1,0 +1,229 @@
+"""Closest point of a curve: global and exact on the spline, at a cost that hardly grows with the number of pieces.
+
+On a cubic piece, d² = |φ(u) − p|² has degree 6 and its minima are roots of the quintic f = (φ − p)·φ̇. Pieces are
+found by branch and bound over the tree of capsules; on a piece, Bernstein's sign variations tell how many roots
+there are, the piece is halved until each is alone, and safeguarded Newton finishes it. So no root is missed.
+
+A warm start only tightens the first bound: it makes the search faster and cannot hold it in a local minimum. Of
+equally near points (within 1e-11 m) the one found first stays, which is the warm one.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.bounds import NODE
+from controllers.curves.trajectory import (
+    BREAKS,
+    COEFFICIENTS,
+    LEVELS,
+    PIECE,
+    PIECES,
+    START,
+    TREE,
+    find_piece,
+    piece_point,
+    piece_velocity,
+    wrap_phase,
+)
+from controllers.state import Array
+
+_TIE = 1e-11  # [m] a bound that promises less than this is not followed
+
+
+@njit
+def _slope(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> tuple[float, float]:
+    """Quintic f = (φ − p)·φ̇ and f' = |φ̇|² + (φ − p)·φ̈ at u."""
+    x, y, z = piece_point(blob, row, u)
+    vx, vy, vz = piece_velocity(blob, row, u)
+    x, y, z = x - px, y - py, z - pz
+    ax = 2.0 * blob[row + 14] + 6.0 * u * blob[row + 21]
+    ay = 2.0 * blob[row + 15] + 6.0 * u * blob[row + 22]
+    az = 2.0 * blob[row + 16] + 6.0 * u * blob[row + 23]
+    return x * vx + y * vy + z * vz, vx * vx + vy * vy + vz * vz + x * ax + y * ay + z * az
+
+
+@njit
+def _square(blob: Array, row: int, u: float, px: float, py: float, pz: float) -> float:
+    x, y, z = piece_point(blob, row, u)
+    return (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
+
+
+@njit
+def _root(blob: Array, row: int, low: float, high: float, px: float, py: float, pz: float) -> float:
+    """Root of f between low (f < 0) and high (f > 0): Newton, bisecting whenever it leaves the bracket or stalls."""
+    f_low, _ = _slope(blob, row, low, px, py, pz)
+    f_high, _ = _slope(blob, row, high, px, py, pz)
+    u = 0.5 * (low + high)
+    if f_low < 0.0 < f_high:
+        u = low - f_low * (high - low) / (f_high - f_low)
+    finest = 1e-15 * (abs(low) + abs(high))
+    last = high - low
+    for _ in range(100):
+        f, slope = _slope(blob, row, u, px, py, pz)
+        if f == 0.0 or high - low <= finest:
+            break
+        if f < 0.0:
+            low = u
+        else:
+            high = u
+        step = f / slope if slope > 0.0 else np.inf
+        if not (low <= u - step <= high) or abs(step) > 0.5 * last:
+            step = u - 0.5 * (low + high)
+        last = abs(step)
+        u -= step
+        if last <= finest:
+            break
+    return u
+
+
+@njit
+def _variations(b: Array) -> int:
+    """Sign variations of six Bernstein coefficients: an upper bound, of the same parity, of the roots inside."""
+    count, sign = 0, 0.0
+    for k in range(6):
+        if b[k] != 0.0:
+            if sign * b[k] < 0.0:
+                count += 1
+            sign = 1.0 if b[k] > 0.0 else -1.0
+    return count
+
+
+@njit
+def _nearest_on_piece(
+    blob: Array, row: int, h: float, px: float, py: float, pz: float, b: Array
+) -> tuple[float, float]:
+    """(d², u) of the point of one piece nearest to p; `b` is scratch of shape (48, 8)."""
+    best, best_u = _square(blob, row, 0.0, px, py, pz), 0.0
+    end = _square(blob, row, h, px, py, pz)
+    if end < best:
+        best, best_u = end, h
+    for k in range(6):
+        b[0, k] = 0.0
+    for axis in range(3):
+        c0, c1 = blob[row + axis] - (px, py, pz)[axis], blob[row + 7 + axis] * h
+        c2, c3 = blob[row + 14 + axis] * h * h, blob[row + 21 + axis] * h * h * h
+        q0, q1, q2, q3 = c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, c0 + c1 + c2 + c3
+        d0, d1, d2 = q1 - q0, q2 - q1, q3 - q2
+        # Product of Bernstein polynomials of degree 3 and 2, over the binomials of degree 5.
+        b[0, 0] += q0 * d0
+        b[0, 1] += (2.0 * q0 * d1 + 3.0 * q1 * d0) / 5.0
+        b[0, 2] += (q0 * d2 + 6.0 * q1 * d1 + 3.0 * q2 * d0) / 10.0
+        b[0, 3] += (3.0 * q1 * d2 + 6.0 * q2 * d1 + q3 * d0) / 10.0
+        b[0, 4] += (3.0 * q2 * d2 + 2.0 * q3 * d1) / 5.0
+        b[0, 5] += q3 * d2
+    b[0, 6], b[0, 7] = 0.0, 1.0
+    top = 1
+    while top > 0:
+        top -= 1
+        row_b = b[top]
+        low, high = row_b[6], row_b[7]
+        variations = _variations(row_b)
+        if variations == 0 or (variations == 1 and row_b[5] < 0.0):
+            continue
+        largest = 0.0
+        for k in range(6):
+            largest = max(largest, abs(row_b[k]))
+        # On an arc about p the quintic is all rounding error: stop once it can no longer change the distance.
+        flat = 6.0 * largest * (high - low) <= 1e-20 + 1e-12 * best
+        if variations == 1 or flat or top > 44:
+            u = h * 0.5 * (low + high) if flat else _root(blob, row, h * low, h * high, px, py, pz)
+            square = _square(blob, row, u, px, py, pz)
+            if square < best:
+                best, best_u = square, u
+            continue
+        # De Casteljau at the middle: the left half stays in place, the right half goes above it.
+        right = b[top + 1]
+        for k in range(6):
+            right[k] = row_b[k]
+        for level in range(5):
+            row_b[level] = right[0]
+            for k in range(5 - level):
+                right[k] = 0.5 * (right[k] + right[k + 1])
+        row_b[5] = right[0]
+        row_b[7], right[6], right[7] = 0.5 * (low + high), 0.5 * (low + high), high
+        top += 2
+    return best, best_u
+
+
+@njit
+def _chord_square(blob: Array, node: int, px: float, py: float, pz: float) -> float:
+    """Squared distance from p to the chord of the capsule at ``blob[node]``."""
+    x, y, z = px - blob[node], py - blob[node + 1], pz - blob[node + 2]
+    dx, dy, dz = blob[node + 3], blob[node + 4], blob[node + 5]
+    share = min(max((x * dx + y * dy + z * dz) * blob[node + 6], 0.0), 1.0)
+    x, y, z = x - share * dx, y - share * dy, z - share * dz
+    return x * x + y * y + z * z
+
+
+@njit
+def _out_of_reach(blob: Array, node: int, square: float, best: float) -> bool:
+    """Whether nothing in the capsule at ``blob[node]`` can be nearer than `best`, for its chord's squared distance."""
+    reach = max(best - _TIE + blob[node + 7], 0.0)
+    return square >= reach * reach
+
+
+@njit
+def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:
+    """Phase t* of the point of the curve packed at ``blob[at:]`` that is nearest to p, over the whole curve.
+
+    Parameters
+    ----------
+    blob, at
+        Array and offset of a packed `Trajectory`.
+    px, py, pz : float
+        p_H [m].
+    guess : float
+        Phase to start from, such as the last t*; NaN when there is none. It decides the cost and ties, not the
+        answer.
+
+    Returns
+    -------
+    t, distance : float
+        t* [s] and |φ(t*) − p| [m], exact to 1e-11 m. NaN distance if p is not finite.
+    """
+    if not np.isfinite(px + py + pz):
+        return blob[at + START], np.nan
+    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
+    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
+    scratch = np.empty((48, 8))
+    nodes, squares = np.empty(64, np.int64), np.empty(64)
+    best: float = math.inf
+    best_t = float(blob[at + START])
+    # From the warm leaf upwards, each sibling of an ancestor is searched in turn; without one, the root alone.
+    below = 1
+    if np.isfinite(guess):
+        below = first_leaf + find_piece(blob, at, wrap_phase(blob, at, guess))
+    nodes[0], squares[0] = below, 0.0
+    top = 1
+    while True:
+        while top > 0:
+            top -= 1
+            node = int(nodes[top])
+            if _out_of_reach(blob, tree + NODE * node, squares[top], best):
+                continue
+            if node < first_leaf:
+                near, far = 2 * node, 2 * node + 1
+                near_square = _chord_square(blob, tree + NODE * near, px, py, pz)
+                far_square = _chord_square(blob, tree + NODE * far, px, py, pz)
+                if far_square < near_square:
+                    near, far, near_square, far_square = far, near, far_square, near_square
+                nodes[top], squares[top] = far, far_square
+                nodes[top + 1], squares[top + 1] = near, near_square
+                top += 2
+            elif node - first_leaf < pieces:
+                piece = node - first_leaf
+                start = blob[breaks + piece]
+                h = blob[breaks + piece + 1] - start
+                square, u = _nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
+                distance = math.sqrt(square)
+                if distance < best - _TIE:
+                    best, best_t = distance, start + u
+        if below == 1:
+            break
+        nodes[0] = below ^ 1
+        squares[0] = _chord_square(blob, tree + NODE * (below ^ 1), px, py, pz)
+        below //= 2
+        top = 1
+    return best_t, best

@@ -1,0 +1,113 @@
+"""The bunny: an attractor that runs along the curve, felt only near it (Donald & Henle 2000, section 7.3)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
+from controllers.fields.follow import follow_force
+from controllers.fields.instructions import BUNNY, Program, checked, leave_trace, one_of, wrench_of
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+
+_LONGEST_TICK = 0.05  # [s] a bunny that waits does not leap after a pause
+
+
+@njit
+def gaussian(square: float, inverse_square: float) -> float:
+    """G_δ = exp(−|p − φ|²/2δ²), 1 on the bunny, from the squared distance and 1/δ²."""
+    return np.exp(-0.5 * square * inverse_square)
+
+
+@njit
+def _square_to(params: Array, curve: int, phase: float, p: Array) -> float:
+    x, y, z = curve_point(params, curve, phase)
+    return (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
+
+
+@njit
+def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction BUNNY: parameters [k_r, b_d, 1/δ², along, waits], memory [t*, t_b, time of the last tick]."""
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    time, inverse_square = hand[HAND_TIME], params[at + 2]
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
+    memory[slot] = phase
+    if params[at + 4] == 0.0:
+        bunny = params[curve + START] + time
+    elif np.isnan(memory[slot + 1]):
+        bunny = phase
+    else:
+        pace = gaussian(_square_to(params, curve, memory[slot + 1], p), inverse_square)
+        bunny = memory[slot + 1] + pace * min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
+    bunny = wrap_phase(params, curve, bunny)
+    memory[slot + 1], memory[slot + 2] = bunny, time
+    pull = gaussian(_square_to(params, curve, bunny, p), inverse_square)
+    target = phase if params[at + 3] > 0.0 else bunny
+    p_curve, v_curve = curve_point(params, curve, target), curve_velocity(params, curve, target)
+    for i in range(3):
+        wrench[i] = pull * follow_force(p[i], v[i], p_curve[i], v_curve[i], params[at], params[at + 1])
+        wrench[i + 3] = 0.0
+    leave_trace(params, curve, memory, phase, distance, bunny)
+
+
+@dataclass(frozen=True, eq=False)
+class Bunny:
+    r"""Attractor φ(t_b) that keeps its own pace and pulls the hand near it.
+
+    .. math:: L = G_\delta(p - \varphi(t_b))\,\bigl(k_r\,(\varphi(s) - p) + b_d\,(\dot\varphi(s) - \dot p)\bigr)
+
+    with G_δ(x) = exp(−|x|²/2δ²). The paper writes L = F ∗ G_δ(φ(t)); we read it as the field F weighted by the
+    Gaussian about the bunny. As δ → ∞ the form "along" tends to the static field of `Follow` with ε = ∞, the form
+    "point" to a spring and damper to the moving point.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    k_r : float
+        Stiffness [N/m].
+    b_d : float
+        Damping [N s/m].
+    delta : float
+        δ, how far the bunny is felt [m]; may be infinite.
+    attraction : {"point", "along"}
+        To the bunny itself (s = t_b), or along the curve by FOLLOW's own force (s = t*, the nearest phase).
+    pace : {"clock", "wait"}
+        t_b is the hand's time; or it starts nearest to the hand and runs at the rate G_δ, thus stops for a hand
+        that is held.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is negative or not finite, δ below 1e-4 m, or a form or pace is unknown.
+    """
+
+    curve: Trajectory
+    k_r: float
+    b_d: float
+    delta: float
+    attraction: Literal["point", "along"] = "point"
+    pace: Literal["clock", "wait"] = "wait"
+
+    def __post_init__(self) -> None:
+        checked("k_r", self.k_r, "N/m")
+        checked("b_d", self.b_d, "N s/m")
+        checked("delta", self.delta, "m", least=1e-4, infinite=True)
+        one_of("attraction", self.attraction, ("point", "along"))
+        one_of("pace", self.pace, ("clock", "wait"))
+
+    @cached_property
+    def _program(self) -> Program:
+        forms = [float(self.attraction == "along"), float(self.pace == "wait")]
+        return Program.law(BUNNY, [self.k_r, self.b_d, self.delta**-2, *forms], [np.nan] * 3, self.curve)
+
+    def program(self) -> Program:
+        """Compiled form of the field."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """L at one hand state, by the compiled law; a bunny that waits has just started."""
+        return wrench_of(bunny_wrench, self._program, hand)

@@ -1,0 +1,85 @@
+"""FOLLOW: a spring to the curve plus a damper to its tangent velocity (Donald & Henle 2000, section 4)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
+from controllers.fields.instructions import FOLLOW, Program, checked, leave_trace, wrench_of
+from controllers.fields.river import window
+from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+
+
+@njit
+def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float, b_d: float) -> float:
+    """F = k_r (φ − p) + b_d (φ̇ − v), one component of each in H, or whole vectors."""
+    return k_r * (p_curve - p) + b_d * (v_curve - v)
+
+
+@njit
+def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction FOLLOW: parameters [k_r, b_d, 1/ε²], memory [t*]."""
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
+    memory[slot] = phase
+    p_curve, v_curve = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    w = window(distance * distance * params[at + 2])
+    for i in range(3):
+        wrench[i] = w * follow_force(p[i], v[i], p_curve[i], v_curve[i], params[at], params[at + 1])
+        wrench[i + 3] = 0.0
+    leave_trace(params, curve, memory, phase, distance, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class Follow:
+    r"""River force that traces a curve by itself and yields to the hand.
+
+    .. math:: F = w(d/\varepsilon)\,\bigl(k_r\,(\varphi(t^*) - p) + b_d\,(\dot\varphi(t^*) - \dot p)\bigr)
+
+    t* is the phase of the curve's point nearest to the hand, d its distance, w the C² `window`. F is continuous in
+    p wherever the nearest point is unique (within `Trajectory.reach` of the curve, and beyond outside the medial
+    axis). Where two points are equally near, the one found first stays; beyond ε there is no force. At an open
+    curve's ends t* stays at the end.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    k_r : float
+        Radial stiffness [N/m].
+    b_d : float
+        Tangential damping [N s/m].
+    epsilon : float
+        ε, radius of the tube [m], may be infinite. The default is about the workspace's: the field reaches
+        everywhere and is hardly weakened near the curve (2 % at 2 cm).
+
+    Raises
+    ------
+    ParameterError
+        If a gain is negative or not finite, or ε below 1e-4 m.
+    """
+
+    curve: Trajectory
+    k_r: float
+    b_d: float
+    epsilon: float = 0.25
+
+    def __post_init__(self) -> None:
+        checked("k_r", self.k_r, "N/m")
+        checked("b_d", self.b_d, "N s/m")
+        checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
+
+    @cached_property
+    def _program(self) -> Program:
+        return Program.law(FOLLOW, [self.k_r, self.b_d, self.epsilon**-2], [np.nan], self.curve)
+
+    def program(self) -> Program:
+        """Compiled form of the field."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """F at one hand state, by the compiled law; t* is found without a warm start."""
+        return wrench_of(follow_wrench, self._program, hand)

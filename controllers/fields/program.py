@@ -1,0 +1,52 @@
+"""The evaluation of a field: one compiled chain over its instructions, whatever it is composed of."""
+
+import numpy as np
+from numba import njit
+
+from controllers.fields.bunny import bunny_wrench
+from controllers.fields.follow import follow_wrench
+from controllers.fields.instructions import ADD, BUNNY, EXTERNAL, FOLLOW, STACK, TRACE_DISTANCE, TRACE_ROW, Program
+from controllers.state import Array, IntArray
+
+__all__ = ["Program", "evaluate"]
+
+
+@njit
+def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: Array) -> None:
+    """Field's wrench at one tick.
+
+    Parameters
+    ----------
+    ops, params
+        Of a `Program`.
+    memory : Array
+        Its memory, written: state of the laws, and the trace in the first `TRACE_SIZE` numbers (see `instructions`).
+    hand : Array, shape (15,)
+        State of the hand (see `controllers.state`).
+    wrench : Array, shape (6,)
+        Written: [F_H (3) [N], τ_H (3) [N m]].
+    """
+    stack = np.empty((STACK, 6))
+    top = 0
+    memory[TRACE_DISTANCE] = np.inf
+    for row in range(ops.shape[0]):
+        opcode, at, slot, curve = ops[row, 0], ops[row, 1], ops[row, 2], ops[row, 3]
+        before = memory[TRACE_DISTANCE]
+        if opcode == FOLLOW:
+            follow_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == BUNNY:
+            bunny_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == EXTERNAL:
+            for i in range(6):
+                stack[top, i] = memory[slot + i]
+            top += 1
+        elif opcode == ADD:
+            top -= 1
+            for i in range(6):
+                stack[top - 1, i] += stack[top, i]
+        if memory[TRACE_DISTANCE] < before:
+            memory[TRACE_ROW] = row
+    for i in range(6):
+        wrench[i] = stack[0, i]

@@ -1,0 +1,80 @@
+"""What a controller is given and what it gives back, and how both lie in plain arrays.
+
+The compiled loop passes a hand as one vector of `HAND_SIZE` numbers, in the hand frame H (z up, origin at the
+device's zero configuration): ``[t, p (3), quaternion wxyz (4), v (3), ω (3), switch]``; a wrench as ``[F (3), τ
+(3)]``, both in H, the moment about the stylus tip.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+Vec3: TypeAlias = npt.NDArray[np.float64]
+Quat: TypeAlias = npt.NDArray[np.float64]
+Pose: TypeAlias = npt.NDArray[np.float64]
+Tangent: TypeAlias = npt.NDArray[np.float64]
+
+HAND_TIME = 0
+HAND_POSITION = 1
+HAND_QUATERNION = 4
+HAND_VELOCITY = 8
+HAND_ANGULAR_VELOCITY = 11
+HAND_SWITCH = 14
+HAND_SIZE = 15
+
+
+@dataclass(frozen=True, eq=False)
+class HandState:
+    """What the device measures of the hand at one tick.
+
+    Parameters
+    ----------
+    t : float
+        Time since the start of the run [s].
+    p : Vec3
+        p_H, the stylus tip [m].
+    q : Quat
+        R_H, orientation of the stylus, unit quaternion wxyz.
+    v : Vec3
+        Velocity of the tip in H [m/s].
+    w : Vec3
+        Angular velocity of the stylus in H [rad/s].
+    switch : bool
+        Whether the stylus switch is pressed.
+    """
+
+    t: float
+    p: Vec3
+    q: Quat
+    v: Vec3
+    w: Vec3
+    switch: bool = False
+
+    @staticmethod
+    def at(p: npt.ArrayLike, v: npt.ArrayLike = (0.0, 0.0, 0.0), t: float = 0.0) -> "HandState":
+        """Hand at position p [m] with velocity v [m/s] at time t [s]; stylus upright, not turning, switch open."""
+        upright = np.array([1.0, 0.0, 0.0, 0.0])
+        return HandState(t, np.asarray(p, dtype=float), upright, np.asarray(v, dtype=float), np.zeros(3))
+
+    def vector(self) -> Array:
+        """Array of the `HAND_SIZE` numbers that compiled laws read."""
+        return np.concatenate(([self.t], self.p, self.q, self.v, self.w, [float(self.switch)]))
+
+
+class Wrench(NamedTuple):
+    """What the hand shall feel.
+
+    Attributes
+    ----------
+    force : Vec3
+        F_H at the stylus tip [N].
+    torque : Vec3
+        τ_H about the stylus tip [N m].
+    """
+
+    force: Vec3
+    torque: Vec3
