@@ -2,8 +2,8 @@
 
 Sources: [C] Çavuşoğlu, Feygin & Tendick, "A Critical Study of the Mechanical and Electrical Properties of the PHANToM
 Haptic Interface", Presence 11(6), 2002, and the technical report of 2001 behind it; [S] SensAble's data sheet of the
-Premium 1.5, at second hand; [M] Maxon's catalogue, RE 25; [O] an open C++ model of the Premium 1.5 built on mahi-util; [E] an estimate
-of ours.
+Premium 1.5, at second hand; [M] Maxon's RE 25, as the open models have it; [O] an open C++ model of the Premium 1.5
+built on mahi-util; [E] an estimate of ours.
 """
 
 from dataclasses import dataclass
