@@ -1,0 +1,118 @@
+"""What the device may be asked for: a force limiter with a memory of heat, and a latch that lets go on a fault."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+_CONTINUOUS, _PEAK, _SHARE, _STEP = range(4)
+LIMITER_HEAT, LIMITER_FORCE, LIMITER_FAULT, LIMITER_SIZE = 0, 1, 4, 5
+
+FAULT_NONE, FAULT_NOT_FINITE = 0, 1
+
+
+@njit
+def force_ceiling(heat: float, continuous: float, peak: float) -> float:
+    """Largest force [N] for a mean square h of the past: L² = F_c² + (F_p² − F_c²) max(0, 1 − h/F_c²)."""
+    cold = np.maximum(0.0, 1.0 - heat / (continuous * continuous))
+    return np.sqrt(continuous * continuous + (peak * peak - continuous * continuous) * cold)
+
+
+@njit
+def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> None:
+    """Force that the device is asked for at this tick.
+
+    Parameters
+    ----------
+    limits : Array
+        `ForceLimiter.limits`.
+    limiter : Array
+        Memory [h, last force (3), fault], written. Once a fault is set the force stays zero until the memory is
+        renewed.
+    wrench : Array, shape (6,)
+        What the field asks for; the moment is dropped, the device has motors for a force only.
+    force : Array, shape (3,)
+        Written [N].
+    """
+    if not np.isfinite(wrench[0] + wrench[1] + wrench[2]):
+        limiter[LIMITER_FAULT] = FAULT_NOT_FINITE
+    if limiter[LIMITER_FAULT] != FAULT_NONE:
+        for i in range(3):
+            force[i] = limiter[LIMITER_FORCE + i] = 0.0
+        return
+    ceiling = force_ceiling(limiter[LIMITER_HEAT], limits[_CONTINUOUS], limits[_PEAK])
+    # Scaling by the largest component first keeps the norm of a huge force finite.
+    largest = max(abs(wrench[0]), abs(wrench[1]), abs(wrench[2]), 1e-300)
+    norm = largest * np.sqrt((wrench[0] / largest) ** 2 + (wrench[1] / largest) ** 2 + (wrench[2] / largest) ** 2)
+    scale = min(1.0, ceiling / norm)
+    change = 0.0
+    for i in range(3):
+        force[i] = scale * wrench[i]
+        change += (force[i] - limiter[LIMITER_FORCE + i]) ** 2
+    change = np.sqrt(change)
+    if change > limits[_STEP]:
+        for i in range(3):
+            last = limiter[LIMITER_FORCE + i]
+            force[i] = last + (force[i] - last) * (limits[_STEP] / change)
+    norm = np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
+    # The last force may have been allowed by a higher ceiling than today's.
+    scale = min(1.0, ceiling / max(norm, 1e-300))
+    heat = limiter[LIMITER_HEAT]
+    limiter[LIMITER_HEAT] = heat + limits[_SHARE] * ((scale * norm) ** 2 - heat)
+    for i in range(3):
+        force[i] *= scale
+        limiter[LIMITER_FORCE + i] = force[i]
+
+
+@dataclass(frozen=True)
+class ForceLimiter:
+    r"""Limits of the force at the stylus: continuous, peak, and how fast it may change.
+
+    .. math:: |F| \le L(h), \qquad T\,|\dot F| \le T\,r, \qquad \dot h = (|F|^2 - h)/\tau
+
+    The magnitude is scaled, the direction kept. h is the mean square of the force over the thermal time τ: a cold
+    motor gives the peak force, a motor that has worked for some τ the continuous one (see `force_ceiling`). A force
+    that is not finite is a fault: zero from then on.
+
+    Parameters
+    ----------
+    period : float
+        Servo period T [s].
+    continuous, peak : float
+        F_c and F_p [N]; the defaults are the Premium 1.5's.
+    thermal_time : float
+        τ [s]; the order of a motor winding's time constant.
+    slew : float
+        r, largest change of the force [N/s].
+
+    Raises
+    ------
+    ParameterError
+        If a value is not positive and finite, or the peak force is below the continuous one.
+    """
+
+    period: float
+    continuous: float = 1.5
+    peak: float = 8.5
+    thermal_time: float = 10.0
+    slew: float = 5000.0
+
+    def __post_init__(self) -> None:
+        for name in ("period", "continuous", "peak", "thermal_time", "slew"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} of the limiter must be positive and finite, got {value}")
+        if self.peak < self.continuous:
+            raise ParameterError(f"peak force {self.peak} N is below the continuous force {self.continuous} N")
+
+    def limits(self) -> Array:
+        """Parameters of `limit_force`."""
+        share = 1.0 - np.exp(-self.period / self.thermal_time)
+        return np.array([self.continuous, self.peak, share, self.slew * self.period])
+
+    def fresh_memory(self) -> Array:
+        """Memory of a cold device at rest without a fault."""
+        return np.zeros(LIMITER_SIZE)
