@@ -323,7 +323,7 @@ class Recording:
         self.seed = int(_dataset(file, "seed")[()])
         summary = bytes(_dataset(file, "summary")[: _dataset(file, "summary_bytes")[0]])
         self.summary: dict[str, object] | None = json.loads(summary) if summary else None
-        self.arrays: dict[str, npt.NDArray[np.generic]] = {}
+        self.arrays: dict[str, Array] = {}
         self.texts: dict[str, str] = {}
         static = _group(file, "static")
         for name in _names(static):
@@ -331,7 +331,7 @@ class Recording:
             if isinstance(value, bytes):
                 self.texts[name] = value.decode()
             else:
-                self.arrays[name] = np.asarray(value)
+                self.arrays[name] = np.asarray(value, dtype=np.float64)
         self.groups: dict[str, dict[str, Channel]] = {}
         self.rates: dict[str, float] = {}
         for name in _names(file):

@@ -102,7 +102,6 @@ class _Stage:
         self._model = model
         self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
         self._p_WH = np.asarray(recording.arrays["p_WH"], dtype=np.float64)
-        scene.configure_fog(1.0, 2.0, enabled=False)
         figure = body_shapes(model, "figure/")
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)

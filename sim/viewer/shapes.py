@@ -60,8 +60,10 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
         parts.setdefault((body, tuple(float(c) for c in rgba)), []).append(mesh)
     shapes: list[Shape] = []
     for (body, (red, green, blue, alpha)), meshes in parts.items():
-        whole = trimesh.util.concatenate(meshes)
-        shapes.append(Shape(body, np.asarray(whole.vertices), np.asarray(whole.faces), (red, green, blue, alpha)))
+        first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+        vertices = np.concatenate([mesh.vertices for mesh in meshes])
+        faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, first[:-1], strict=True)])
+        shapes.append(Shape(body, vertices, faces, (red, green, blue, alpha)))
     return shapes
 
 

@@ -1,0 +1,187 @@
+"""The figures of a run, drawn from its recording and nothing else.
+
+What is read: arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
+in group ``ticks`` the channels t, p, distance, force, user and torque; in group ``frames`` the channels t, joint_error,
+root_error, residual, ground and flight. SI units and radians there; millimetres, centimetres and degrees in figures.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from sim.recorder import Recording
+
+Array = npt.NDArray[np.float64]
+
+POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
+PUSH = 0.2  # a hand that presses harder than this counts as pushing [N]
+FIELD, USER, HAND, TUBE, PALE = "#22a046", "#eb7814", "#3c465a", "#dbe7f4", "#fbe3cd"
+AXES = ("#2f6db3", "#c2473b", "#7a5195")
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e8ec",
+    "axes.axisbelow": True,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+}
+
+
+def draw_figures(recording: Recording, folder: Path) -> list[Path]:
+    """Draw all figures as PNG files into a folder, which is made when it is missing.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order in which a reader wants them.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files: list[Path] = []
+    drawings: dict[str, Callable[[Recording], Figure]] = {
+        "path": path_figure,
+        "deviation": deviation_figure,
+        "forces": forces_figure,
+        "torques": torques_figure,
+        "figure": tracking_figure,
+    }
+    for name, draw in drawings.items():
+        with mpl.rc_context(_STYLE):
+            drawing = draw(recording)
+            files.append(folder / f"{name}.png")
+            drawing.savefig(files[-1], dpi=150)
+    return files
+
+
+def path_figure(recording: Recording) -> Figure:
+    """Path of the hand against curve and tube, seen along z and along y of the hand frame [mm]."""
+    curve, path = 1e3 * recording.arrays["curve"], 1e3 * _rows(recording, "ticks", "p")
+    radius = 1e3 * float(recording.arrays["tube_radius"])
+    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    figure, axes = _panels(1, 2, height=3.6)
+    for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
+        ax.add_collection(
+            PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=TUBE, zorder=1), autolim=False
+        )
+        ax.plot(curve[:, i], curve[:, j], color=HAND, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
+        ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
+        held = np.where(pushed[:, None], path, np.nan)
+        ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label="hand, pushing", zorder=3)
+        ax.margins(0.25)
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def deviation_figure(recording: Recording) -> Figure:
+    """Distance of the hand from the curve, pushes shaded, and again at a scale for a hand left alone [mm]."""
+    t = _rows(recording, "ticks", "t")
+    distance = 1e3 * _rows(recording, "ticks", "distance")
+    pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
+    figure, axes = _panels(2, 1, height=4.0)
+    for ax in axes:
+        _shade(ax, t, pushed, PALE, "hand pushes")
+        ax.axhline(
+            1e3 * float(recording.arrays["tube_radius"]), color=AXES[0], lw=0.8, ls="--", label="edge of the tube"
+        )
+        ax.plot(t, distance, color=HAND)
+        ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
+    left_alone = distance if np.all(pushed) else distance[~pushed]
+    axes[0].set(title="distance from the curve", ylim=(0, 1.08 * np.max(distance) + 1e-3))
+    axes[1].set(title="magnified", ylim=(0, 1.5 * np.percentile(left_alone, 90) + 1e-3), xlabel="time [s]")
+    _legend(axes[0])
+    return figure
+
+
+def forces_figure(recording: Recording) -> Figure:
+    """What the field does to the hand, and what the hand does to the stylus, by component [N]."""
+    t = _rows(recording, "ticks", "t")
+    figure, axes = _panels(2, 1, height=4.2)
+    for ax, name, title in zip(
+        axes, ("force", "user"), ("force of the field, limited", "force of the hand"), strict=True
+    ):
+        force = _rows(recording, "ticks", name)
+        ax.plot(t, np.linalg.norm(force, axis=1), color="#b9bec8", lw=2.4, label="norm")
+        for axis, color in enumerate(AXES):
+            ax.plot(t, force[:, axis], color=color, lw=1.0, label="xyz"[axis])
+        ax.set(title=title, ylabel="F [N]", xlim=(t[0], t[-1]))
+    _legend(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def torques_figure(recording: Recording) -> Figure:
+    """Torques of the three motors against what they can give for long and for a moment [mN m]."""
+    t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
+    continuous = 1e3 * np.asarray(recording.arrays["motor_continuous"], dtype=np.float64)
+    peak = 1e3 * np.asarray(recording.arrays["motor_peak"], dtype=np.float64)
+    figure, axes = _panels(3, 1, height=4.8)
+    for i, ax in enumerate(axes):
+        ax.plot(t, torque[:, i], color=AXES[i])
+        for sign in (-1, 1):
+            ax.axhline(sign * continuous[i], color=HAND, lw=0.8, ls="--", label="continuous" if sign > 0 else None)
+            ax.axhline(sign * peak[i], color=HAND, lw=0.8, ls=":", label="peak" if sign > 0 else None)
+        reach = max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
+        ax.set(title=f"motor {i + 1}", ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-1.25 * reach, 1.25 * reach))
+    _legend(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def tracking_figure(recording: Recording) -> Figure:
+    """How well the physical figure follows the animation, and what that takes; flights shaded."""
+    t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
+    weight = float(recording.arrays["body_weight"])
+    residual = 100 * np.linalg.norm(_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
+    ground = 100 * _rows(recording, "frames", "ground")[:, 2] / weight
+    curves = (
+        ("joints: RMS angle to the animation", "[°]", np.rad2deg(_rows(recording, "frames", "joint_error"))),
+        ("root: distance to the animation", "[cm]", 1e2 * _rows(recording, "frames", "root_error")),
+        ("residual force at the root", "[% body weight]", residual),
+        ("ground force, vertical", "[% body weight]", ground),
+    )
+    figure, axes = _panels(4, 1, height=6.4)
+    for ax, (title, unit, values) in zip(axes, curves, strict=True):
+        _shade(ax, t, flight, TUBE, "flight")
+        ax.plot(t, values, color=HAND)
+        ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
+        ax.set_ylim(bottom=0)
+    if np.any(flight):
+        _legend(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _rows(recording: Recording, group: str, name: str) -> Array:
+    channel = recording.groups[group][name]
+    return channel[:: max(1, -(-len(channel) // POINTS))]
+
+
+def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=columns == 1)
+    return figure, list(grid.ravel())
+
+
+def _legend(ax: Axes) -> None:
+    """In a row above the axes, where it hides no data."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
+def _shade(ax: Axes, t: Array, where: npt.NDArray[np.bool_], color: str, label: str) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    for i, (start, stop) in enumerate(edges.reshape(-1, 2)):
+        ax.axvspan(float(t[start]), float(t[stop - 1]), color=color, lw=0, label=label if i == 0 else None)

@@ -1,0 +1,89 @@
+"""report.html: what a run did, in one file that opens from disk: its lines, its replay in 3D, its figures."""
+
+import base64
+import html
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+
+from sim.recorder import Recording
+from sim.viewer.replay_html import MAGNIFICATION, SECONDS, replay_html
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,">
+<title>{title}</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }}
+h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
+h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
+ul {{ margin: 0 0 1rem; padding-left: 1.2rem; }}
+iframe {{ width: 100%; height: min(42rem, 80vh); border: 1px solid #d9dde4; border-radius: 6px; }}
+p {{ font-size: .9rem; color: #566072; margin: .5rem 0; }}
+p b {{ font-weight: 600; }}
+.figures {{ columns: 26rem; column-gap: 1.5rem; }}
+img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+<ul>{lines}</ul>
+<iframe title="Replay in 3D" srcdoc="{replay}"></iframe>
+<p>Drag to turn, wheel to zoom, right button to move; space plays and pauses, the bar scrubs.
+<b style="color:#22a046">Green</b> arrow: force of the field. <b style="color:#eb7814">Orange</b> arrow: force of the
+hand; where it pushes, the path is orange too. Light blue: the tube around the curve. {replayed}
+The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
+their true size.</p>
+<h2>Figures</h2>
+<div class="figures">{figures}</div>
+<h2>Made with</h2>
+<p>{versions}; seed {seed}.</p>
+</body>
+</html>
+"""
+
+
+def write_report(
+    path: Path, recording: Recording, model: mujoco.MjModel, title: str, lines: Sequence[str], figures: Sequence[Path]
+) -> None:
+    """Write the report of a run.
+
+    Parameters
+    ----------
+    path : Path
+        HTML file to write.
+    recording : Recording
+        What `replay_html` reads.
+    model : mujoco.MjModel
+        The world that was recorded.
+    title : str
+        Heading of the page.
+    lines : sequence of str
+        What happened, a sentence each.
+    figures : sequence of Path
+        PNG files, which are put into the page.
+    """
+    t = recording.groups["ticks"]["t"]
+    seconds = float(t[-1] - t[0])
+    replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
+    images = [
+        f'<img alt="{figure.stem}" src="data:image/png;base64,{base64.b64encode(figure.read_bytes()).decode()}">'
+        for figure in figures
+    ]
+    path.write_text(
+        _PAGE.format(
+            title=html.escape(title),
+            lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
+            replay=html.escape(replay_html(recording, model)),
+            replayed=replayed,
+            magnification=MAGNIFICATION,
+            figures="".join(images),
+            versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),
+            seed=recording.seed,
+        ),
+        encoding="utf-8",
+    )
