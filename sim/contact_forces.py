@@ -18,31 +18,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from sim.stance import factor, substitute
+
 Array = npt.NDArray[np.float64]
 
 N_EDGES = 4  # of a linearised friction cone
 _STEPS = 40
 _TOLERANCE = 1e-10
-
-
-@njit
-def solve_in_place(H: Array, g: Array) -> None:
-    """Solve H z = g for a small symmetric positive definite H; H is overwritten, g becomes z."""
-    n = g.size
-    for i in range(n):
-        for j in range(i + 1):
-            total = H[i, j]
-            for k in range(j):
-                total -= H[i, k] * H[j, k]
-            H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
-    for i in range(n):
-        for k in range(i):
-            g[i] -= H[i, k] * g[k]
-        g[i] /= H[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            g[i] -= H[k, i] * g[k]
-        g[i] /= H[i, i]
 
 
 @njit
@@ -101,7 +83,8 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
         if norm < _TOLERANCE**2:
             return taken
         gradient = step.copy()
-        solve_in_place(H, step)
+        factor(H)
+        substitute(H, step)
         slope = -np.dot(gradient, step)
         length = 1.0
         trial = residual - step

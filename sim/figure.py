@@ -27,9 +27,10 @@ import numpy.typing as npt
 from numba import njit
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT, SEGMENTS, figure_model
-from sim.contact_forces import N_EDGES, cone_edges, shared_forces, solve_in_place
+from sim.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.errors import SimError
 from sim.native import mj_full_m, mj_kinematics
+from sim.stance import stance_response
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -81,6 +82,7 @@ class FigureState(NamedTuple):
     moment_bound: float
     reference_reach: float
     contact_reach: float
+    flight_height: float
     acceleration: Array
     rotation: Array
     share: Array
@@ -94,6 +96,12 @@ class FigureState(NamedTuple):
     given: Array
     wrench: Array
     root_M: Array
+    root_bias: Array
+    wanted_root: Array
+    points: Array
+    legs: IntArray
+    offset: Array
+    response: Array
     report: Array
 
 
@@ -160,11 +168,10 @@ def _find_support(s: FigureState, q_r: Array) -> float:
     mj_kinematics(s.twin_model, s.twin_data)
     support = 0.0
     for i in range(s.share.shape[0]):
-        near = _nearness(s.twin_contact_pos[s.twin_contact[i], 2] - s.radius, s.reference_reach)
-        if near > 0.0:
-            near *= _nearness(s.contact_pos[s.contact[i], 2] - s.radius, s.contact_reach)
-        s.share[i] = near
-        support = max(support, near)
+        height = s.twin_contact_pos[s.twin_contact[i], 2] - s.radius
+        near = _nearness(s.contact_pos[s.contact[i], 2] - s.radius, s.contact_reach)
+        s.share[i] = near * _nearness(height, s.reference_reach)
+        support = max(support, near * _nearness(height, s.flight_height))
     return support
 
 
@@ -185,13 +192,33 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     M, a, demand, w = s.M, s.acceleration, s.demand, s.wrench
     R, origin = s.xmat[0], s.xpos[0]
+    for c in range(s.share.shape[0]):
+        s.points[c] = s.contact_pos[s.contact[c]]
+        s.points[c, 2] -= s.radius
+    s.root_M[:] = M[:6, :6]
+    s.wanted_root[:] = a[:6]
+    a[:6] = 0.0
+    for leg in range(2):
+        stance_response(
+            s.legs[leg], s.points[4 * leg : 4 * leg + 4], s.share[4 * leg : 4 * leg + 4], s.xpos, s.xmat, s.qvel, a,
+            s.offset, s.response[leg],
+        )
+        for k in range(9):
+            t = 3 + 3 * s.legs[leg, k // 3] + k % 3
+            a[t] += s.offset[k]
+            for i in range(6):
+                for m in range(6):
+                    s.root_M[i, m] += M[i, t] * s.response[leg, k, m]
     for i in range(6):
-        demand[i] = s.bias[i] - s.passive[i]
-        for k in range(n):
-            demand[i] += M[i, k] * a[k]
+        s.root_bias[i] = s.bias[i] - s.passive[i]
+        for k in range(6, n):
+            s.root_bias[i] += M[i, k] * a[k]
+        demand[i] = s.root_bias[i]
+        for k in range(6):
+            demand[i] += s.root_M[i, k] * s.wanted_root[k]
     w[:] = 0.0
     s.force[:] = 0.0
-    if support > 0.0:
+    if s.share.max() > 0.0:
         s.scaled[:3] = demand[:3] / s.weight
         for i in range(3):  # moments in world axes, so that the cones need no turning
             s.scaled[3 + i] = (R[3 * i] * demand[3] + R[3 * i + 1] * demand[4] + R[3 * i + 2] * demand[5]) / (
@@ -199,8 +226,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
             )
         for c in range(s.share.shape[0]):
             point = s.rotation[0]
-            point[:] = s.contact_pos[s.contact[c]] - origin
-            point[2] -= s.radius
+            point[:] = s.points[c] - origin
             edges = s.edges[N_EDGES * c : N_EDGES * c + N_EDGES]
             cone_edges(point, s.friction, edges)
             edges[:, 3:] /= _LEVER
@@ -217,13 +243,12 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     given = s.given
     given[:] = 0.0
     _contact_torques(s, given)
-    for i in range(6):
-        demand[i] = given[i] + w[i] - s.bias[i] + s.passive[i]
-        for k in range(6, n):
-            demand[i] -= M[i, k] * a[k]
-    s.root_M[:] = M[:6, :6]
-    solve_in_place(s.root_M, demand)
-    a[:6] = demand
+    a[:6] = np.linalg.solve(s.root_M, given[:6] + w - s.root_bias)
+    for leg in range(2):
+        for k in range(9):
+            t = 3 + 3 * s.legs[leg, k // 3] + k % 3
+            for m in range(6):
+                a[t] += s.response[leg, k, m] * a[m]
     saturated = 0
     for i in range(6, n):
         torque = s.bias[i] - s.passive[i] - given[i]
@@ -265,9 +290,7 @@ def _contact_torques(s: FigureState, given: Array) -> None:
             given[i] += f[i]
         body = s.contact_body[c]
         while body >= 0:
-            x = s.contact_pos[s.contact[c], 0] - origin[body, 0]
-            y = s.contact_pos[s.contact[c], 1] - origin[body, 1]
-            z = s.contact_pos[s.contact[c], 2] - s.radius - origin[body, 2]
+            x, y, z = s.points[c, 0] - origin[body, 0], s.points[c, 1] - origin[body, 1], s.points[c, 2] - origin[body, 2]
             mx, my, mz = y * f[2] - z * f[1], z * f[0] - x * f[2], x * f[1] - y * f[0]
             for i in range(3):
                 given[3 + 3 * body + i] += R[body, i] * mx + R[body, 3 + i] * my + R[body, 6 + i] * mz
@@ -288,12 +311,13 @@ class FigureGains:
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
     """
 
-    joint_rate: float = 40.0
-    root_rate: float = 12.0
+    joint_rate: float = 25.0
+    root_rate: float = 25.0
     force_bound: float = 0.5
     moment_bound: float = 0.1
-    reference_reach: float = 0.02
-    contact_reach: float = 0.01
+    reference_reach: float = 0.03
+    contact_reach: float = 0.004
+    flight_height: float = 0.02
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -363,8 +387,11 @@ class Figure:
             weight=weight, radius=float(m.geom_size[geoms[0], 0]), friction=0.9 * float(m.geom_friction[geoms[0], 0]),
             joint_rate=gains.joint_rate, root_rate=gains.root_rate, force_bound=gains.force_bound * weight,
             moment_bound=gains.moment_bound * weight * 1.75, reference_reach=gains.reference_reach,
-            contact_reach=gains.contact_reach, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
+            contact_reach=gains.contact_reach, flight_height=gains.flight_height, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
             share=np.zeros(n), edges=np.zeros((N_EDGES * n, 6)), edge_share=np.zeros(N_EDGES * n),
             edge_force=np.zeros(N_EDGES * n), force=np.zeros((n, 3)), scaled=np.zeros(6), residual=np.zeros(6),
-            demand=np.zeros(6), given=np.zeros(N_TANGENT), wrench=np.zeros(6), root_M=np.zeros((6, 6)), report=np.zeros(8),
+            demand=np.zeros(6), given=np.zeros(N_TANGENT), wrench=np.zeros(6), root_M=np.zeros((6, 6)),
+            root_bias=np.zeros(6), wanted_root=np.zeros(6), points=np.zeros((n, 3)),
+            legs=np.array([[BODIES.index(f"{side}_{b}") for b in ("thigh", "shank", "foot")] for side in ("left", "right")]),
+            offset=np.zeros(9), response=np.zeros((2, 9, 6)), report=np.zeros(8),
         )  # fmt: skip

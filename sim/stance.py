@@ -1,0 +1,149 @@
+r"""How the legs move while their feet stand: the floor, not the reference, says where a loaded foot is.
+
+A foot that landed a centimetre from where the reference has it would be torn along the floor by the feedback, and the friction
+that this meets is a force nobody planned. So the wanted accelerations a_ℓ of a leg's nine degrees of freedom are amended, by as
+little as possible, towards contact points at rest:
+
+.. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p s_p\,\|J_p^\ell(a_\ell^* + \delta) + J_p^r a_r + \dot J_p v
+          + 2\eta\,\dot p + \eta^2 h_p e_z\|^2 ,
+
+with each point's share s_p of the load and its height h_p, in the form δ = δ_0 + K a_r, since the root's acceleration is not known yet.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_ADHERENCE = 100.0  # κ
+_SETTLING = 30.0  # η, rate at which a foot is asked to come to rest on the floor [1/s]
+N_LEG = 9
+
+
+@njit
+def _cross_add(a: Array, b: Array, out: Array) -> None:
+    """out += a × b."""
+    out[0] += a[1] * b[2] - a[2] * b[1]
+    out[1] += a[2] * b[0] - a[0] * b[2]
+    out[2] += a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def stance_response(
+    bodies: IntArray, points: Array, share: Array, xpos: Array, xmat: Array, v: Array, a: Array,
+    offset: Array, response: Array,
+) -> None:  # fmt: skip
+    """Amend the wanted accelerations of one leg so that its loaded contact points rest.
+
+    Parameters
+    ----------
+    bodies : IntArray
+        Indices of thigh, shank and foot among the figure's bodies; the root is 0.
+    points, share : Array
+        Positions (n, 3) of the foot's contact points in the world, floor at z = 0, and their shares (n,).
+    xpos, xmat : Array
+        Positions (18, 3) and rotation matrices (18, 9) of the figure's bodies.
+    v, a : Array
+        Velocity and wanted acceleration of the figure (57).
+    offset, response : Array
+        Results δ_0 (9,) and K (9, 6).
+    """
+    offset[:] = 0.0
+    response[:] = 0.0
+    if share.max() <= 0.0:
+        return
+    normal = np.eye(N_LEG)
+    J, J_root, wanted = np.empty((3, N_LEG)), np.empty((3, 6)), np.empty(3)
+    omega, axis, relative, arm, spin = np.zeros((4, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    # angular velocities of root, thigh, shank, foot; acceleration of the foot's origin under velocities alone
+    drift, turning = np.zeros((4, 3)), np.zeros((4, 3))
+    for level in range(4):
+        body = 0 if level == 0 else bodies[level - 1]
+        for i in range(3):
+            relative[i] = 0.0
+            for k in range(3):
+                relative[i] += xmat[body, 3 * i + k] * v[3 + 3 * body + k]
+        if level > 0:
+            above = 0 if level == 1 else bodies[level - 2]
+            omega[level] = omega[level - 1]
+            turning[level] = turning[level - 1]
+            _cross_add(omega[level - 1], relative, turning[level])
+            arm[:] = xpos[body] - xpos[above]
+            drift[level] = drift[level - 1]
+            _cross_add(turning[level - 1], arm, drift[level])
+            spin[:] = 0.0
+            _cross_add(omega[level - 1], arm, spin)
+            _cross_add(omega[level - 1], spin, drift[level])
+        omega[level] += relative
+    for p in range(share.shape[0]):
+        if share[p] <= 0.0:
+            continue
+        weight = _ADHERENCE * share[p]
+        arm[:] = points[p] - xpos[bodies[2]]
+        spin[:] = 0.0
+        _cross_add(omega[3], arm, spin)
+        wanted[:] = -drift[3]
+        relative[:] = 0.0
+        _cross_add(turning[3], arm, relative)
+        _cross_add(omega[3], spin, relative)
+        wanted -= relative
+        for level in range(4):
+            body = 0 if level == 0 else bodies[level - 1]
+            arm[:] = points[p] - xpos[body]
+            for k in range(3):
+                for i in range(3):
+                    axis[i] = xmat[body, 3 * i + k]
+                spin[:] = 0.0
+                _cross_add(axis, arm, spin)
+                if level == 0:
+                    J_root[:, 3 + k] = spin
+                else:
+                    J[:, 3 * (level - 1) + k] = spin
+        for i in range(3):
+            J_root[i, :3] = 0.0
+            J_root[i, i] = 1.0
+        wanted[2] -= _SETTLING**2 * points[p, 2]
+        for i in range(3):
+            for k in range(6):
+                wanted[i] -= 2.0 * _SETTLING * J_root[i, k] * v[k]
+            for k in range(N_LEG):
+                t = 3 + 3 * bodies[k // 3] + k % 3
+                wanted[i] -= J[i, k] * (2.0 * _SETTLING * v[t] + a[t])
+        for k in range(N_LEG):
+            for i in range(3):
+                offset[k] += weight * J[i, k] * wanted[i]
+                for m in range(6):
+                    response[k, m] -= weight * J[i, k] * J_root[i, m]
+                for m in range(k + 1):
+                    normal[k, m] += weight * J[i, k] * J[i, m]
+    factor(normal)
+    substitute(normal, offset)
+    for m in range(6):
+        substitute(normal, response[:, m])
+
+
+@njit
+def factor(H: Array) -> None:
+    """Cholesky factor of a small symmetric positive definite matrix, in its lower triangle."""
+    for i in range(H.shape[0]):
+        for j in range(i + 1):
+            total = H[i, j]
+            for k in range(j):
+                total -= H[i, k] * H[j, k]
+            H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
+
+
+@njit
+def substitute(L: Array, g: Array) -> None:
+    """Solve L Lᵀ z = g; g becomes z."""
+    n = g.size
+    for i in range(n):
+        for k in range(i):
+            g[i] -= L[i, k] * g[k]
+        g[i] /= L[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            g[i] -= L[k, i] * g[k]
+        g[i] /= L[i, i]
