@@ -23,6 +23,7 @@ from models.mocap.motion_file import (
     VALUE_LIMIT,
     MotionFileError,
     count,
+    frame_rate,
     number,
     numbers,
     quoted,
@@ -78,7 +79,7 @@ def read_bvh(path: Path) -> SourceMotion:
             turn = quaternions.about_axis(axis, np.deg2rad(frames[:, column]))
             rotations[:, index] = quaternions.product(rotations[:, index], turn)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
-    return SourceMotion(path.stem, names, parents, offsets, tips, rotations, translations, fps)
+    return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None)
 
 
 class _Tokens:
@@ -196,7 +197,7 @@ def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path)
     match = re.fullmatch(r"\s*Frame\s+Time\s*:\s*(\S+)\s*", text, re.IGNORECASE)
     if match is None:
         raise MotionFileError(path, line, f"found {quoted(text.strip())} after Frames", "Frame Time: seconds")
-    fps = _frame_rate(match[1], path, line)
+    fps = frame_rate(number(match[1], path, line), path, line)
     values, found = array("d"), 0
     for line, text in rest:
         tokens = text.split()
@@ -212,17 +213,6 @@ def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path)
     if found < n_frames and n_columns:
         raise MotionFileError(path, len(lines), f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
     return np.array(values).reshape(n_frames, n_columns), fps
-
-
-def _frame_rate(token: str, path: Path, line: int) -> float:
-    """Frames per second: a whole number when the frame time is one's reciprocal in as many digits as the file gives."""
-    seconds = number(token, path, line)
-    if not 1e-5 <= seconds <= 1e4:
-        raise MotionFileError(path, line, f"frame time is {quoted(token)} s", "between 0.00001 and 10000 s")
-    decimals = len(token.partition(".")[2]) if "e" not in token.lower() else 17
-    whole = round(1.0 / seconds)
-    near = whole > 0 and abs(1.0 / whole - seconds) <= min(10.0**-decimals, 1e-3 * seconds)
-    return float(whole) if near else 1.0 / seconds
 
 
 def _rotation_order(joint: str) -> tuple[int, int, int]:
@@ -302,4 +292,4 @@ def own_clip(motion: SourceMotion) -> Clip | None:
         return None
     quaternion = motion.rotations[..., [0, *(1 + axis for axis in _TO_WORLD)]]
     position = motion.translations[:, 0, _TO_WORLD] / _CENTIMETRES
-    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.name)
+    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)

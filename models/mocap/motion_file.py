@@ -98,3 +98,17 @@ def count(token: str, limit: int, what: str, path: Path, line: int) -> int:
     if not _COUNT.fullmatch(token) or int(token) > limit:
         raise MotionFileError(path, line, f"{what} is {quoted(token)}", f"a whole number up to {limit}")
     return int(token)
+
+
+def frame_rate(seconds: float, path: Path, line: int) -> float:
+    """Frames per second of a frame time; files round it, so a rate within 5e-5 of a whole number is that number.
+
+    Raises
+    ------
+    MotionFileError
+        If the time is not between 1e-5 and 1e4 s.
+    """
+    if not 1e-5 <= seconds <= 1e4:
+        raise MotionFileError(path, line, f"frame time is {seconds:g} s", "between 0.00001 and 10000 s")
+    rate = 1.0 / seconds
+    return float(round(rate)) if abs(rate - round(rate)) <= 5e-5 * rate else rate

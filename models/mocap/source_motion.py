@@ -1,6 +1,7 @@
 """A motion on the skeleton it was recorded or authored for: what the readers return, before any retargeting."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +20,8 @@ class SourceMotion:
 
     Attributes
     ----------
-    name : str
-        What the motion is called.
+    path : Path
+        The file it was read from.
     joints : tuple of str
         Names as the file gives them; a parent comes before its children.
     parents : tuple of int
@@ -35,9 +36,11 @@ class SourceMotion:
         From the parent to the joint in the parent's frame: the offset, unless the file moves the joint.
     fps : float
         Frames per second [1/s].
+    unit : float or None
+        The file's unit of length [m] where the format tells it.
     """
 
-    name: str
+    path: Path
     joints: tuple[str, ...]
     parents: tuple[int, ...]
     offsets: Array
@@ -45,6 +48,7 @@ class SourceMotion:
     rotations: Array
     translations: Array
     fps: float
+    unit: float | None
 
     @property
     def n_frames(self) -> int:

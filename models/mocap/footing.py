@@ -1,0 +1,87 @@
+"""Where the floor is under a retargeted motion, and toes that do not go through it.
+
+The figure's foot is one rigid piece. A foot that rolls off over bent toes would push the figure's through the floor, so
+where the toes' contact points are too low the ankle bends them up, about its own lateral axis, until they touch.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
+from models.mocap import quaternions
+
+Array = npt.NDArray[np.float64]
+
+_LEVEL = 0.06  # the four contact points of a sole that is level differ by less in height [m]
+_SHARE = 0.25  # of the supporting, level soles are at or below the floor
+_FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
+_PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
+
+
+def on_the_floor(root: Array, segments: Array) -> tuple[Array, Array]:
+    """The motion shifted vertically, by one constant, onto the floor, with toes bent up where they would go through it.
+
+    Parameters
+    ----------
+    root : array of shape (frames, 3)
+        Positions of the pelvis [m], z up.
+    segments : array of shape (frames, 18, 4)
+        Rotations of the segments in the world.
+
+    Returns
+    -------
+    root, segments : arrays
+        The same after the shift and the bending of the ankles.
+    """
+    ankles = root[:, None, 2] + _ankle_heights(segments)
+    feet = segments[:, _FEET]
+    points = _contact_points()
+    heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
+    floor = _floor(heights)
+    bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
+    segments = segments.copy()
+    segments[:, _FEET] = quaternions.product(feet, quaternions.about_axis(1, bend))
+    return root - np.array([0.0, 0.0, floor]), segments
+
+
+def _contact_points() -> Array:
+    """Centres of the contact spheres in the frames of the feet, shape (2, 4, 3)."""
+    model = figure_model()
+    return np.array([[model.geom(f"{side}_{place}").pos for place in _PLACES] for side in ("left", "right")])
+
+
+def _ankle_heights(segments: Array) -> Array:
+    """Heights of the ankles over the pelvis [m], shape (frames, 2)."""
+    model = figure_model()
+    heights = np.zeros((len(segments), len(_FEET)))
+    for column, body in enumerate(_FEET):
+        while (parent := SEGMENTS[body].parent) >= 0:
+            heights[:, column] += quaternions.rotated(segments[:, parent], model.body(BODIES[body]).pos)[:, 2]
+            body = parent
+    return heights
+
+
+def _floor(heights: Array) -> float:
+    """Height of the floor from the contact points', shape (frames, 2, 4): where the lower foot's level sole is."""
+    lower = np.argmin(heights.min(axis=2), axis=1)
+    sole = heights[np.arange(len(heights)), lower]
+    level = np.ptp(sole, axis=1) < _LEVEL
+    # Somebody who never puts a foot down flat stands on the lowest points instead.
+    return float(np.quantile(sole[level].mean(axis=1) if level.any() else sole.min(axis=1), _SHARE))
+
+
+def _toe_bend(ankles: Array, feet: Array, points: Array) -> Array:
+    """Rotations about the feet's y axis [rad], ≤ 0, after which no toe is below the floor, shape (frames, 2).
+
+    A point p of a foot whose frame has the vertical r is, after a bend by δ, at the height
+    h + r_y p_y + (r_x p_x + r_z p_z) cos δ + (r_x p_z − r_z p_x) sin δ.
+    """
+    r = quaternions.rotated(quaternions.conjugate(feet), np.array([0.0, 0.0, 1.0]))[:, :, None]
+    p = points[:, 2:]
+    constant = ankles[:, :, None] + r[..., 1] * p[..., 1]
+    cosine = r[..., 0] * p[..., 0] + r[..., 2] * p[..., 2]
+    sine = r[..., 0] * p[..., 2] - r[..., 2] * p[..., 0]
+    turn = np.arctan2(sine, cosine) + np.arccos(np.clip(-constant / np.hypot(cosine, sine), -1.0, 1.0))
+    # Only a foot with its toes ahead of the ankle and too low has anything to bend.
+    needed = (constant + cosine < 0.0) & (sine < 0.0)
+    return np.where(needed, np.clip(turn, -np.pi / 3, 0.0), 0.0).min(axis=2)

@@ -1,0 +1,111 @@
+"""Clips by name or from anybody's files: `load_clip` for any format, `embedded` for those of the package."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import NamedTuple
+
+from models.errors import ModelError
+from models.mocap.asf_amc import read_amc
+from models.mocap.bvh import own_clip, read_bvh, write_bvh
+from models.mocap.clip import Clip
+from models.mocap.deepmimic import read_deepmimic
+from models.mocap.motion_file import MotionFileError, read_lines
+from models.mocap.retarget import RetargetReport, retarget
+from models.mocap.skeleton_roles import roles_of
+from models.mocap.source_motion import SourceMotion
+
+_CLIPS = files("models.mocap") / "clips"
+
+
+class Loaded(NamedTuple):
+    """A clip from a file, and what the file was taken for; no report where it is the figure's own."""
+
+    clip: Clip
+    report: RetargetReport | None
+
+
+def embedded_names() -> tuple[str, ...]:
+    """Names of the clips that come with the package, sorted."""
+    if not _CLIPS.is_dir():
+        return ()
+    return tuple(sorted(entry.name.removesuffix(".bvh") for entry in _CLIPS.iterdir() if entry.name.endswith(".bvh")))
+
+
+def embedded(name: str) -> Clip:
+    """A clip that comes with the package.
+
+    Raises
+    ------
+    ModelError
+        If there is no clip of that name.
+    """
+    if name not in embedded_names():
+        raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}")
+    with as_file(_CLIPS / f"{name}.bvh") as path:
+        return load_clip(path)
+
+
+def load_clip(path: Path) -> Clip:
+    """The motion in a BVH, AMC or DeepMimic file, on the figure; see `load`."""
+    return load(path).clip
+
+
+def load(path: Path) -> Loaded:
+    """The motion in a file, on the figure, and a report: a file of `write_bvh` as it is, another skeleton retargeted.
+
+    Raises
+    ------
+    MotionFileError
+        If the file cannot be read, or its skeleton is not a human's.
+    """
+    motion = read_motion(path)
+    if (clip := own_clip(motion)) is not None:
+        return Loaded(clip, None)
+    roles = roles_of(motion.joints, motion.parents)
+    if isinstance(roles, str):
+        names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
+        raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", "the skeleton of a human")
+    return Loaded(*retarget(motion, roles))
+
+
+def read_motion(path: Path) -> SourceMotion:
+    """The motion in a file on its own skeleton; the format is told by the suffix, else by the first word.
+
+    Raises
+    ------
+    MotionFileError
+        If the file cannot be read.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".bvh":
+        return read_bvh(path)
+    if suffix == ".amc":
+        return read_amc(path)
+    start = next((line.strip() for line in read_lines(path) if line.strip()), "")
+    if start.upper().startswith("HIERARCHY"):
+        return read_bvh(path)
+    if start.startswith(("{", "[")):
+        return read_deepmimic(path)
+    raise MotionFileError(path, 1, "not a motion file", "BVH, AMC (with its ASF beside it) or DeepMimic JSON")
+
+
+def convert(source: Path, target: Path, overwrite: bool = False) -> Loaded:
+    """Read any motion file and write it as BVH on the figure's 57 channels.
+
+    Raises
+    ------
+    MotionFileError
+        If the source cannot be read.
+    ModelError
+        If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
+    """
+    if target.suffix.lower() != ".bvh":
+        raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
+    if target.exists() and not overwrite:
+        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    loaded = load(source)
+    try:
+        write_bvh(loaded.clip, target)
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
+    return loaded
