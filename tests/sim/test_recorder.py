@@ -1,0 +1,210 @@
+"""A recording keeps what it was given, whole or killed, and never overwrites another."""
+
+import json
+import random
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from sim.recorder import CHUNK_SECONDS, Group, Recorder, Recording, RecordingError
+
+CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
+GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
+
+# Writes rows that hold their own number, and says after each block how many there are.
+WRITER = """
+import sys
+from pathlib import Path
+import numpy as np
+from sim.recorder import Group, Recorder
+channels = {"t": (), "p": (3,), "applied": (2, 3)}
+recorder = Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, channels)}, {"xml": "x" * 300000})
+n = 0
+while True:
+    rows = np.arange(n, n + 20.0)
+    blocks = {k: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (20, *s)) for k, s in channels.items()}
+    recorder.append("ticks", blocks)
+    n += 20
+    print(n, flush=True)
+    if n == int(sys.argv[2]):
+        recorder.close({"text": "y" * 20000})
+"""
+
+
+def block(start: int, n: int) -> dict[str, np.ndarray]:
+    rows = np.arange(start, start + n, dtype=float)
+    return {name: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (n, *s)) for name, s in CHANNELS.items()}
+
+
+def numbered(channel) -> bool:
+    rows = channel[:]
+    return bool(np.all(rows == np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1))))
+
+
+def test_everything_given_is_read_back_bit_for_bit(tmp_path):
+    rng = np.random.default_rng(1)
+    t, p, applied = rng.normal(size=777), rng.normal(size=(777, 3)), rng.normal(size=(777, 2, 3))
+    curve = rng.normal(size=(50, 3))
+    with Recorder(tmp_path / "run.h5", {"gain": 0.1}, 7, GROUPS, {"curve": curve, "xml": "<mujoco/> φ"}) as recorder:
+        for a, b in ((0, 1), (1, 250), (250, 251), (251, 777)):
+            recorder.append("ticks", {"t": t[a:b], "p": p[a:b], "applied": applied[a:b]})
+        recorder.close({"rms": 0.1 + 0.2})
+    with Recording(tmp_path / "run.h5") as recording:
+        ticks = recording.groups["ticks"]
+        assert np.array_equal(ticks["t"][:], t)
+        assert np.array_equal(ticks["p"][:], p)
+        assert np.array_equal(ticks["applied"][:], applied)
+        assert np.array_equal(ticks["p"][10:500:7], p[10:500:7])
+        assert np.array_equal(ticks["p"][-1], p[-1])
+        assert ticks["p"].shape == (777, 3)
+        assert len(recording.groups["frames"]["t"]) == 0
+        assert recording.rates == {"ticks": 1000.0, "frames": 100.0}
+        assert np.array_equal(recording.arrays["curve"], curve)
+        assert recording.texts["xml"] == "<mujoco/> φ"
+        assert (recording.config, recording.seed) == ({"gain": 0.1}, 7)
+        assert recording.summary == {"rms": 0.1 + 0.2}
+        assert recording.complete
+        assert recording.versions["numpy"] == np.__version__
+        with pytest.raises(IndexError):
+            ticks["p"][777]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_run_killed_while_it_writes_opens_and_has_lost_less_than_a_second(tmp_path, seed):
+    path = tmp_path / "run.h5"
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(path), "-1"], stdout=subprocess.PIPE) as writer:
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        time.sleep(random.Random(seed).uniform(0.0, 0.3))
+        writer.kill()
+        said = [20, *map(int, writer.stdout.read().split(b"\n")[:-1])][-1]
+    with Recording(path) as recording:
+        ticks = recording.groups["ticks"]
+        assert said - len(ticks["t"]) <= CHUNK_SECONDS * 1000 <= 1000
+        assert all(numbered(channel) for channel in ticks.values())
+        assert not recording.complete
+
+
+@pytest.mark.slow
+def test_no_moment_of_a_kill_spoils_a_recording(tmp_path):
+    """A hundred kills, from the moment the file appears until after it is closed."""
+    rng = random.Random(0)
+    opened = 0
+    for i in range(100):
+        path = tmp_path / f"{i}.h5"
+        arguments = [sys.executable, "-c", WRITER, str(path), str(20 * rng.randrange(1, 400))]
+        with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as writer:
+            while not path.exists():
+                time.sleep(0.0005)
+            time.sleep(rng.choice((0.0, rng.uniform(0.0, 0.004), rng.uniform(0.0, 0.15))))
+            writer.kill()
+        with Recording(path) as recording:
+            ticks = recording.groups["ticks"]
+            assert all(numbered(channel) for channel in ticks.values())
+            assert recording.summary in (None, {"text": "y" * 20000})
+            opened += 1
+    assert opened == 100
+
+
+def test_an_exception_keeps_all_rows_and_marks_the_recording_as_incomplete(tmp_path):
+    def run():
+        with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
+            recorder.append("ticks", block(0, 333))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    with Recording(tmp_path / "run.h5") as recording:
+        assert len(recording.groups["ticks"]["t"]) == 333
+        assert recording.summary is None
+
+
+def test_rows_that_were_not_counted_are_not_read(tmp_path):
+    path = tmp_path / "run.h5"
+    with Recorder(path, {}, 1, GROUPS, {}) as recorder:
+        recorder.append("ticks", block(0, 500))
+    with h5py.File(path, "r+") as file:
+        file["ticks/p"].resize(900, axis=0)
+    with Recording(path) as recording:
+        assert recording.groups["ticks"]["p"].shape == (500, 3)
+
+
+def test_a_running_recording_can_be_read(tmp_path):
+    with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
+        recorder.append("ticks", block(0, 600))
+        with Recording(tmp_path / "run.h5") as recording:
+            assert len(recording.groups["ticks"]["p"]) == 500
+            assert numbered(recording.groups["ticks"]["p"])
+
+
+def test_memory_does_not_grow_with_the_run(tmp_path):
+    """Fifty times the rows may cost a few megabytes more, not the hundred that they occupy."""
+    script = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from sim.recorder import Group, Recorder
+n = 250
+with Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, {"x": (100,)})}, {}) as recorder:
+    for i in range(530):
+        if i == 10:
+            early = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        recorder.append("ticks", {"x": np.full((n, 100), float(i))})
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - early)
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "run.h5")], capture_output=True, check=True, text=True
+    )
+    assert (tmp_path / "run.h5").stat().st_size > 100e6
+    assert int(result.stdout) < 10_000
+
+
+def test_an_existing_file_is_refused_and_left_alone(tmp_path):
+    (tmp_path / "run.h5").write_text("precious")
+    with pytest.raises(RecordingError, match=r"run\.h5: exists"):
+        Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {})
+    assert (tmp_path / "run.h5").read_text() == "precious"
+    assert [file.name for file in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_header_that_cannot_be_written_leaves_nothing_behind(tmp_path):
+    with pytest.raises(TypeError):
+        Recorder(tmp_path / "run.h5", {"gain": object()}, 1, GROUPS, {})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("group", "change", "message"),
+    [
+        ("pings", {}, r"pings: no such group; there are \['frames', 'ticks'\]"),
+        ("ticks", {"q": np.zeros(5)}, r"channels are .*'q'.*; expected"),
+        ("ticks", {"p": np.zeros((5, 4))}, r"/ticks/p: shape is \(5, 4\); expected \(5, 3\)"),
+        ("ticks", {"applied": np.zeros((4, 2, 3))}, r"/ticks/applied: shape is \(4, 2, 3\); expected \(5, 2, 3\)"),
+    ],
+)
+def test_blocks_of_another_shape_than_announced_are_refused(tmp_path, group, change, message):
+    with (
+        Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder,
+        pytest.raises(RecordingError, match=message),
+    ):
+        recorder.append(group, block(0, 5) | change)
+
+
+@pytest.mark.parametrize(("rate", "channels"), [(0.0, {"t": ()}), (np.nan, {"t": ()}), (1.0, {}), (1.0, {"rows": ()})])
+def test_a_group_without_rate_or_channels_is_refused(rate, channels):
+    with pytest.raises(RecordingError):
+        Group(rate, channels)
+
+
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path):
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with h5py.File(tmp_path / "other.h5", "w", libver="latest") as file:
+        file["config"] = json.dumps({})
+    for name in ("missing.h5", "text.h5", "other.h5"):
+        with pytest.raises(RecordingError, match=rf"{name}: .*expected the run\.h5 of a run") as caught:
+            Recording(tmp_path / name)
+        assert "\n" not in str(caught.value)
