@@ -22,10 +22,8 @@ Array = npt.NDArray[np.float64]
 
 _TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame, about which a heel rises
 _HANG = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards
-_REACH = (
-    0.95,
-    0.999,
-)  # shares of a leg's length: what it reaches as asked, and what it never exceeds
+_REACH = (0.95, 0.999)  # shares of a leg's length: reached as asked, and never exceeded
+_LIFT = np.array([0.06, np.deg2rad(15)])  # of toes [m] and heel in the middle of a swing that says nothing else
 
 
 @dataclass(frozen=True)
@@ -213,11 +211,11 @@ def _channel(choreography: Choreography, name: str, t: Array) -> Array:
 _STEP_CHANNELS = tuple(f.name for f in fields(Step) if f.name not in ("t", "rest"))
 
 
-def _foot_track(choreography: Choreography, side: str, t: Array, clearance: float = 0.07) -> Array:
+def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     """Track of a foot as (x, y, z, yaw, pitch, roll, knee) [m, rad], shape (n, 7).
 
     Quintic splines from resting step to resting step, with no velocity and acceleration at either: C², and a plant is
-    constant exactly. A swing that passes through no step in between is lifted by the clearance [m].
+    constant exactly. A swing that passes through no step in between is lifted, heel first.
     """
     steps: Sequence[Step] = getattr(choreography, f"{side}_foot")
     rests = [i for i, step in enumerate(steps) if step.rest]
@@ -247,7 +245,7 @@ def _foot_track(choreography: Choreography, side: str, t: Array, clearance: floa
         when, what = times[i : j + 1], values[i : j + 1]
         if j == i + 1 and np.any(what[0, :2] != what[1, :2]):
             via = what.mean(axis=0)
-            via[2] += clearance
+            via[[2, 4]] += _LIFT
             when, what = np.insert(when, 1, when.mean()), np.insert(what, 1, via, axis=0)
         here = segment == k
         track[here] += make_interp_spline(when, what, k=5, bc_type=at_rest)(t[here])

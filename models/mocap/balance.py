@@ -125,7 +125,7 @@ def outside_support(motion: Dynamics) -> Array:
 
 
 def balanced_clip(
-    choreography: Choreography, fps: float, harmonics: int = 12, rounds: int = 8, share: float = 0.7
+    choreography: Choreography, fps: float, cutoff: float = 8.0, rounds: int = 12, share: float = 0.7
 ) -> Clip:
     """Sample a cyclic in-place choreography, its pelvis swaying so that the zero-moment point stays under the feet.
 
@@ -139,8 +139,8 @@ def balanced_clip(
         The motion; its sway is added to the x and y of its keys.
     fps : float
         Frames per second [1/s].
-    harmonics : int
-        How many harmonics of the lap the sway may use: it is smooth by construction.
+    cutoff : float
+        Highest frequency of the sway [Hz]: it is smooth by construction.
     rounds : int
         Repetitions.
     share : float
@@ -154,15 +154,15 @@ def balanced_clip(
     n = round(choreography.duration * fps)
     t = np.linspace(0.0, choreography.duration, n + 1)
     sway = np.zeros((n + 1, 2))
-    frequency = 2 * np.pi * np.arange(n // 2 + 1) / choreography.duration
+    frequency = np.arange(n // 2 + 1) / choreography.duration
     for _ in range(rounds):
         motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
-        wanted = [
-            supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
-        ]
-        error = np.fft.rfft(np.array(wanted) - motion.zmp, axis=0)
-        error[harmonics + 1 :] = 0.0
-        error /= (1 + motion.com[:, 2].mean() / GRAVITY * frequency**2)[:, None]
+        wanted = [supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)]
+        # A sway adds a moment: the same one moves the zero-moment point further where the floor pushes less.
+        load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
+        error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)
+        error[frequency > cutoff] = 0.0
+        error /= (1 + motion.com[:, 2].mean() / GRAVITY * (2 * np.pi * frequency) ** 2)[:, None]
         change = np.fft.irfft(error, n, axis=0)
         sway += np.vstack([change, change[:1]])
     return Clip(poses_at(choreography, t, sway), fps, choreography.name)

@@ -17,77 +17,75 @@ FPS = 60.0
 
 def angry() -> Choreography:
     """One-armed anger: two stabs with a pointing arm, a shaken fist, a stamp of the foot."""
-    aimed = Arm(raised=88, plane=8, turn=10, elbow=12, pronation=20)
-    drawn = Arm(raised=62, plane=25, turn=10, elbow=88, pronation=20)
-    fist = Arm(raised=72, plane=62, turn=-25, elbow=112, pronation=-10, wrist=10)
-    shaken = replace(fist, raised=80, elbow=82)
-    down = Arm(raised=34, plane=40, turn=20, elbow=22, pronation=30)
-    tense = Arm(raised=24, plane=95, turn=25, elbow=48, pronation=20, wrist=15)
-    bent = replace(tense, raised=30, elbow=66)
+    aimed = Arm(raised=104, plane=10, turn=10, elbow=10, pronation=20)
+    drawn = Arm(raised=66, plane=35, turn=10, elbow=100, pronation=20)
+    fist = Arm(raised=72, plane=48, turn=-42, elbow=112, pronation=15, wrist=15)
+    shaken = replace(fist, raised=80, plane=38, turn=-30, elbow=74)
+    down = Arm(raised=36, plane=48, turn=20, elbow=26, pronation=30)
+    tense = Arm(raised=26, plane=100, turn=30, elbow=50, pronation=20, wrist=20)
+    bent = replace(tense, raised=36, elbow=72)
     return Choreography(
         "angry",
         3.6,
         [
-            Key(0.0, x=-0.01, y=0.0, height=0.885, yaw=0, lean=4, tilt=0, trunk=(6, 0, -14), head=(4, 0, 6),
-                right_arm=Arm(raised=48, plane=50, turn=10, elbow=95, pronation=20), left_arm=tense),
-            Key(0.38, x=0.05, y=0.02, height=0.86, yaw=8, lean=9, trunk=(16, 2, 16), head=(6, -4, -4), right_arm=aimed,
+            Key(0.0, x=-0.05, y=0.0, height=0.885, yaw=-4, lean=2, tilt=0, trunk=(2, 0, -16), head=(4, 0, 8),
+                right_arm=replace(drawn, raised=52), left_arm=tense),
+            Key(0.36, x=0.03, y=0.03, height=0.86, yaw=10, lean=9, trunk=(18, 2, 18), head=(8, -4, -8), right_arm=aimed,
                 left_arm=bent),
-            Key(0.68, x=0.03, y=0.02, height=0.87, trunk=(11, 1, 2), right_arm=drawn),
-            Key(0.98, x=0.07, y=0.03, height=0.85, yaw=9, lean=11, trunk=(19, 3, 18), head=(9, -6, -4), right_arm=aimed,
-                left_arm=tense),
-            Key(1.25, x=0.06, y=0.02, trunk=(18, 3, 17), right_arm=replace(aimed, elbow=8)),
-            Key(1.60, x=0.01, y=-0.01, height=0.885, yaw=0, lean=4, trunk=(5, -2, -6), head=(2, 6, 8), right_arm=fist,
+            Key(0.68, x=0.0, y=0.02, height=0.87, trunk=(11, 1, 2), right_arm=drawn),
+            Key(0.98, x=0.05, y=0.04, height=0.845, yaw=12, lean=11, trunk=(22, 4, 20), head=(12, -8, -8),
+                right_arm=aimed, left_arm=tense),
+            Key(1.25, x=0.04, y=0.03, trunk=(20, 4, 18), head=(8, 4, -8), right_arm=replace(aimed, elbow=13)),
+            Key(1.62, x=-0.01, y=-0.02, height=0.885, yaw=0, lean=4, trunk=(4, -2, -8), head=(0, 6, 6), right_arm=fist,
                 left_arm=bent),
-            Key(1.76, right_arm=shaken),
-            Key(1.92, right_arm=fist, head=(0, 4, 4)),
-            Key(2.08, right_arm=shaken, trunk=(8, -3, -4)),
-            Key(2.24, right_arm=fist, head=(4, 6, 8)),
-            Key(2.40, y=-0.05, height=0.885, right_arm=shaken, left_arm=bent),
-            Key(2.58, yaw=-3, lean=3, trunk=(2, -4, -8), head=(0, 4, 6), right_arm=replace(fist, raised=95)),
-            Key(2.92, x=0.04, y=-0.02, height=0.855, yaw=2, lean=9, trunk=(18, 0, 8), head=(8, 0, 0), right_arm=down,
+            Key(1.79, right_arm=shaken, trunk=(12, -2, 0), head=(8, 6, 0)),
+            Key(1.96, right_arm=fist, trunk=(5, -2, -7), head=(0, 4, 6)),
+            Key(2.13, right_arm=shaken, trunk=(13, -3, 0), head=(8, 2, 0)),
+            Key(2.30, height=0.88, right_arm=fist, trunk=(5, -3, -8), head=(0, -2, 6)),
+            Key(2.40, y=-0.05, left_arm=bent),
+            Key(2.60, yaw=-4, lean=2, trunk=(0, -4, -12), head=(-4, 4, 8), right_arm=replace(fist, raised=108, plane=60, elbow=84)),
+            Key(2.94, x=0.02, y=-0.02, height=0.85, yaw=4, lean=10, trunk=(20, 0, 12), head=(10, 0, -4), right_arm=down,
                 left_arm=tense),
-            Key(3.25, x=0.01, height=0.88, trunk=(10, 0, -2), right_arm=Arm(raised=30, plane=55, turn=15, elbow=55)),
+            Key(3.25, x=0.0, height=0.88, lean=6, trunk=(12, 0, 0), right_arm=Arm(raised=32, plane=50, turn=15, elbow=66)),
         ],
-        [Step(0.0, 0.02, 0.13, yaw=12), Step(2.42, 0.02, 0.13, yaw=12), Step(2.64, 0.03, 0.13, z=0.13, yaw=12, pitch=8, rest=False),
-         Step(2.86, 0.02, 0.13, yaw=12)],
-        [Step(0.0, -0.04, -0.13, yaw=-18)],
+        [
+            Step(0.0, 0.06, 0.13, yaw=12),
+            Step(2.42, 0.06, 0.13, yaw=12),
+            Step(2.66, 0.08, 0.13, z=0.15, yaw=12, pitch=10, rest=False),
+            Step(2.88, 0.06, 0.13, yaw=12),
+        ],
+        [Step(0.0, -0.10, -0.13, yaw=-20)],
         Lap(),
     )  # fmt: skip
 
 
 def cheer() -> Choreography:
-    """Both arms thrown up, twice pumped, with a bounce in the knees and up to the toes."""
-    low = Arm(raised=38, plane=55, turn=10, elbow=85, pronation=0, wrist=0)
-    thrown = Arm(raised=152, plane=72, turn=0, elbow=14, pronation=0, wrist=-10)
-    pumped = Arm(raised=112, plane=68, turn=-35, elbow=82)
+    """Both arms thrown up and pumped twice, with a bounce in the knees."""
+    low = Arm(raised=38, plane=55, turn=10, elbow=85)
+    thrown = Arm(raised=152, plane=72, elbow=14, wrist=-10)
+    pumped = Arm(raised=112, plane=68, turn=-35, elbow=86)
     spread = replace(thrown, raised=158, plane=80, elbow=8)
 
     def both(arm: Arm) -> dict[str, Arm]:
         return {"left_arm": arm, "right_arm": arm}
 
-    crouch, tall = 0.80, 0.925
+    crouch, bounce, tall = 0.79, 0.85, 0.905
     return Choreography(
         "cheer",
         3.0,
         [
-            Key(0.0, x=-0.02, y=0.0, height=crouch, yaw=0, lean=10, tilt=0, trunk=(16, 0, 0), head=(2, 0, 0), **both(low)),
-            Key(0.45, x=0.0, height=tall, lean=-1, trunk=(-9, 0, 0), head=(-18, 0, 0), **both(thrown)),
-            Key(0.80, height=0.87, lean=3, trunk=(0, 3, 4), head=(-8, 4, 8), **both(pumped)),
-            Key(1.10, height=tall, trunk=(-8, 5, 6), head=(-16, 4, 10), **both(spread)),
-            Key(1.45, height=0.87, lean=3, trunk=(0, -3, -4), head=(-8, -4, -8), **both(pumped)),
-            Key(1.75, height=tall, lean=-1, trunk=(-8, -5, -6), head=(-16, -4, -10), **both(spread)),
-            Key(2.10, height=0.90, trunk=(-4, 0, 0), head=(-10, 0, 0), **both(replace(thrown, raised=140, elbow=25))),
-            Key(2.60, height=0.84, lean=7, trunk=(10, 0, 0), head=(0, 0, 0), **both(replace(low, raised=55, elbow=60))),
+            Key(0.0, x=-0.02, y=0.0, height=crouch, yaw=0, lean=12, tilt=0, trunk=(18, 0, 0), head=(2, 0, 0), **both(low)),
+            Key(0.45, height=tall, lean=-2, trunk=(-9, 0, 0), head=(-18, 0, 0), **both(thrown)),
+            Key(0.80, y=0.03, height=bounce, yaw=4, lean=4, trunk=(0, 4, 4), head=(-6, 4, 10), **both(pumped)),
+            Key(1.10, y=0.04, height=tall, trunk=(-8, 7, 6), head=(-16, 4, 12), **both(spread)),
+            Key(1.45, y=-0.03, height=bounce, yaw=-4, lean=4, trunk=(0, -4, -4), head=(-6, -4, -10), **both(pumped)),
+            Key(1.75, y=-0.04, height=tall, lean=-2, trunk=(-8, -7, -6), head=(-16, -4, -12), **both(spread)),
+            Key(2.10, y=0.0, height=0.88, yaw=0, trunk=(-2, 0, 0), head=(-8, 0, 0),
+                **both(replace(thrown, raised=140, elbow=25))),
+            Key(2.60, height=0.84, lean=8, trunk=(12, 0, 0), head=(0, 0, 0), **both(replace(low, raised=52, elbow=60))),
         ],
-        *(
-            [
-                Step(0.0, 0.0, side * 0.14, yaw=side * 12),
-                Step(0.25, 0.0, side * 0.14, yaw=side * 12),
-                Step(0.47, 0.0, side * 0.14, yaw=side * 12, pitch=16),
-                Step(0.72, 0.0, side * 0.14, yaw=side * 12),
-            ]
-            for side in (1, -1)
-        ),
+        [Step(0.0, 0.0, 0.14, yaw=12)],
+        [Step(0.0, 0.0, -0.14, yaw=-12)],
         Lap(),
     )  # fmt: skip
 
@@ -115,12 +113,13 @@ def spin() -> Choreography:
         "spin",
         lap,
         [
-            Key(0.0, x=0.0, y=0.0, height=0.895, yaw=0, lean=1, tilt=0, trunk=(-2, -4, 6), head=(0, 4, 4), left_arm=high, right_arm=low),
+            Key(0.0, x=0.0, y=0.0, yaw=0, lean=1, tilt=0, trunk=(-2, -4, 6), head=(0, 4, 4), left_arm=high, right_arm=low),
             Key(0.6, head=(0, 3, -50)),
-            Key(0.9, height=0.895, trunk=(-3, 0, 10), head=(0, 2, -62), left_arm=wide, right_arm=wide),
-            Key(1.8, height=0.895, trunk=(-2, 6, 6), head=(2, -4, 0), left_arm=low, right_arm=high),
-            Key(2.7, height=0.895, trunk=(-3, 0, 10), head=(0, -2, 62), left_arm=wide, right_arm=wide),
+            Key(0.9, trunk=(-3, 0, 10), head=(0, 2, -62), left_arm=wide, right_arm=wide),
+            Key(1.8, trunk=(-2, 6, 6), head=(2, -4, 0), left_arm=low, right_arm=high),
+            Key(2.7, trunk=(-3, 0, 10), head=(0, -2, 62), left_arm=wide, right_arm=wide),
             Key(3.0, head=(0, 0, 54)),
+            *(Key(k * beat / 2, height=0.9 if k % 2 == 0 else 0.88) for k in range(2 * steps)),
         ],
         track(1),
         track(-1),
@@ -131,17 +130,17 @@ def spin() -> Choreography:
 def squat_dance() -> Choreography:
     """The Russian dance: deep in the knees, arms folded, legs kicked forwards in turn."""
     beat = 0.8
-    folded_left = Arm(raised=68, plane=12, turn=38, elbow=104, pronation=35)
-    folded_right = Arm(raised=58, plane=12, turn=38, elbow=104, pronation=35)
-    low, high = 0.47, 0.56
+    upper = Arm(raised=92, plane=10, turn=62, elbow=92, pronation=10)
+    lower = Arm(raised=74, plane=10, turn=64, elbow=90, pronation=10)
+    low, high = 0.54, 0.62
 
     def track(side: int, first: float) -> list[Step]:
         track = []
         for start in (first, first + 2 * beat):
             track += [
-                Step(start - beat + 0.08, 0.0, side * 0.09, yaw=side * 22, pitch=22, knee=18),
-                Step(start + 0.02, 0.0, side * 0.09, yaw=side * 22, pitch=22, knee=18),
-                Step.in_air(start + 0.36, (0.66, side * 0.13, 0.30), yaw=side * 8, pitch=-28),
+                Step(start - beat + 0.08, 0.0, side * 0.10, yaw=side * 25, knee=30),
+                Step(start + 0.02, 0.0, side * 0.10, yaw=side * 25, knee=30),
+                Step.in_air(start + 0.38, (0.63, side * 0.12, 0.40), yaw=side * 10, pitch=-35, knee=5),
             ]
         return track
 
@@ -150,9 +149,9 @@ def squat_dance() -> Choreography:
         side = 1 if k % 2 == 0 else -1
         t = k * beat
         keys += [
-            Key(t, x=-0.02, y=0.0, height=high, yaw=0, lean=4, tilt=0, trunk=(14, 0, 0), head=(-4, 0, 0),
-                left_arm=folded_left, right_arm=folded_right),
-            Key(t + 0.4, height=low, yaw=-4 * side, lean=2, tilt=0, trunk=(22, 0, 6 * side), head=(-6, 4 * side, 4 * side)),
+            Key(t, x=-0.17, y=0.0, height=high, yaw=0, lean=8, tilt=0, trunk=(26, 0, 0), head=(-14, 0, 0),
+                left_arm=upper, right_arm=lower),
+            Key(t + 0.4, height=low, yaw=-4 * side, lean=4, tilt=0, trunk=(29, 0, 8 * side), head=(-14, 5 * side, 6 * side)),
         ]
     return Choreography("squat_dance", 4 * beat, keys, track(1, 0.0), track(-1, beat), Lap())  # fmt: skip
 
@@ -160,7 +159,7 @@ def squat_dance() -> Choreography:
 def ginga() -> Choreography:
     """Capoeira's ginga: the triangle of steps behind low guarding arms; the second step behind swings out into a kick."""
     guard = Arm(raised=62, plane=-8, turn=20, elbow=112, pronation=20)
-    open_guard = Arm(raised=52, plane=35, turn=10, elbow=92, pronation=20)
+    open_guard = Arm(raised=50, plane=30, turn=15, elbow=112, pronation=10)
     back = Arm(raised=38, plane=125, turn=10, elbow=40, pronation=10)
     return Choreography(
         "ginga",
@@ -189,7 +188,7 @@ def ginga() -> Choreography:
             Step(1.62, -0.5, 0.14, yaw=14, pitch=34, knee=6),
             Step(1.96, -0.5, 0.14, yaw=14, pitch=34, knee=6),
             Step.in_air(2.24, (0.15, 0.12, 0.5), yaw=4, pitch=10),
-            Step.in_air(2.50, (0.78, 0.08, 1.0), yaw=0, pitch=-62),
+            Step.in_air(2.50, (0.80, 0.06, 1.02), yaw=0, pitch=-64),
             Step.in_air(2.76, (0.30, 0.18, 0.5), yaw=4, pitch=-5),
             Step(3.10, 0.0, 0.25, yaw=14, knee=8),
         ],
