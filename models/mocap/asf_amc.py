@@ -6,6 +6,7 @@ file formats*, 1998). The files hold no rate: CMU recorded at 120 frames per sec
 """
 
 from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,9 +20,9 @@ from models.mocap.motion_file import (
     VALUE_LIMIT,
     MotionFileError,
     number,
+    numbered_lines,
     numbers,
     quoted,
-    read_lines,
 )
 from models.mocap.source_motion import SourceMotion
 
@@ -109,10 +110,11 @@ def _skeleton_path(path: Path) -> Path:
     raise MotionFileError(path, 0, "its skeleton is not beside it", f"{names[0].name} or {names[1].name}")
 
 
-def _sections(lines: list[str]) -> list[tuple[int, list[str]]]:
+def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Numbered lines as words, without comments and blank lines."""
-    words = ((index + 1, line.partition("#")[0].split()) for index, line in enumerate(lines))
-    return [(line, fields) for line, fields in words if fields]
+    for line, text in numbered_lines(path):
+        if fields := text.partition("#")[0].split():
+            yield line, fields
 
 
 def _read_asf(path: Path) -> _Skeleton:
@@ -120,7 +122,7 @@ def _read_asf(path: Path) -> _Skeleton:
     root = _Bone("root")
     skeleton = _Skeleton({"root": root}, {}, [0.0, 0.0, 0.0], True, 1.0)
     section, bone, text = "", None, False
-    for line, fields in _sections(read_lines(path)):
+    for line, fields in _fields(path):
         keyword = fields[0].lower()
         if keyword.startswith(":"):
             section, bone, text = keyword[1:], None, False
@@ -229,7 +231,7 @@ def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
     degrees, values, n_frames = True, array("d"), 0
     row: dict[str, list[float]] = {}
     line = 0
-    for line, fields in _sections(read_lines(path)):
+    for line, fields in _fields(path):
         if fields[0].startswith(":"):
             degrees = degrees and fields[0].lower() != ":radians"
         elif len(fields) == 1:

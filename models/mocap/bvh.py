@@ -8,6 +8,7 @@ written exactly.
 
 import re
 from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,9 +26,9 @@ from models.mocap.motion_file import (
     count,
     frame_rate,
     number,
+    numbered_lines,
     numbers,
     quoted,
-    read_lines,
 )
 from models.mocap.source_motion import SourceMotion
 
@@ -64,9 +65,9 @@ def read_bvh(path: Path) -> SourceMotion:
     MotionFileError
         If the file is not a BVH, or breaks off, or its counts do not agree.
     """
-    lines = read_lines(path)
-    joints, n_columns, motion_line = _read_hierarchy(lines, path)
-    frames, fps = _read_frames(lines, motion_line, n_columns, path)
+    lines = numbered_lines(path)
+    joints, n_columns = _read_hierarchy(lines, path)
+    frames, fps = _read_frames(lines, n_columns, path)
     offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
     tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
@@ -85,10 +86,10 @@ def read_bvh(path: Path) -> SourceMotion:
 class _Tokens:
     """Words of the hierarchy with the lines they stand on."""
 
-    def __init__(self, lines: list[str], path: Path) -> None:
+    def __init__(self, lines: Iterator[tuple[int, str]], path: Path) -> None:
         self.path = path
         self.line = 0
-        self._words = ((index + 1, word) for index, line in enumerate(lines) for word in line.split())
+        self._words = ((number, word) for number, line in lines for word in line.split())
 
     def next(self, expected: str) -> str:
         """The next word."""
@@ -118,8 +119,8 @@ class _Tokens:
         return MotionFileError(self.path, self.line, what, expected)
 
 
-def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int, int]:
-    """Joints in the file's order, number of channels, and the line of MOTION."""
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:
+    """Joints in the file's order and number of channels; leaves the lines after MOTION."""
     tokens = _Tokens(lines, path)
     if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
         raise tokens.error(f"file begins with {quoted(word)}", "HIERARCHY: is this a BVH file?")
@@ -153,7 +154,7 @@ def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int, in
             raise tokens.error(f"found {quoted(word)}", "OFFSET, CHANNELS, JOINT, End Site or }")
     if (word := tokens.next("MOTION")).upper() != "MOTION":
         raise tokens.error(f"found {quoted(word)} after the root's }}", "MOTION")
-    return joints, n_columns, tokens.line
+    return joints, n_columns
 
 
 def _read_channels(tokens: _Tokens, joint: _Joint, column: int) -> int:
@@ -182,10 +183,10 @@ def _read_end_site(tokens: _Tokens) -> list[float]:
     return tip
 
 
-def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path) -> tuple[Array, float]:
+def _read_frames(lines: Iterator[tuple[int, str]], n_columns: int, path: Path) -> tuple[Array, float]:
     """The frames' channels, shape (frames, channels), and their rate."""
-    rest = ((index + 1, lines[index]) for index in range(motion_line, len(lines)) if lines[index].strip())
-    line, text = next(rest, (len(lines), ""))
+    rest = ((line, text) for line, text in lines if text.strip())
+    line, text = next(rest, (0, ""))
     match = re.fullmatch(r"\s*Frames\s*:\s*(\S+)\s*", text, re.IGNORECASE)
     if match is None:
         raise MotionFileError(path, line, f"found {quoted(text.strip())} after MOTION", "Frames: n")
@@ -193,7 +194,7 @@ def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path)
     if n_frames == 0 or n_frames * n_columns > VALUE_LIMIT:
         what = f"{n_frames} frames of {n_columns} channels"
         raise MotionFileError(path, line, what, f"at least 1 frame and at most {VALUE_LIMIT} numbers")
-    line, text = next(rest, (len(lines), ""))
+    line, text = next(rest, (line + 1, ""))
     match = re.fullmatch(r"\s*Frame\s+Time\s*:\s*(\S+)\s*", text, re.IGNORECASE)
     if match is None:
         raise MotionFileError(path, line, f"found {quoted(text.strip())} after Frames", "Frame Time: seconds")
@@ -211,7 +212,7 @@ def _read_frames(lines: list[str], motion_line: int, n_columns: int, path: Path)
         values.extend(numbers(tokens, path, line))
     # A skeleton without channels has nothing to say in its frames.
     if found < n_frames and n_columns:
-        raise MotionFileError(path, len(lines), f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
+        raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
     return np.array(values).reshape(n_frames, n_columns), fps
 
 

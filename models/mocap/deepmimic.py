@@ -22,14 +22,14 @@ from models.mocap.motion_file import (
     MotionFileError,
     frame_rate,
     quoted,
-    read_lines,
+    read_text,
 )
 from models.mocap.source_motion import SourceMotion
 
 Array = npt.NDArray[np.float64]
 
 _WIDTH = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
-_JSON_LIMIT = 16_000_000  # characters: parsed, a hostile file takes some thirty times its size
+_JSON_LIMIT = 16_000_000  # bytes: parsed, a hostile file takes some thirty times its size
 
 
 class _Joint(NamedTuple):
@@ -104,9 +104,7 @@ def _parse(path: Path) -> tuple[str, dict[str, object]]:
     def refuse(constant: str) -> NoReturn:
         raise ValueError(f"{constant} is not a number")
 
-    text = "\n".join(read_lines(path))
-    if len(text) > _JSON_LIMIT:
-        raise MotionFileError(path, 0, "JSON file is too large", f"at most {_JSON_LIMIT // 1_000_000} MB")
+    text = read_text(path, _JSON_LIMIT).decode("utf-8", errors="replace")
     try:
         document: object = json.loads(text, parse_constant=refuse)
     except json.JSONDecodeError as error:

@@ -82,6 +82,7 @@ def _toe_bend(ankles: Array, feet: Array, points: Array) -> Array:
     cosine = r[..., 0] * p[..., 0] + r[..., 2] * p[..., 2]
     sine = r[..., 0] * p[..., 2] - r[..., 2] * p[..., 0]
     turn = np.arctan2(sine, cosine) + np.arccos(np.clip(-constant / np.hypot(cosine, sine), -1.0, 1.0))
-    # Only a foot with its toes ahead of the ankle and too low has anything to bend.
-    needed = (constant + cosine < 0.0) & (sine < 0.0)
+    turn = np.where(turn > np.pi, turn - 2.0 * np.pi, turn)
+    # A foot that points straight down, or a little further, still bends forwards: its toes got there from ahead.
+    needed = (constant + cosine < 0.0) & (sine < 0.05)
     return np.where(needed, np.clip(turn, -np.pi / 3, 0.0), 0.0).min(axis=2)

@@ -9,7 +9,7 @@ from models.mocap.asf_amc import read_amc
 from models.mocap.bvh import own_clip, read_bvh, write_bvh
 from models.mocap.clip import Clip
 from models.mocap.deepmimic import read_deepmimic
-from models.mocap.motion_file import MotionFileError, read_lines
+from models.mocap.motion_file import MotionFileError, numbered_lines
 from models.mocap.retarget import RetargetReport, retarget
 from models.mocap.skeleton_roles import roles_of
 from models.mocap.source_motion import SourceMotion
@@ -81,7 +81,7 @@ def read_motion(path: Path) -> SourceMotion:
         return read_bvh(path)
     if suffix == ".amc":
         return read_amc(path)
-    start = next((line.strip() for line in read_lines(path) if line.strip()), "")
+    start = next((text.strip() for _, text in numbered_lines(path) if text.strip()), "")
     if start.upper().startswith("HIERARCHY"):
         return read_bvh(path)
     if start.startswith(("{", "[")):

@@ -2,11 +2,14 @@
 
 import math
 import re
+from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 
 from models.errors import ModelError
 
 FILE_LIMIT = 128_000_000  # bytes
+LINE_LIMIT = 1_000_000  # bytes
 JOINT_LIMIT = 1_000
 FRAME_LIMIT = 1_000_000
 VALUE_LIMIT = 16_000_000  # numbers in one file; 128 MB as float64
@@ -33,30 +36,43 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:39] + "…")
 
 
-def read_lines(path: Path) -> list[str]:
-    """Lines of a text file, without their endings (LF, CR LF or CR, also mixed).
+def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
+    """A text file's content with lines ended by LF alone, from any mixture of LF, CR LF and CR.
 
     Raises
     ------
     MotionFileError
-        If the file cannot be opened, is empty, binary or larger than `FILE_LIMIT`.
+        If the file cannot be opened, is empty, binary or larger than `limit` bytes.
     """
     try:
         with path.open("rb") as file:
-            content = file.read(FILE_LIMIT + 1)
+            content = file.read(limit + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MotionFileError(path, 0, f"cannot be opened ({reason})", "a readable motion file") from None
-    if len(content) > FILE_LIMIT:
-        raise MotionFileError(path, 0, "file is too large", f"at most {FILE_LIMIT // 1_000_000} MB")
+    if len(content) > limit:
+        raise MotionFileError(path, 0, "file is too large", f"at most {limit // 1_000_000} MB")
     if b"\0" in content:
-        line = content[: content.index(b"\0")].count(b"\n") + 1
+        line = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise MotionFileError(path, line, "binary content (a zero byte)", "a text file")
     if not content.strip():
         raise MotionFileError(path, 1, "file is empty", "a motion")
-    # Joint names come in many encodings; the numbers and keywords are ASCII in all of them.
-    text = content.decode("utf-8-sig", errors="replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines of a text file, counted from 1, one at a time: a list of all their words would be ten times the file.
+
+    Raises
+    ------
+    MotionFileError
+        If the file cannot be read as text, or a line is longer than `LINE_LIMIT`.
+    """
+    for index, line in enumerate(BytesIO(read_text(path))):
+        if len(line) > LINE_LIMIT:
+            raise MotionFileError(path, index + 1, f"line of {len(line)} bytes", f"at most {LINE_LIMIT} bytes a line")
+        # Joint names come in many encodings; the numbers and keywords are ASCII in all of them.
+        yield index + 1, line.decode("utf-8", errors="replace")
 
 
 def number(token: str, path: Path, line: int) -> float:

@@ -28,6 +28,8 @@ from models.mocap.source_motion import SourceMotion
 Array = npt.NDArray[np.float64]
 
 _X, _Y, _Z = np.eye(3)
+_UPRIGHT = 0.4  # mean of the body's direction along the vertical, below which the motion does not tell what is up
+_FLAT_FOOT = np.deg2rad(20)  # slope of the bone from ankle to toes in a foot that stands flat
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -94,7 +96,8 @@ def retarget(motion: SourceMotion, roles: Roles) -> tuple[Clip, RetargetReport]:
     zero = _zero_pose(bones, motion.parents)
     rotations = motion.global_rotations()
     positions = motion.global_positions(rotations)
-    rest, up = _rest_axes(zero, roles, motion), _vertical(positions, roles)
+    rest = _rest_axes(zero, roles, motion)
+    up = _vertical(positions, roles, rest)
     pelvis = rotations[0, roles.segments["pelvis"]]
     axes = _world_axes(quaternions.product(pelvis, rest), up)
     corrections = _corrections(zero, motion.tips, roles, rest)
@@ -151,12 +154,17 @@ def _rest_axes(zero: Array, roles: Roles, motion: SourceMotion) -> Array:
     return _quaternion(*frame.T)
 
 
-def _vertical(positions: Array, roles: Roles) -> Array:
-    """The file's axis that points up: along which the head is above the ankles on the average of all frames."""
+def _vertical(positions: Array, roles: Roles, rest: Array) -> Array:
+    """The file's axis that points up: along which the head is above the ankles on the average of all frames.
+
+    Where there is no such axis, for somebody rolls or lies, it is the rest pose's.
+    """
     ends = [roles.ends.get(f"{side}_shank", roles.segments[f"{side}_shank"]) for side in ("left", "right")]
     top = roles.segments.get("head", roles.segments.get("chest", roles.segments["pelvis"]))
     body = positions[:, top] - positions[:, ends].mean(axis=1)
     mean = (body / np.maximum(np.linalg.norm(body, axis=1, keepdims=True), 1e-9)).mean(axis=0)
+    if np.abs(mean).max() < _UPRIGHT:
+        mean = quaternions.rotated(rest, _Z)
     axis = int(np.argmax(np.abs(mean)))
     return np.sign(mean[axis]) * np.eye(3)[axis]
 
@@ -201,17 +209,20 @@ def _corrections(zero: Array, tips: Array, roles: Roles, rest: Array) -> dict[st
 
 
 def _sole(shank: Array, toes: Array | None) -> Array:
-    """Q of a foot: level with toes where the source has them, but rolled with a leg that is spread at rest.
+    """Q of a foot, from the directions of shank and toes at rest in the figure's axes.
 
-    The ankle lies above the toes, so the bone's slope is the foot's height and no rotation.
+    The foot stands flat at rest and looks where the toes do; it rolls with a leg that is spread at rest. The ankle lies
+    above the toes, so the bone's slope is no rotation; a bone without slope is drawn along an axis, not from life.
     """
     spread = float(np.arctan2(shank[1], -shank[2]))
     roll = quaternions.about_axis(0, np.array(spread if abs(spread) > np.deg2rad(10) else 0.0))
     if toes is None:
         return roll
-    x, y, _ = quaternions.rotated(quaternions.conjugate(roll), toes) / np.linalg.norm(toes)
-    yaw = float(np.arctan2(y, x)) if x > 0.5 else 0.0
-    return quaternions.product(roll, quaternions.about_axis(2, np.array(yaw)))
+    x, y, z = quaternions.rotated(quaternions.conjugate(roll), toes) / np.linalg.norm(toes)
+    if x < 0.5:
+        return roll
+    q = quaternions.product(roll, quaternions.about_axis(2, np.arctan2(y, x)))
+    return quaternions.product(q, quaternions.about_axis(1, np.array(-_FLAT_FOOT))) if abs(z) < 0.08 else q
 
 
 def _segment_rotations(
