@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from sim.recorder import Recording
+from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 
 Array = npt.NDArray[np.float64]
 
 POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
-PUSH = 0.2  # a hand that presses harder than this counts as pushing [N]
-FIELD, USER, HAND, TUBE, PALE = "#22a046", "#eb7814", "#3c465a", "#dbe7f4", "#fbe3cd"
+PALE_TUBE, PALE_USER = "#dbe7f4", "#fbe3cd"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -73,9 +73,9 @@ def path_figure(recording: Recording) -> Figure:
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
         ax.add_collection(
-            PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=TUBE, zorder=1), autolim=False
+            PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=PALE_TUBE, zorder=1), autolim=False
         )
-        ax.plot(curve[:, i], curve[:, j], color=HAND, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
+        ax.plot(curve[:, i], curve[:, j], color=CURVE, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
         ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label="hand, pushing", zorder=3)
@@ -89,20 +89,20 @@ def path_figure(recording: Recording) -> Figure:
 def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve, pushes shaded, and again at a scale for a hand left alone [mm]."""
     t = _rows(recording, "ticks", "t")
-    distance = 1e3 * _rows(recording, "ticks", "distance")
+    distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.arrays["tube_radius"])
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
-        _shade(ax, t, pushed, PALE, "hand pushes")
-        ax.axhline(
-            1e3 * float(recording.arrays["tube_radius"]), color=AXES[0], lw=0.8, ls="--", label="edge of the tube"
-        )
-        ax.plot(t, distance, color=HAND)
+        _shade(ax, t, pushed, PALE_USER, "hand pushes")
+        if radius < 1.05 * np.max(distance):
+            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label="edge of the tube")
+        ax.plot(t, distance, color=CURVE)
         ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
     left_alone = distance if np.all(pushed) else distance[~pushed]
     axes[0].set(title="distance from the curve", ylim=(0, 1.08 * np.max(distance) + 1e-3))
     axes[1].set(title="magnified", ylim=(0, 1.5 * np.percentile(left_alone, 90) + 1e-3), xlabel="time [s]")
-    _legend(axes[0])
+    if axes[0].get_legend_handles_labels()[0]:
+        _legend(axes[0])
     return figure
 
 
@@ -126,14 +126,14 @@ def forces_figure(recording: Recording) -> Figure:
 def torques_figure(recording: Recording) -> Figure:
     """Torques of the three motors against what they can give for long and for a moment [mN m]."""
     t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
-    continuous = 1e3 * np.asarray(recording.arrays["motor_continuous"], dtype=np.float64)
-    peak = 1e3 * np.asarray(recording.arrays["motor_peak"], dtype=np.float64)
+    continuous = 1e3 * recording.arrays["motor_continuous"]
+    peak = 1e3 * recording.arrays["motor_peak"]
     figure, axes = _panels(3, 1, height=4.8)
     for i, ax in enumerate(axes):
         ax.plot(t, torque[:, i], color=AXES[i])
         for sign in (-1, 1):
-            ax.axhline(sign * continuous[i], color=HAND, lw=0.8, ls="--", label="continuous" if sign > 0 else None)
-            ax.axhline(sign * peak[i], color=HAND, lw=0.8, ls=":", label="peak" if sign > 0 else None)
+            ax.axhline(sign * continuous[i], color=CURVE, lw=0.8, ls="--", label="continuous" if sign > 0 else None)
+            ax.axhline(sign * peak[i], color=CURVE, lw=0.8, ls=":", label="peak" if sign > 0 else None)
         reach = max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
         ax.set(title=f"motor {i + 1}", ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-1.25 * reach, 1.25 * reach))
     _legend(axes[0])
@@ -155,8 +155,8 @@ def tracking_figure(recording: Recording) -> Figure:
     )
     figure, axes = _panels(4, 1, height=6.4)
     for ax, (title, unit, values) in zip(axes, curves, strict=True):
-        _shade(ax, t, flight, TUBE, "flight")
-        ax.plot(t, values, color=HAND)
+        _shade(ax, t, flight, PALE_TUBE, "flight")
+        ax.plot(t, values, color=CURVE)
         ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
         ax.set_ylim(bottom=0)
     if np.any(flight):

@@ -8,7 +8,8 @@ from pathlib import Path
 import mujoco
 
 from sim.recorder import Recording
-from sim.viewer.replay_html import MAGNIFICATION, SECONDS, replay_html
+from sim.viewer.palette import FIELD, USER
+from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -34,8 +35,8 @@ img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
 <ul>{lines}</ul>
 <iframe title="Replay in 3D" srcdoc="{replay}"></iframe>
 <p>Drag to turn, wheel to zoom, right button to move; space plays and pauses, the bar scrubs.
-<b style="color:#22a046">Green</b> arrow: force of the field. <b style="color:#eb7814">Orange</b> arrow: force of the
-hand; where it pushes, the path is orange too. Light blue: the tube around the curve. {replayed}
+<b style="color:{field}">Green</b> arrow: force of the field. <b style="color:{user}">Orange</b> arrow: force of the
+hand; where it pushes, the path is orange too. Light blue: the tube around the curve{tube}. {replayed}
 The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
 their true size.</p>
 <h2>Figures</h2>
@@ -70,6 +71,8 @@ def write_report(
     t = recording.groups["ticks"]["t"]
     seconds = float(t[-1] - t[0])
     replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
+    radius, drawn = float(recording.arrays["tube_radius"]), drawn_tube(recording)
+    tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
     images = [
         f'<img alt="{figure.stem}" src="data:image/png;base64,{base64.b64encode(figure.read_bytes()).decode()}">'
         for figure in figures
@@ -80,6 +83,9 @@ def write_report(
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
             replay=html.escape(replay_html(recording, model)),
             replayed=replayed,
+            tube=tube,
+            field=FIELD,
+            user=USER,
             magnification=MAGNIFICATION,
             figures="".join(images),
             versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),

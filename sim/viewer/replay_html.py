@@ -15,24 +15,20 @@ import numpy.typing as npt
 import viser
 
 from sim.recorder import Channel, Recording
+from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER, rgb
 from sim.viewer.shapes import Shape, body_shapes, tube
 
 Array = npt.NDArray[np.float64]
-Rgb = tuple[int, int, int]
 
 FPS = 30.0
 SECONDS = 120.0  # of a longer run, the beginning is shown
 MAGNIFICATION = 4.0
 PHANTOM_AT = np.array([1.35, -0.55, 1.0])  # where the origin of the hand frame is drawn [m]
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
-ARROW = 0.6  # drawn length of the largest force [m]
+ARROW = 0.6  # drawn length of a large force [m]
 TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
 TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
-PUSH = 0.1  # a hand that presses harder than this is pushing [N]
-GREEN: Rgb = (34, 160, 70)
-ORANGE: Rgb = (235, 120, 20)
-SLATE: Rgb = (60, 70, 90)
-BLUE: Rgb = (70, 130, 200)
+TUBE_SHARE = 0.2  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
@@ -65,6 +61,12 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     return page.replace("</head>", _HEAD + "</head>", 1)
 
 
+def drawn_tube(recording: Recording) -> float:
+    """Radius with which the tube is drawn [m]: ε, or less where that would hide the curve and the hand."""
+    extent = float(np.max(np.ptp(recording.arrays["curve"], axis=0)))
+    return min(float(recording.arrays["tube_radius"]), TUBE_SHARE * extent)
+
+
 class _Actor:
     """Bodies of the model that are drawn in one style and placed by position and quaternion."""
 
@@ -79,7 +81,7 @@ class _Actor:
                 f"{node}/{i}",
                 shape.vertices * scale,
                 shape.faces,
-                color=BLUE if ghost else shape.rgba[:3],
+                color=rgb(TUBE) if ghost else shape.rgba[:3],
                 opacity=None if opacity == 1 else opacity,
                 cast_shadow=not ghost,
                 receive_shadow=False,
@@ -101,19 +103,19 @@ class _Stage:
         self._data = mujoco.MjData(model)
         self._model = model
         self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
-        self._p_WH = np.asarray(recording.arrays["p_WH"], dtype=np.float64)
+        self._p_WH = recording.arrays["p_WH"]
         figure = body_shapes(model, "figure/")
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
         self._ghost = _Actor(scene, "ghost", figure, 1.0, ghost=True)
-        peak = max(_largest(self._ticks["force"]), _largest(self._ticks["user"]), 1e-9)
+        peak = max(_typical_peak(self._ticks["force"]), _typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
-            name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", GREEN), ("user", ORANGE))
+            name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))
         }
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
-        self._draw_curve(np.asarray(recording.arrays["curve"]), float(recording.arrays["tube_radius"]))
+        self._draw_curve(recording.arrays["curve"], drawn_tube(recording))
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
@@ -125,21 +127,21 @@ class _Stage:
             f"/labels/{name}", text, position=position, anchor="bottom-center", font_screen_scale=1.25
         )
 
-    def _arrow(self, name: str, color: Rgb) -> viser.ArrowsHandle:
+    def _arrow(self, name: str, color: str) -> viser.ArrowsHandle:
         return self._scene.add_arrows(
-            f"/forces/{name}", np.zeros((1, 2, 3)), color, shaft_radius=0.016, head_radius=0.04, head_length=0.09
+            f"/forces/{name}", np.zeros((1, 2, 3)), rgb(color), shaft_radius=0.015, head_radius=0.035, head_length=0.07
         )
 
     def _draw_curve(self, points: Array, radius: float) -> None:
         line = PHANTOM_AT + MAGNIFICATION * points
         vertices, faces = tube(line, 0.004, sides=8)
-        self._scene.add_mesh_simple("/curve/line", vertices, faces, color=SLATE, cast_shadow=False)
+        self._scene.add_mesh_simple("/curve/line", vertices, faces, color=rgb(CURVE), cast_shadow=False)
         vertices, faces = tube(line, MAGNIFICATION * radius)
         self._scene.add_mesh_simple(
             "/curve/tube",
             vertices,
             faces,
-            color=BLUE,
+            color=rgb(TUBE),
             opacity=0.16,
             side="double",
             cast_shadow=False,
@@ -189,13 +191,13 @@ class _Stage:
             return
         pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > PUSH
         vertices, faces = tube(points[moved], 0.007, sides=8)
-        color = ORANGE if pushed else GREEN
+        color = rgb(USER if pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)
 
 
-def _largest(channel: Channel) -> float:
-    """Largest norm of a row."""
-    return max(float(np.max(np.linalg.norm(channel[i : i + 65536], axis=1))) for i in range(0, len(channel), 65536))
+def _typical_peak(channel: Channel) -> float:
+    """Norm that only a two-hundredth of the rows exceeds, so that a jolt does not shrink all other arrows."""
+    return float(np.percentile(np.linalg.norm(channel[:: max(1, len(channel) // 20000)], axis=1), 99.5))
 
 
 def _followed(roots: Array) -> Array:
