@@ -1,0 +1,78 @@
+"""The figure's 57 free coordinates: the root's place, and the rotation vectors of the root and of the 17 joints.
+
+They are to positions what MuJoCo's qvel is to velocities, in the same order; unlike a pose's quaternions they form a
+linear space, so splines and least squares work on them. Half a turn of a joint is beyond its limits, so no joint meets
+the singularity at a full turn; the root may (a backflip), if it turns about one axis.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from models.errors import ModelError
+from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
+
+Array = npt.NDArray[np.float64]
+
+_DELTA = 1e-3  # [s] of the difference quotients that turn rotation vectors into angular velocity
+
+
+def coordinate(joint: str, axis: str) -> int:
+    """Index of a coordinate, in the tangent's order.
+
+    Parameters
+    ----------
+    joint : str
+        ``position``, ``root`` or one of `JOINTS`.
+    axis : str
+        ``x``, ``y`` or ``z``.
+
+    Raises
+    ------
+    ModelError
+        If there is no such coordinate.
+    """
+    names = ("position", "root", *JOINTS)
+    if joint not in names or axis not in ("x", "y", "z"):
+        raise ModelError(f"there is no coordinate {joint} {axis}; joints: {', '.join(names)}; axes: x, y, z")
+    return 3 * names.index(joint) + "xyz".index(axis)
+
+
+def reflection() -> Array:
+    """Reflection of the coordinates in the x–z plane, (57, 57): sides swap, y and turns about x and z change sign."""
+    mirror = np.zeros((N_TANGENT, N_TANGENT))
+    for i, joint in enumerate(("position", "root", *JOINTS)):
+        side, _, rest = joint.partition("_")
+        twin = {"left": "right_" + rest, "right": "left_" + rest}.get(side, joint)
+        signs = (1.0, -1.0, 1.0) if joint == "position" else (-1.0, 1.0, -1.0)
+        for axis, sign in zip("xyz", signs, strict=True):
+            mirror[3 * i + "xyz".index(axis), coordinate(twin, axis)] = sign
+    return mirror
+
+
+def poses(coordinates: Array) -> Array:
+    """MuJoCo poses of coordinates, shape (..., 57) → (..., 75); quaternions are exp(½ rotation vector)."""
+    shape = coordinates.shape[:-1]
+    vectors = coordinates[..., 3:].reshape(*shape, 18, 3)
+    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    pose = np.empty((*shape, N_POSE))
+    pose[..., :3] = coordinates[..., :3]
+    quaternions = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
+    pose[..., 3:] = quaternions.reshape(*shape, 72)
+    return pose
+
+
+def _turns(a: Array, b: Array) -> Array:
+    """log(a⁻¹ b) of the rotations in two arrays of poses, shape (m, 54)."""
+    first, second = (Rotation.from_quat(p[:, 3:].reshape(-1, 4), scalar_first=True) for p in (a, b))
+    return (first.inv() * second).as_rotvec().reshape(len(a), 54)
+
+
+def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:
+    """MuJoCo's qpos, qvel, qacc of coordinates and their two time derivatives, (m, 57) ×3 → (m, 75), (m, 57) ×2."""
+    bend = 0.5 * _DELTA**2 * ddu
+    before, now, after = poses(u - _DELTA * du + bend), poses(u), poses(u + _DELTA * du + bend)
+    velocity, acceleration = du.copy(), ddu.copy()
+    velocity[:, 3:] = _turns(before, after) / (2 * _DELTA)
+    acceleration[:, 3:] = (_turns(now, after) - _turns(before, now)) / _DELTA**2
+    return now, velocity, acceleration
