@@ -1,0 +1,101 @@
+"""Alignment of loops in time: first by a shift of the phase, then by a smooth monotone warp that closes."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from controllers.haptic_map.loops import Loop
+from controllers.state import Array, IntArray
+
+_SAMPLES = 128
+_BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
+_STEEPEST = 0.5  # and changes the pace by at most a half
+
+
+def _features(loop: Loop) -> Array:
+    """Rotation matrices of root and joints, which know no sign, and the root's height: shape (samples, features)."""
+    channels = loop.channels(np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES))
+    w, x, y, z = np.moveaxis(channels[:, 3:].reshape(_SAMPLES, -1, 4), -1, 0)
+    matrix = np.stack(
+        [w * w + x * x, y * y + w * w, z * z + w * w, x * y - w * z, x * y + w * z, x * z - w * y, x * z + w * y,
+         y * z - w * x, y * z + w * x],
+        axis=-1,
+    )  # fmt: skip
+    return np.concatenate([2.0 * matrix.reshape(_SAMPLES, -1), channels[:, 2:3]], axis=1)
+
+
+def _best_shift(reference: Array, features: Array) -> int:
+    """Circular shift [samples] that correlates best; none for a motion that does not tell one phase from another."""
+    spectra = np.conj(np.fft.rfft(reference, axis=0)) * np.fft.rfft(features, axis=0)
+    correlation = np.fft.irfft(spectra.sum(axis=1), _SAMPLES)
+    spread = float(np.sqrt((reference.var(axis=0).sum()) * (features.var(axis=0).sum()))) * _SAMPLES
+    best = int(correlation.argmax())
+    return best if correlation[best] - correlation[0] > 0.02 * spread + 1e-12 else 0
+
+
+def _warp(reference: Array, features: Array) -> Array:
+    """Lead of the loop's phase over the reference's at each sample [samples], by dynamic time warping in a band.
+
+    The lead changes by at most one sample a sample, and is zero at the lap's ends.
+    """
+    leads = np.arange(-_BAND, _BAND + 1)
+    index: IntArray = (np.arange(_SAMPLES)[:, None] + leads) % _SAMPLES
+    cost = ((features[index] - reference[:, None, :]) ** 2).sum(axis=2)
+    # Where the motions do not tell, the shortest path is the straight one.
+    cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _BAND)
+    total = np.full(len(leads), np.inf)
+    total[_BAND] = 0.0
+    steps = np.zeros((_SAMPLES, len(leads)), dtype=np.int64)
+    for k in range(_SAMPLES):
+        padded = np.pad(total, 1, constant_values=np.inf)
+        options = np.stack([padded[1:-1], padded[:-2] + 0.2, padded[2:] + 0.2])
+        steps[k] = np.array([0, -1, 1])[options.argmin(axis=0)]
+        total = options.min(axis=0) + cost[k]
+    lead = np.zeros(_SAMPLES)
+    at = _BAND
+    for k in range(_SAMPLES - 1, -1, -1):
+        lead[k] = leads[at]
+        at += steps[k, at]
+    return lead
+
+
+def _smoothed(lead: Array) -> Array:
+    """Low-pass of a periodic lead by a Gaussian of a sixteenth of the lap, no steeper than allowed."""
+    frequency = np.fft.rfftfreq(_SAMPLES)
+    spectrum = np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _SAMPLES / 16.0) ** 2)
+    smooth = np.fft.irfft(spectrum, _SAMPLES)
+    steepest = float(np.abs(np.diff(smooth, append=smooth[:1])).max())
+    return smooth * min(1.0, _STEEPEST / max(steepest, 1e-12))
+
+
+def aligned_channels(loops: list[Loop], samples: int) -> Array:
+    """Remainders of all loops at equal steps of the common phase.
+
+    The first loop keeps its own phase; every other one is shifted and warped to it.
+
+    Parameters
+    ----------
+    loops : list of Loop
+        Clips as closed loops.
+    samples : int
+        N, phases 0, 1/N, … of the lap.
+
+    Returns
+    -------
+    Array, shape (N, m, nq)
+        Signs of quaternions agree with the first loop's as far as they can.
+    """
+    reference = _features(loops[0])
+    phase = np.arange(samples) / samples
+    channels = [loops[0].channels(phase, np.zeros(samples))]
+    for loop in loops[1:]:
+        features = _features(loop)
+        shift = _best_shift(reference, features)
+        lead = _smoothed(_warp(reference, np.roll(features, -shift, axis=0))) / _SAMPLES
+        knots = np.arange(_SAMPLES + 1) / _SAMPLES
+        smooth = CubicSpline(knots, np.append(lead, lead[0]), bc_type="periodic")(phase)
+        own = loop.channels(phase + shift / _SAMPLES + smooth, smooth)
+        for first in range(3, own.shape[1], 4):
+            if (own[:, first : first + 4] * channels[0][:, first : first + 4]).sum() < 0.0:
+                own[:, first : first + 4] *= -1.0
+        channels.append(own)
+    return np.stack(channels, axis=1)

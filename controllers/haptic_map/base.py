@@ -1,0 +1,59 @@
+"""Haptic maps: every stylus pose is a pose of something with many joints (Donald & Henle 2000, section 2.2)."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+from controllers.state import Array, Pose
+
+STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
+STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H
+
+
+class CompiledMap(NamedTuple):
+    """A map in the form that the servo evaluates (see `controllers.haptic_map.evaluate`).
+
+    Attributes
+    ----------
+    kind : int
+        Which kernel.
+    params : Array
+        What it reads.
+    memory : Array
+        What it keeps from tick to tick, at the start of a run.
+    """
+
+    kind: int
+    params: Array
+    memory: Array
+
+
+class HapticMap(ABC):
+    r"""Smooth map from stylus poses to configurations of a target, and its derivative.
+
+    .. math:: h: SE(3) \to D, \qquad h_*: \mathbb{R}^6 \to T_{h(X)}D
+
+    A configuration has `nq` numbers and a tangent `nv`; what they mean is the map's affair. A map that keeps memory
+    (the lap of a travelling animation) is a function of the stylus pose and of that memory.
+    """
+
+    @property
+    @abstractmethod
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+
+    @property
+    @abstractmethod
+    def nv(self) -> int:
+        """Numbers of a tangent."""
+
+    @abstractmethod
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run."""
+
+    @abstractmethod
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
+
+    @abstractmethod
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""

@@ -1,0 +1,31 @@
+"""The evaluation of a haptic map, of whatever kind, in the compiled tick."""
+
+import numpy as np
+from numba import njit
+
+from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
+from controllers.state import Array
+
+
+@njit
+def evaluate_map(kind: int, params: Array, x: Array, memory: Array, pose: Array) -> None:
+    """Pose h(x).
+
+    Parameters
+    ----------
+    kind, params, memory
+        Of a `CompiledMap`; the memory is updated.
+    x : Array, shape (7,)
+        Stylus pose: p_H [m], R_H (quaternion wxyz).
+    pose : Array, shape (nq,)
+        Written.
+    """
+    if kind == CYLINDRICAL:
+        cylindrical_map(params, x, memory, pose, np.empty((0, 6)))
+
+
+@njit
+def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
+    if kind == CYLINDRICAL:
+        cylindrical_map(params, x, memory, pose, jacobian)

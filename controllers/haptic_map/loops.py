@@ -1,0 +1,206 @@
+r"""Clips as closed loops: each is split into a steady drift over the ground and a remainder that repeats.
+
+.. math:: X_{root}(s) = \exp(s\,\xi)\,\rho(s), \qquad s \in [0, 1],\; \rho(1) = \rho(0)
+
+ξ = (v, ω) is the twist in the plane whose exponential is the displacement of one lap: the walk goes on from where
+the lap ended, the spin comes back to where it began having turned by ω = 2π. Everything else (ρ and the joints) is
+a periodic C² spline, in R³ for the root's position and in R⁴, normalised, for each rotation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+_STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # a lap that ends so near to its start is meant to return
+_UPRIGHT = 0.3  # least vertical component of the pelvis axis at which its turning about the vertical counts
+_SEAM = 0.2  # share of the lap at each end that the closing of an open clip may change
+
+
+def plane_exponential(twist: Array) -> tuple[Array, Array]:
+    """Displacements exp(ξ) in the plane: translations (..., 2) and angles (...), of twists (v, ω), shape (..., 3)."""
+    angle = twist[..., 2]
+    half = 0.5 * angle
+    # sin α/α and (1 − cos α)/α by sinc: exact at α = 0.
+    s, c = np.sinc(angle / np.pi), np.sin(half) * np.sinc(half / np.pi)
+    x, y = twist[..., 0], twist[..., 1]
+    return np.stack([s * x - c * y, c * x + s * y], axis=-1), angle
+
+
+def turned(angle: Array, xy: Array) -> Array:
+    """Vectors of the plane (..., 2) turned by angles (...)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * xy[..., 0] - s * xy[..., 1], s * xy[..., 0] + c * xy[..., 1]], axis=-1)
+
+
+def yawed(angle: Array, quaternions: Array) -> Array:
+    """Quaternions (..., 4) turned about the vertical by angles (...): q_z ⊗ q."""
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    return np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=-1)
+
+
+def _periodic_spline(s: Array, values: Array, sign: float) -> CubicSpline:
+    """C² spline through values whose last row is `sign` times the first; of period 2 if the sign is −1."""
+    if sign > 0.0:
+        return CubicSpline(s, np.vstack([values[:-1], values[:1]]), bc_type="periodic")
+    twice = np.vstack([values[:-1], -values[:-1], values[:1]])
+    return CubicSpline(np.concatenate([s[:-1], s + 1.0]), twice, bc_type="periodic")
+
+
+def _hermite(x: Array) -> Array:
+    """Quintics on [0, 1], shape (3, n): value, slope or second derivative 1 at 0, all others 0 there and at 1."""
+    x = np.minimum(x, 1.0)
+    rest = (1.0 - x) ** 3
+    return np.stack([rest * (1.0 + 3.0 * x + 6.0 * x**2), rest * (x + 3.0 * x**2), rest * 0.5 * x**2])
+
+
+def _end_derivatives(s: Array, values: Array) -> Array:
+    """Value, slope and second derivative at s = 0, shape (3, c); the two from a cubic fit, or noise would decide them."""
+    n = min(len(s), max(6, len(s) // 12))
+    fit = np.polynomial.polynomial.polyfit(s[:n], values[:n], min(3, n - 1))
+    return np.stack([values[0], fit[1], 2.0 * fit[2] if len(fit) > 2 else np.zeros_like(fit[0])])
+
+
+def _closed(s: Array, values: Array, sign: float) -> Array:
+    """Lead the ends of an open motion half way to each other: value, slope and second derivative meet."""
+    start, end = _end_derivatives(s, values), _end_derivatives(1.0 - s[::-1], values[::-1])
+    gaps = sign * end * [[1.0], [-1.0], [1.0]] - start
+    reach = _SEAM ** np.arange(3)[:, None]
+    first = np.einsum("kn,kc->nc", _hermite(s / _SEAM) * reach, 0.5 * gaps)
+    # Seen from the end the parameter runs backwards, which changes the sign of the slope's part.
+    last = np.einsum("kn,kc->nc", _hermite((1.0 - s) / _SEAM) * reach * [[1.0], [-1.0], [1.0]], 0.5 * sign * gaps)
+    return values + first - last
+
+
+def _full_turns(quaternions: Array, net: float) -> int:
+    """Whole turns about the vertical beyond the net one, counted while the pelvis is upright: not a somersault's."""
+    upright = 1.0 - 2.0 * (quaternions[:, 1] ** 2 + quaternions[:, 2] ** 2)
+    change = quaternions[1:] - quaternions[:-1]
+    middle = 0.5 * (quaternions[1:] + quaternions[:-1])
+    # Vertical component of the world's angular velocity: twice the k part of dq ⊗ q⁻¹.
+    vertical = 2.0 * (
+        change[:, 3] * middle[:, 0]
+        - change[:, 0] * middle[:, 3]
+        + change[:, 2] * middle[:, 1]
+        - change[:, 1] * middle[:, 2]
+    )
+    counted = vertical[(upright[1:] > _UPRIGHT) & (upright[:-1] > _UPRIGHT)].sum()
+    return round(float(counted - net) / (2.0 * np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One clip as a closed loop over the phase s in [0, 1].
+
+    Attributes
+    ----------
+    drift : Array, shape (3,)
+        ξ = (v_x, v_y [m], ω [rad]) a lap.
+    duration : float
+        Of a lap [s].
+    gap : float
+        Angle [rad] by which the joint that closes worst did not close in the clip, and was made to.
+    splines : list of CubicSpline
+        ρ's position, then root and joint rotations in R⁴, each of period 1 or 2 (when it comes back as −q).
+    """
+
+    drift: Array
+    duration: float
+    gap: float
+    splines: list[CubicSpline]
+
+    def channels(self, s: Array, lead: Array) -> Array:
+        """Remainder at phases s, all rotations of unit length, shape (n, nq); the root moved by exp(lead ξ)."""
+        parts = [spline(np.mod(s, float(spline.x[-1]))) for spline in self.splines]
+        rotations = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts[1:]]
+        shift, angle = plane_exponential(lead[:, None] * self.drift)
+        parts[0][:, :2] = turned(angle, parts[0][:, :2]) + shift
+        rotations[0] = yawed(angle, rotations[0])
+        return np.concatenate([parts[0], *rotations], axis=1)
+
+
+def checked_clip(poses: Array, fps: float, name: str) -> Array:
+    """Poses of a clip as an array of floats with unit quaternions of continuous sign, or what is wrong with them."""
+    array = np.array(poses, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] < 7 or (array.shape[1] - 7) % 4 != 0:
+        raise ParameterError(f"{name}: poses must have shape (n, 7 + 4 joints), got {array.shape}")
+    if len(array) < 2:
+        raise ParameterError(f"{name}: a clip needs at least 2 frames, got {len(array)}")
+    if not (np.isfinite(fps) and fps > 0.0):
+        raise ParameterError(f"{name}: fps must be positive and finite, got {fps}")
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name}: frame {int(np.argwhere(~np.isfinite(array))[0][0])} is not finite")
+    for first in range(3, array.shape[1], 4):
+        quaternions = array[:, first : first + 4]
+        norms = np.linalg.norm(quaternions, axis=1, keepdims=True)
+        if np.abs(norms - 1.0).max() > 1e-3:
+            raise ParameterError(
+                f"{name}: quaternion at number {first} of frame {int(np.abs(norms - 1).argmax())} is not unit"
+            )
+        dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
+        signs = np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
+        array[:, first : first + 4] = quaternions / norms * signs[:, None]
+    return array
+
+
+def _drift(poses: Array) -> Array:
+    """ξ of a clip from its first and last frame and the turns between."""
+    first, last = poses[0], poses[-1]
+    w = float(last[3:7] @ first[3:7])
+    # k part of q_last ⊗ q_first⁻¹: the change of heading is the twist of that rotation about the vertical.
+    k = float(last[6] * first[3] - last[3] * first[6] + last[5] * first[4] - last[4] * first[5])
+    net = float(2.0 * np.arctan2(k * np.sign(w or 1.0), abs(w)))
+    turns = _full_turns(poses[:, 3:7], net)
+    step = last[:2] - turned(np.array(net), first[:2])
+    if turns == 0 and abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
+        return np.zeros(3)
+    if turns != 0 and abs(net) < 1.0:
+        # A twist of whole turns cannot move on; what is left of a step is closed at the seam.
+        return np.array([0.0, 0.0, 2.0 * np.pi * turns])
+    angle = net + 2.0 * np.pi * turns
+    columns, _ = plane_exponential(np.array([[1.0, 0.0, angle], [0.0, 1.0, angle]]))
+    return np.append(np.linalg.solve(columns.T, step), angle)
+
+
+def _remainder(poses: Array, s: Array, drift: Array) -> Array:
+    """ρ and the joints: the poses with the root moved by exp(−s ξ)."""
+    rest = poses.copy()
+    shift, angle = plane_exponential(s[:, None] * drift)
+    rest[:, :2] = turned(-angle, poses[:, :2] - shift)
+    rest[:, 3:7] = yawed(-angle, poses[:, 3:7])
+    return rest
+
+
+def closed_loop(poses: Array, fps: float) -> Loop:
+    """Loop of a clip of poses (n, nq) that passed `checked_clip`, moved to the origin and facing +x on average.
+
+    A clip that does not close by itself is made to: over the first and last fifth of the lap its ends are led half
+    way to each other by quintics, so that value, slope and second derivative meet.
+    """
+    s = np.linspace(0.0, 1.0, len(poses))
+    placed = poses.copy()
+    placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
+    w, _, _, z = _remainder(placed, s, _drift(placed))[:, 3:7].T
+    # Mean heading by the doubled half angle, which does not know the sign of a quaternion.
+    heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
+    placed[:, :2] = turned(np.array(-heading), placed[:, :2])
+    placed[:, 3:7] = yawed(np.full(len(s), -heading), placed[:, 3:7])
+    drift = _drift(placed)
+    rest = _remainder(placed, s, drift)
+    splines: list[CubicSpline] = []
+    gap = 0.0
+    for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:
+        values = rest[:, first:stop]
+        sign = 1.0
+        if first:
+            dot = float(values[-1] @ values[0])
+            sign = 1.0 if dot >= 0.0 else -1.0
+            gap = max(gap, 2.0 * float(np.arccos(min(1.0, abs(dot)))))
+        if np.abs(values[-1] - sign * values[0]).max() > 1e-6:
+            values = _closed(s, values, sign)
+        splines.append(_periodic_spline(s, values, sign))
+    return Loop(drift, (len(poses) - 1) / fps, gap, splines)

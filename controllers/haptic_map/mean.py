@@ -1,0 +1,176 @@
+r"""Weighted mean of rotations, and its derivative.
+
+The mean minimises Σ w_i |R − R_i|², the chordal metric (Markley et al. 2007, "Averaging quaternions"): its
+quaternion is the eigenvector of M = Σ w_i q_i q_iᵀ with the largest eigenvalue λ. We prefer it to the Karcher mean,
+with which it agrees to third order in the spread of the rotations: the sign of a quaternion does not matter, and it
+is smooth except where λ is double (two rotations half a turn apart in equal parts: a point), while the Karcher mean
+jumps as soon as two are half a turn apart, whatever their weights. So a somersault can be blended with a walk.
+
+With r_i = q⁻¹ ⊗ q_i = (s_i, v_i), the mean satisfies g = Σ w_i s_i v_i = 0 and A = Σ w_i (s_i² I − v_i v_iᵀ), which
+is λI − M seen in the tangent space of q, is positive definite: that proves that the iteration found the largest
+eigenvalue.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.rotations import multiply, relative
+from controllers.state import Array, Quat
+
+_Normal = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@njit
+def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
+    """Entries A11, A12, A13, A22, A23, A33 and g1, g2, g3."""
+    a11 = a12 = a13 = a22 = a23 = a33 = g1 = g2 = g3 = 0.0
+    for i in range(unit.shape[0]):
+        w = weights[i]
+        s, x, y, z = relative(q[0], q[1], q[2], q[3], unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3])
+        a11 += w * (s * s - x * x)
+        a22 += w * (s * s - y * y)
+        a33 += w * (s * s - z * z)
+        a12 -= w * x * y
+        a13 -= w * x * z
+        a23 -= w * y * z
+        g1 += w * s * x
+        g2 += w * s * y
+        g3 += w * s * z
+    return a11, a12, a13, a22, a23, a33, g1, g2, g3
+
+
+@njit
+def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A⁻¹ (x, y, z) by cofactors; zero when A is singular (the mean is not unique there)."""
+    c11, c12, c13 = e[3] * e[5] - e[4] * e[4], e[2] * e[4] - e[1] * e[5], e[1] * e[4] - e[2] * e[3]
+    c22, c23, c33 = e[0] * e[5] - e[2] * e[2], e[1] * e[2] - e[0] * e[4], e[0] * e[3] - e[1] * e[1]
+    determinant = e[0] * c11 + e[1] * c12 + e[2] * c13
+    if abs(determinant) < 1e-18:
+        return 0.0, 0.0, 0.0
+    return (
+        (c11 * x + c12 * y + c13 * z) / determinant,
+        (c12 * x + c22 * y + c23 * z) / determinant,
+        (c13 * x + c23 * y + c33 * z) / determinant,
+    )
+
+
+@njit
+def _polish(unit: Array, weights: Array, q: Quat) -> bool:
+    """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; tells whether A is positive definite at the end."""
+    e = _normal_equations(unit, weights, q)
+    for _ in range(8):
+        x, y, z = _solve(e, e[6], e[7], e[8])
+        square = x * x + y * y + z * z
+        scale = 1.0 / np.sqrt(1.0 + square)
+        q[0], q[1], q[2], q[3] = multiply(q[0], q[1], q[2], q[3], scale, scale * x, scale * y, scale * z)
+        if square < 1e-12:
+            break
+        e = _normal_equations(unit, weights, q)
+    second = e[0] * e[3] - e[1] * e[1]
+    third = e[5] * second - e[0] * e[4] * e[4] + 2.0 * e[1] * e[2] * e[4] - e[3] * e[2] * e[2]
+    return e[0] > 0.0 and second > 0.0 and third > 0.0
+
+
+@njit
+def _dominant(unit: Array, weights: Array, q: Quat) -> None:
+    """Eigenvector of the largest eigenvalue of M by squaring it 24 times: slow, and sure."""
+    m = np.zeros((4, 4))
+    for i in range(unit.shape[0]):
+        for j in range(4):
+            for k in range(4):
+                m[j, k] += weights[i] * unit[i, j] * unit[i, k]
+    square = np.empty((4, 4))
+    for _ in range(24):
+        trace = m[0, 0] + m[1, 1] + m[2, 2] + m[3, 3]
+        for j in range(4):
+            for k in range(4):
+                total = 0.0
+                for n in range(4):
+                    total += m[j, n] * m[n, k]
+                square[j, k] = total / (trace * trace)
+        m[:] = square
+    column = 0
+    for j in range(1, 4):
+        if m[j, j] > m[column, column]:
+            column = j
+    norm = 0.0
+    for j in range(4):
+        norm += m[j, column] * m[j, column]
+    for j in range(4):
+        q[j] = m[j, column] / np.sqrt(norm)
+
+
+@njit
+def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
+    """Weighted mean of rotations.
+
+    Parameters
+    ----------
+    unit : Array, shape (m, 4)
+        Unit quaternions wxyz, of any sign.
+    weights : Array, shape (m,)
+        Not negative, of sum 1.
+    q : Quat
+        Written: the mean, with the sign of the heaviest quaternion.
+    """
+    heaviest = 0
+    for i in range(1, unit.shape[0]):
+        if weights[i] > weights[heaviest]:
+            heaviest = i
+    q[:] = 0.0
+    for i in range(unit.shape[0]):
+        dot = 0.0
+        for j in range(4):
+            dot += unit[i, j] * unit[heaviest, j]
+        w = weights[i] if dot >= 0.0 else -weights[i]
+        for j in range(4):
+            q[j] += w * unit[i, j]
+    norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    for j in range(4):
+        q[j] /= norm
+    if not _polish(unit, weights, q):
+        _dominant(unit, weights, q)
+        _polish(unit, weights, q)
+    dot = 0.0
+    for j in range(4):
+        dot += q[j] * unit[heaviest, j]
+    if dot < 0.0:
+        for j in range(4):
+            q[j] = -q[j]
+
+
+@njit
+def mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q: Quat, tangent: Array) -> None:
+    """Local angular velocities of the mean as its rotations turn, and as its weights change.
+
+    From dM q projected on the tangent space: A ω/2 = Σ dw_i s_i v_i + ½ w_i (s_i² ω_i + s_i v_i × ω_i − v_i
+    (v_i·ω_i)).
+
+    Parameters
+    ----------
+    unit, weights, q
+        As in `mean_rotation`, q being the mean.
+    spin : Array, shape (m, 3)
+        ω_i, local angular velocities of the rotations with respect to one parameter.
+    changes : Array, shape (k, m)
+        Derivatives of the weights with respect to k other parameters.
+    tangent : Array, shape (3, 1 + k)
+        Written: local angular velocity of the mean with respect to each parameter.
+    """
+    e = _normal_equations(unit, weights, q)
+    tangent[:] = 0.0
+    for i in range(unit.shape[0]):
+        s, x, y, z = relative(q[0], q[1], q[2], q[3], unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3])
+        a, b, c = spin[i, 0], spin[i, 1], spin[i, 2]
+        along = x * a + y * b + z * c
+        half = 0.5 * weights[i]
+        tangent[0, 0] += half * (s * s * a + s * (y * c - z * b) - x * along)
+        tangent[1, 0] += half * (s * s * b + s * (z * a - x * c) - y * along)
+        tangent[2, 0] += half * (s * s * c + s * (x * b - y * a) - z * along)
+        for k in range(changes.shape[0]):
+            tangent[0, 1 + k] += changes[k, i] * s * x
+            tangent[1, 1 + k] += changes[k, i] * s * y
+            tangent[2, 1 + k] += changes[k, i] * s * z
+    for k in range(tangent.shape[1]):
+        x, y, z = _solve(e, 2.0 * tangent[0, k], 2.0 * tangent[1, k], 2.0 * tangent[2, k])
+        tangent[0, k], tangent[1, k], tangent[2, k] = x, y, z
