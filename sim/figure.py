@@ -26,10 +26,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT, SEGMENTS, figure_model
+from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT, SEGMENTS
 from sim.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.errors import SimError
-from sim.native import mj_full_m, mj_kinematics
+from sim.native import mj_full_m, mj_integrate_pos, mj_kinematics
 from sim.stance import stance_response
 
 Array = npt.NDArray[np.float64]
@@ -83,6 +83,7 @@ class FigureState(NamedTuple):
     reference_reach: float
     contact_reach: float
     flight_height: float
+    lift_time: float
     acceleration: Array
     rotation: Array
     share: Array
@@ -121,7 +122,7 @@ def _rotation_error(q: Array, q_r: Array, error: Array) -> None:
 
 @njit
 def _turned(rotation: Array, vector: Array, out: Array) -> None:
-    """out = exp(rotation) vector (Rodrigues)."""
+    """Out = exp(rotation) vector (Rodrigues)."""
     angle = np.sqrt(rotation[0] ** 2 + rotation[1] ** 2 + rotation[2] ** 2)
     a = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
     b = 0.5 if angle < 1e-4 else (1.0 - np.cos(angle)) / angle**2
@@ -162,16 +163,26 @@ def _nearness(height: float, reach: float) -> float:
 
 
 @njit
-def _find_support(s: FigureState, q_r: Array) -> float:
-    """Share of each contact point: near the floor in the reference and in fact. Returns the largest."""
+def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
+    """Share of each contact point: near the floor in fact, and in the reference now and a moment ahead.
+
+    A point that the reference is about to lift is unloaded before, so that its leg need not catch up. Returns the largest
+    share by the narrower measure of what counts as flight.
+    """
+    s.twin_qpos[:] = q_r
+    mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.lift_time)
+    mj_kinematics(s.twin_model, s.twin_data)
+    for i in range(s.share.shape[0]):
+        s.share[i] = s.twin_contact_pos[s.twin_contact[i], 2]
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
     support = 0.0
     for i in range(s.share.shape[0]):
-        height = s.twin_contact_pos[s.twin_contact[i], 2] - s.radius
-        near = _nearness(s.contact_pos[s.contact[i], 2] - s.radius, s.contact_reach)
-        s.share[i] = near * _nearness(height, s.reference_reach)
-        support = max(support, near * _nearness(height, s.flight_height))
+        height = max(s.share[i], s.twin_contact_pos[s.twin_contact[i], 2]) - s.radius
+        gap = s.contact_pos[s.contact[i], 2] - s.radius
+        touch = _nearness(gap, s.contact_reach)
+        s.share[i] = touch * _nearness(height, s.reference_reach)
+        support = max(support, touch * _nearness(height, s.flight_height))
     return support
 
 
@@ -188,7 +199,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """
     n = s.acceleration.shape[0]
     _wanted_acceleration(s, q_r, v_r, a_r)
-    support = _find_support(s, q_r)
+    support = _find_support(s, q_r, v_r)
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     M, a, demand, w = s.M, s.acceleration, s.demand, s.wrench
     R, origin = s.xmat[0], s.xpos[0]
@@ -315,9 +326,10 @@ class FigureGains:
     root_rate: float = 25.0
     force_bound: float = 0.5
     moment_bound: float = 0.1
-    reference_reach: float = 0.03
-    contact_reach: float = 0.004
-    flight_height: float = 0.02
+    reference_reach: float = 0.015
+    contact_reach: float = 0.001
+    flight_height: float = 0.015
+    lift_time: float = 0.02
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -387,7 +399,7 @@ class Figure:
             weight=weight, radius=float(m.geom_size[geoms[0], 0]), friction=0.9 * float(m.geom_friction[geoms[0], 0]),
             joint_rate=gains.joint_rate, root_rate=gains.root_rate, force_bound=gains.force_bound * weight,
             moment_bound=gains.moment_bound * weight * 1.75, reference_reach=gains.reference_reach,
-            contact_reach=gains.contact_reach, flight_height=gains.flight_height, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
+            contact_reach=gains.contact_reach, flight_height=gains.flight_height, lift_time=gains.lift_time, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
             share=np.zeros(n), edges=np.zeros((N_EDGES * n, 6)), edge_share=np.zeros(N_EDGES * n),
             edge_force=np.zeros(N_EDGES * n), force=np.zeros((n, 3)), scaled=np.zeros(6), residual=np.zeros(6),
             demand=np.zeros(6), given=np.zeros(N_TANGENT), wrench=np.zeros(6), root_M=np.zeros((6, 6)),

@@ -5,9 +5,9 @@ that this meets is a force nobody planned. So the wanted accelerations a_ℓ of 
 little as possible, towards contact points at rest:
 
 .. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p s_p\,\|J_p^\ell(a_\ell^* + \delta) + J_p^r a_r + \dot J_p v
-          + 2\eta\,\dot p + \eta^2 h_p e_z\|^2 ,
+          + \eta\,\dot p\|^2 ,
 
-with each point's share s_p of the load and its height h_p, in the form δ = δ_0 + K a_r, since the root's acceleration is not known yet.
+with each point's share s_p of the load, in the form δ = δ_0 + K a_r, since the root's acceleration is not known yet.
 """
 
 import numpy as np
@@ -18,13 +18,13 @@ Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _ADHERENCE = 100.0  # κ
-_SETTLING = 30.0  # η, rate at which a foot is asked to come to rest on the floor [1/s]
+_SETTLING = 40.0  # η, rate at which a foot is asked to come to rest on the floor [1/s]
 N_LEG = 9
 
 
 @njit
 def _cross_add(a: Array, b: Array, out: Array) -> None:
-    """out += a × b."""
+    """Out += a × b."""
     out[0] += a[1] * b[2] - a[2] * b[1]
     out[1] += a[2] * b[0] - a[0] * b[2]
     out[2] += a[0] * b[1] - a[1] * b[0]
@@ -104,13 +104,12 @@ def stance_response(
         for i in range(3):
             J_root[i, :3] = 0.0
             J_root[i, i] = 1.0
-        wanted[2] -= _SETTLING**2 * points[p, 2]
         for i in range(3):
             for k in range(6):
-                wanted[i] -= 2.0 * _SETTLING * J_root[i, k] * v[k]
+                wanted[i] -= _SETTLING * J_root[i, k] * v[k]
             for k in range(N_LEG):
                 t = 3 + 3 * bodies[k // 3] + k % 3
-                wanted[i] -= J[i, k] * (2.0 * _SETTLING * v[t] + a[t])
+                wanted[i] -= J[i, k] * (_SETTLING * v[t] + a[t])
         for k in range(N_LEG):
             for i in range(3):
                 offset[k] += weight * J[i, k] * wanted[i]
