@@ -34,6 +34,8 @@ class Dynamics(NamedTuple):
         Centre of mass [m].
     force : array, shape (n, 3)
         Force of the floor on the body [N].
+    torque : array, shape (n, 3)
+        Rate of the angular momentum about the centre of mass [N m]: the moment that force must have about it.
     zmp : array, shape (n, 2)
         Zero-moment point on the floor [m].
     contacts : array, shape (n, 8, 3)
@@ -42,6 +44,7 @@ class Dynamics(NamedTuple):
 
     com: Array
     force: Array
+    torque: Array
     zmp: Array
     contacts: Array
 
@@ -77,7 +80,7 @@ def dynamics(clip: Clip) -> Dynamics:
     force = model.body_subtreemass[pelvis] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
     torque = (np.roll(spin, -1, axis=0) - np.roll(spin, 1, axis=0)) * clip.fps / 2
     lever = np.stack([com[:, 2] * force[:, 0] + torque[:, 1], com[:, 2] * force[:, 1] - torque[:, 0]], axis=1)
-    return Dynamics(com, force, com[:, :2] - lever / force[:, 2:], contacts)
+    return Dynamics(com, force, torque, com[:, :2] - lever / force[:, 2:], contacts)
 
 
 def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
@@ -157,7 +160,9 @@ def balanced_clip(
     frequency = np.arange(n // 2 + 1) / choreography.duration
     for _ in range(rounds):
         motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
-        wanted = [supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)]
+        wanted = [
+            supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
+        ]
         # A sway adds a moment: the same one moves the zero-moment point further where the floor pushes less.
         load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
         error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)

@@ -1,0 +1,27 @@
+"""``python -m models.mocap``: make the embedded clips again, all or those named, and write them to ``clips/``."""
+
+import sys
+from pathlib import Path
+
+from models.mocap import choreography, flights, gait
+from models.mocap.bvh import write_bvh
+
+CLIPS = choreography.CLIPS | gait.CLIPS | flights.CLIPS
+
+
+def main(names: list[str]) -> int:
+    """Write the named clips, or every one."""
+    unknown = sorted(set(names) - set(CLIPS))
+    if unknown:
+        print(f"no clip {', '.join(unknown)}; there are {', '.join(CLIPS)}", file=sys.stderr)
+        return 2
+    for name in names or CLIPS:
+        path = Path(__file__).parent / "clips" / f"{name}.bvh"
+        clip = CLIPS[name]()
+        write_bvh(clip, path)
+        print(f"{path.name}: {clip.n_frames} frames, {clip.duration:.2f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
