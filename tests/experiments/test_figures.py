@@ -1,0 +1,159 @@
+"""The figures show what was recorded, in the units they name."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from experiments.figures import (
+    POINTS,
+    deviation_figure,
+    draw_figures,
+    forces_figure,
+    path_figure,
+    torques_figure,
+    tracking_figure,
+)
+from sim.recorder import Group, Recorder, Recording
+
+ANGLE = np.linspace(0, 2 * np.pi, 61)
+CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
+TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torque": (3,)}
+FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": ()}
+
+
+def record(path, n=2000, pushing=True):
+    """A hand on a circle, pushed outwards from 0.5 s to 0.7 s; a flight from 1.0 s to 1.2 s."""
+    t = np.arange(n) / 1000
+    pushed = pushing * ((t >= 0.5) & (t < 0.7)).astype(float)
+    outwards = np.column_stack([np.cos(t), np.sin(t), 0 * t])
+    rows = t[::10]
+    flight = ((rows >= 0.995) & (rows < 1.195)).astype(float)
+    standing = (1 - flight)[:, None]
+    static = {
+        "curve": CURVE,
+        "tube_radius": 0.02,
+        "motor_continuous": np.array([0.4, 0.3, 0.2]),
+        "motor_peak": np.array([1.6, 1.2, 0.8]),
+        "body_weight": 700.0,
+    }
+    with Recorder(path, {}, 1, {"ticks": Group(1000, TICKS), "frames": Group(100, FRAMES)}, static) as recorder:
+        recorder.append(
+            "ticks",
+            {
+                "t": t,
+                "p": (0.05 + 0.01 * pushed)[:, None] * outwards,
+                "distance": 0.01 * pushed,
+                "force": np.tile([1.0, 2.0, 2.0], (n, 1)),
+                "user": 2.0 * pushed[:, None] * outwards,
+                "torque": np.tile([0.1, -0.2, 0.3], (n, 1)),
+            },
+        )
+        recorder.append(
+            "frames",
+            {
+                "t": rows,
+                "joint_error": np.full(len(rows), np.pi / 180),
+                "root_error": np.full(len(rows), 0.02),
+                "residual": standing * np.array([42.0, 0.0, 56.0, 9.0, 9.0, 9.0]),
+                "ground": standing * np.array([0.0, 0.0, 700.0]),
+                "flight": flight,
+            },
+        )
+        recorder.close({})
+    return Recording(path)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    with record(tmp_path / "run.h5") as recording:
+        yield recording
+
+
+def line(ax, label):
+    return next(line for line in ax.lines if line.get_label() == label)
+
+
+def values(ax, label):
+    return line(ax, label).get_ydata()
+
+
+def spans(ax):
+    """Shaded intervals of the horizontal axis."""
+    return [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
+
+
+def test_all_figures_are_drawn_into_a_folder_that_is_made(recording, tmp_path):
+    files = draw_figures(recording, tmp_path / "run" / "figures")
+    assert [file.name for file in files] == ["path.png", "deviation.png", "forces.png", "torques.png", "figure.png"]
+    for file in files:
+        pixels = imread(file)
+        assert pixels.shape[1] == 1080
+        assert np.ptp(pixels[..., :3]) > 0.5
+
+
+def test_the_path_is_in_millimetres_and_orange_where_the_hand_pushes(recording):
+    above, right = path_figure(recording).axes
+    hand = np.array(line(above, "hand").get_data())
+    assert np.linalg.norm(hand[:, [100, 600]], axis=0) == pytest.approx([50.0, 60.0])
+    assert np.flatnonzero(np.isfinite(line(above, "hand, pushing").get_ydata())).tolist() == list(range(500, 700))
+    assert np.linalg.norm(np.array(line(above, "curve φ").get_data()), axis=0) == pytest.approx(np.full(61, 50.0))
+    assert np.all(line(right, "hand").get_ydata() == 0.0)
+
+
+def test_the_deviation_is_in_millimetres_with_pushes_shaded(recording):
+    full, magnified = deviation_figure(recording).axes
+    assert np.max(full.lines[-1].get_ydata()) == pytest.approx(10.0)
+    assert spans(full) == [(pytest.approx(0.5), pytest.approx(0.699))]
+    assert magnified.get_ylim()[1] < 1.0 < 10.0 < full.get_ylim()[1]
+
+
+def test_forces_are_shown_by_component_and_norm(recording):
+    field, hand = forces_figure(recording).axes
+    assert [values(field, label)[0] for label in ("x", "y", "z", "norm")] == [1.0, 2.0, 2.0, 3.0]
+    assert np.max(values(hand, "norm")) == pytest.approx(2.0)
+
+
+def test_torques_stand_against_the_limits_of_their_motor(recording):
+    axes = torques_figure(recording).axes
+    for ax, torque, continuous, peak in zip(axes, (100, -200, 300), (400, 300, 200), (1600, 1200, 800), strict=True):
+        assert ax.lines[0].get_ydata()[0] == pytest.approx(torque)
+        assert values(ax, "continuous")[0] == pytest.approx(continuous)
+        assert values(ax, "peak")[0] == pytest.approx(peak)
+        low, high = ax.get_ylim()
+        assert low < torque < high
+
+
+def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(recording):
+    axes = tracking_figure(recording).axes
+    assert [ax.lines[0].get_ydata()[0] for ax in axes] == pytest.approx([1.0, 2.0, 10.0, 100.0])
+    assert all(spans(ax) == [(pytest.approx(1.0), pytest.approx(1.19))] for ax in axes)
+    assert axes[2].lines[0].get_ydata()[110] == 0.0
+
+
+def test_a_long_recording_is_thinned(tmp_path):
+    with record(tmp_path / "long.h5", n=3 * POINTS + 7) as recording:
+        drawn = values(path_figure(recording).axes[0], "hand")
+    assert POINTS / 2 < len(drawn) <= POINTS
+
+
+def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
+    with record(tmp_path / "calm.h5", pushing=False) as recording:
+        full, _ = deviation_figure(recording).axes
+        assert spans(full) == []
+        assert full.get_legend() is None
+
+
+def test_no_display_is_needed(tmp_path):
+    record(tmp_path / "run.h5").close()
+    script = (
+        "import sys; from pathlib import Path; from sim.recorder import Recording; "
+        "from experiments.figures import draw_figures; draw_figures(Recording(Path(sys.argv[1])), Path(sys.argv[2])); "
+        "sys.exit('matplotlib.pyplot' in sys.modules)"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"} | {"MPLBACKEND": "tkagg"}
+    done = subprocess.run([sys.executable, "-c", script, tmp_path / "run.h5", tmp_path], env=environment, check=False)
+    assert done.returncode == 0
