@@ -1,7 +1,7 @@
 """Authoring engine: readable key poses and footsteps in, C² motion of the figure out.
 
-The body above the hips is keyed in anatomical words and interpolated by cubic splines; the feet follow their own tracks
-of footsteps, exact rests on the floor joined by quintic swings; the legs between the two are solved in closed form.
+The body above the hips is keyed in anatomical words and interpolated by splines; the feet follow their own tracks of
+footsteps, exact rests on the floor joined by quintic swings; the legs between the two are solved in closed form.
 Angles of keys are in degrees, lengths in metres, times in seconds.
 """
 
@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
@@ -176,17 +176,28 @@ class Choreography:
     lap: Lap | None = None
 
 
+def _check_times(choreography: Choreography, what: str, times: Array) -> None:
+    """Refuse times that do not increase or, in a lap, come back to where they began."""
+    if np.any(np.diff(times) <= 0) or (choreography.lap is not None and np.ptp(times) >= choreography.duration):
+        raise ModelError(
+            f"{choreography.name}: {what} at {times.tolist()} s; times must increase and those of a cyclic motion span "
+            f"less than its duration of {choreography.duration} s"
+        )
+
+
+def _from_rest_to_rest(times: Array, values: Array) -> BSpline:
+    """Quintic spline through values (n, k) without velocity and acceleration at either end."""
+    still = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
+    return make_interp_spline(times, values, k=5, bc_type=(still, still))
+
+
 def _channel(choreography: Choreography, name: str, t: Array) -> Array:
-    """Interpolate one channel of the keys by a cubic spline, periodic or starting and ending at rest, shape (n, k)."""
+    """One channel of the keys, shape (n, k): a periodic cubic spline, or a quintic one that starts and ends at rest."""
     keyed = [(key.t, getattr(key, name)) for key in choreography.keys if getattr(key, name) is not None]
     if not keyed:
         raise ModelError(f"{choreography.name}: no key sets {name}; set it at least once")
     times = np.array([when for when, _ in keyed])
-    if np.any(np.diff(times) <= 0) or np.ptp(times) >= choreography.duration + (choreography.lap is None):
-        raise ModelError(
-            f"{choreography.name}: keys of {name} at {times.tolist()} s; times must increase and span less than the "
-            f"duration of {choreography.duration} s"
-        )
+    _check_times(choreography, f"keys of {name}", times)
     values = np.array(
         [value.rotations().ravel() if isinstance(value, Arm) else value for _, value in keyed], dtype=float
     )
@@ -199,7 +210,7 @@ def _channel(choreography: Choreography, name: str, t: Array) -> Array:
     if choreography.lap is None:
         if len(times) == 1:
             return np.tile(values, (len(t), 1))
-        return CubicSpline(times, values, bc_type="clamped")(np.clip(t, times[0], times[-1]))
+        return _from_rest_to_rest(times, values)(np.clip(t, times[0], times[-1]))
     per_lap = getattr(choreography.lap, name, 0.0)
     pace = (np.deg2rad(per_lap) if name == "yaw" else per_lap) / choreography.duration
     closed = np.vstack([values - pace * (times - times[0])[:, None], values[:1]])
@@ -220,8 +231,9 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     steps: Sequence[Step] = getattr(choreography, f"{side}_foot")
     rests = [i for i, step in enumerate(steps) if step.rest]
     times = np.array([step.t for step in steps])
-    if not rests or np.any(np.diff(times) <= 0):
-        raise ModelError(f"{choreography.name}: the {side} foot needs a resting step, and times that increase: {times}")
+    _check_times(choreography, f"steps of the {side} foot", times)
+    if not rests:
+        raise ModelError(f"{choreography.name}: no step of the {side} foot rests; let it rest at least once")
     values = np.array([[getattr(step, name) for name in _STEP_CHANNELS] for step in steps], dtype=float)
     values[:, 3:] = np.deg2rad(values[:, 3:])
     laps = np.zeros(len(t))
@@ -240,7 +252,6 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     segment = np.clip(np.searchsorted(times[rests], t, side="right") - 1, 0, max(len(rests) - 2, 0))
     if len(rests) == 1:
         return track + values[rests[0]]
-    at_rest = ([(1, np.zeros(7)), (2, np.zeros(7))],) * 2
     for k, (i, j) in enumerate(pairwise(rests)):
         when, what = times[i : j + 1], values[i : j + 1]
         if j == i + 1 and np.any(what[0, :2] != what[1, :2]):
@@ -248,7 +259,7 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
             via[[2, 4]] += _LIFT
             when, what = np.insert(when, 1, when.mean()), np.insert(what, 1, via, axis=0)
         here = segment == k
-        track[here] += make_interp_spline(when, what, k=5, bc_type=at_rest)(t[here])
+        track[here] += _from_rest_to_rest(when, what)(t[here])
     return track
 
 
