@@ -26,7 +26,12 @@ def relative(
     aw: float, ax: float, ay: float, az: float, bw: float, bx: float, by: float, bz: float
 ) -> tuple[float, float, float, float]:
     """Difference a⁻¹ ⊗ b of two unit quaternions: b as seen from a."""
-    return multiply(aw, -ax, -ay, -az, bw, bx, by, bz)
+    return (
+        aw * bw + ax * bx + ay * by + az * bz,
+        aw * bx - ax * bw - ay * bz + az * by,
+        aw * by + ax * bz - ay * bw - az * bx,
+        aw * bz - ax * by + ay * bx - az * bw,
+    )
 
 
 @njit

@@ -47,7 +47,7 @@ def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> N
     # Scaling by the largest component first keeps the norm of a huge force finite.
     largest = max(abs(wrench[0]), abs(wrench[1]), abs(wrench[2]), 1e-300)
     norm = largest * np.sqrt((wrench[0] / largest) ** 2 + (wrench[1] / largest) ** 2 + (wrench[2] / largest) ** 2)
-    scale = min(1.0, ceiling / norm)
+    scale = min(1.0, ceiling / max(norm, 1e-300))
     change = 0.0
     for i in range(3):
         force[i] = scale * wrench[i]

@@ -227,3 +227,14 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         below //= 2
         top = 1
     return best_t, best
+
+
+@njit
+def closest_phases(blob: Array, points: Array) -> tuple[Array, Array]:
+    """Phases t* [s] and distances [m], shape (n,), of points (n, 3) along a path, each search started from the last."""
+    phases, distances = np.empty(len(points)), np.empty(len(points))
+    guess = np.nan
+    for i in range(len(points)):
+        guess, distances[i] = closest_phase(blob, 0, points[i, 0], points[i, 1], points[i, 2], guess)
+        phases[i] = guess
+    return phases, distances

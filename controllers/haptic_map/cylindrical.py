@@ -100,7 +100,7 @@ def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: 
     """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
     for i in range(_CLIPS):
         q, d = value[i, column : column + 4], slope[i, column : column + 4]
-        scale = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        scale = 1.0 / np.sqrt(max(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1e-12))
         for j in range(4):
             unit[i, j] = scale * q[j]
         _, x, y, z = relative(unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3], d[0], d[1], d[2], d[3])

@@ -59,7 +59,7 @@ def _hermite(x: Array) -> Array:
 
 
 def _end_derivatives(s: Array, values: Array) -> Array:
-    """Value, slope and second derivative at s = 0, shape (3, c); the two from a cubic fit, or noise would decide them."""
+    """Value, slope and second derivative at s = 0, shape (3, c); the latter two by a cubic fit, for noise's sake."""
     n = min(len(s), max(6, len(s) // 12))
     fit = np.polynomial.polynomial.polyfit(s[:n], values[:n], min(3, n - 1))
     return np.stack([values[0], fit[1], 2.0 * fit[2] if len(fit) > 2 else np.zeros_like(fit[0])])

@@ -1,0 +1,186 @@
+"""FOLLOW, the bunny and their programs: closed forms, continuity, limits, what is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
+from controllers.fields.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
+from controllers.fields.program import Program, evaluate
+from controllers.fields.river import window
+from controllers.state import HandState
+
+CIRCLE = Trajectory.circle(0.05, 4.0)
+SPEED = 2.0 * np.pi * 0.05 / 4.0
+
+
+def _run(program, hand, memory):
+    wrench = np.empty(6)
+    evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+    return wrench
+
+
+def test_the_window_is_one_at_the_centre_and_leaves_with_value_slope_and_curvature_zero():
+    assert window(0.0) == 1.0
+    assert window(1.0) == window(4.0) == window(np.inf) == 0.0
+    h = 1e-4
+    value = [window(s * s) for s in (1 - h, 1.0, 1 + h)]
+    assert abs(value[0]) / h**2 < 10 * h  # so the second derivative tends to zero at the edge
+    assert value[1:] == [0.0, 0.0]
+
+
+def test_follow_on_a_circle_is_the_closed_form():
+    rng = np.random.default_rng(0)
+    follow = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=0.1)
+    for _ in range(50):
+        angle, radius, height = rng.uniform(0, 2 * np.pi), rng.uniform(0.02, 0.09), rng.uniform(-0.03, 0.03)
+        radial, along = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
+        v = rng.normal(size=3) * 0.1
+        p = radius * radial + [0, 0, height]
+        square = ((radius - 0.05) ** 2 + height**2) / 0.1**2
+        expected = max(0.0, 1 - square) ** 3 * (200.0 * (0.05 * radial - p) + 4.0 * (SPEED * along - v))
+        np.testing.assert_allclose(follow.wrench(HandState.at(p, v)).force, expected, atol=1e-4)
+
+
+def test_a_hand_that_moves_with_the_curve_feels_nothing():
+    follow = Follow(CIRCLE, k_r=200.0, b_d=4.0)
+    for t in np.linspace(0.0, 4.0, 17):
+        force = follow.wrench(HandState.at(CIRCLE.point(t), CIRCLE.velocity(t))).force
+        assert np.abs(force).max() < 1e-12
+
+
+def test_force_has_no_jump_along_lines_through_the_tube():
+    rng = np.random.default_rng(1)
+    # A tube inside the reach: there the closest point is unique, so the law must be continuous everywhere.
+    program = Follow(CIRCLE, k_r=200.0, b_d=4.0, epsilon=0.03).program()
+    for _ in range(20):
+        start = CIRCLE.point(rng.uniform(0, 4)) + rng.uniform(-0.04, 0.04, 3)
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        memory = program.fresh_memory()
+        forces = []
+        for s in np.linspace(0.0, 0.08, 200):
+            # Two evaluations 1e-12 m apart: a Lipschitz law differs by less than 1e-8, a jump stays.
+            pair = [_run(program, HandState.at(start + (s + d) * direction), memory)[:3] for d in (0.0, 1e-12)]
+            assert np.abs(pair[1] - pair[0]).max() < 1e-9
+            forces.append(pair[0])
+        # 0.4 mm apart a force of stiffness k and at most 12 N cannot leap.
+        assert np.abs(np.diff(forces, axis=0)).max() < 1.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3), st.floats(0, 1e6))
+def test_every_law_is_finite_everywhere(p, v, t):
+    for law in LAWS:
+        assert np.isfinite(law.wrench(HandState.at(p, v, t)).force).all()
+
+
+LAWS = [
+    Follow(CIRCLE, 200.0, 4.0),
+    *(Bunny(CIRCLE, 200.0, 4.0, 0.02, form, pace) for form in ("point", "along") for pace in ("clock", "wait")),
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+def test_on_the_medial_axis_and_at_rest_a_law_is_finite(law):
+    for p in ([0.0, 0.0, 0.0], [0.0, 0.0, 0.03], [0.05, 0.0, 0.0]):
+        assert np.isfinite(law.wrench(HandState.at(p)).force).all()
+
+
+def test_a_hand_that_is_not_finite_gives_a_force_that_is_not_finite_so_that_safety_sees_it():
+    program = LAWS[0].program()
+    memory = program.fresh_memory()
+    assert np.isnan(_run(program, HandState.at([np.nan, 0, 0]), memory)[:3]).all()
+    assert np.isfinite(_run(program, HandState.at([0.05, 0, 0]), memory)).all()
+
+
+def test_a_bunny_that_is_felt_everywhere_and_pulls_along_the_curve_is_follow():
+    rng = np.random.default_rng(2)
+    bunny = Bunny(CIRCLE, 200.0, 4.0, np.inf, "along", "clock")
+    follow = Follow(CIRCLE, 200.0, 4.0, epsilon=np.inf)
+    narrow = Bunny(CIRCLE, 200.0, 4.0, 1e4, "along", "clock")
+    for _ in range(20):
+        hand = HandState.at(rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.1, rng.uniform(0, 9))
+        np.testing.assert_array_equal(bunny.wrench(hand).force, follow.wrench(hand).force)
+        np.testing.assert_allclose(narrow.wrench(hand).force, follow.wrench(hand).force, rtol=1e-8, atol=1e-12)
+
+
+def test_the_pull_to_the_bunny_is_a_spring_and_damper_weighted_by_the_gaussian():
+    bunny = Bunny(CIRCLE, 200.0, 4.0, 0.02, "point", "clock")
+    p, v, t = np.array([0.03, 0.03, 0.01]), np.array([0.1, -0.2, 0.0]), 4.0 + 0.7
+    away = CIRCLE.point(t) - p
+    expected = np.exp(-(away @ away) / (2 * 0.02**2)) * (200.0 * away + 4.0 * (CIRCLE.velocity(t) - v))
+    np.testing.assert_allclose(bunny.wrench(HandState.at(p, v, t)).force, expected, rtol=1e-12)
+
+
+def _bunny_phases(pace, hands):
+    program = Bunny(CIRCLE, 200.0, 4.0, 0.02, "point", pace).program()
+    memory, phases = program.fresh_memory(), []
+    for k, p in enumerate(hands):
+        _run(program, HandState.at(p, t=k * 1e-3), memory)
+        phases.append(memory[TRACE_ATTRACTOR])
+    return np.array(phases)
+
+
+def test_a_bunny_by_the_clock_runs_on_and_one_that_waits_waits_for_a_held_hand():
+    held = [CIRCLE.point(0.5)] * 3000
+    clock, waits = _bunny_phases("clock", held), _bunny_phases("wait", held)
+    np.testing.assert_allclose(clock, np.arange(3000) * 1e-3, atol=1e-12)
+    assert waits[0] == pytest.approx(0.5, abs=1e-9)
+    # It slows down as it gets away: ṡ = exp(−s²V²/2δ²), so it takes ever longer for each further δ.
+    lead = (waits - 0.5) * SPEED / 0.02
+    assert (np.diff(waits) >= 0.0).all()
+    assert 1.5 < lead[-1] < 3.0
+    assert np.diff(waits)[-1] < 0.2e-3
+
+
+def test_a_bunny_that_waits_keeps_the_clocks_pace_for_a_hand_that_keeps_up():
+    moving = [CIRCLE.point(0.5 + k * 1e-3) for k in range(5000)]
+    phases = _bunny_phases("wait", moving)
+    assert np.linalg.norm(CIRCLE.point(phases) - moving, axis=1).max() < 1e-4
+
+
+def test_programs_add_and_python_may_fill_in_a_wrench():
+    inner, outer = Trajectory.circle(0.03, 2.0), Trajectory.circle(0.07, 3.0)
+    laws = [Follow(inner, 100.0, 1.0), Follow(outer, 50.0, 2.0), Bunny(outer, 30.0, 1.0, 0.05)]
+    hand = HandState.at([0.045, 0.01, 0.0], [0.0, 0.1, 0.0], 0.3)
+    program = laws[0].program() + (Program.external() + laws[1].program()) + laws[2].program()
+    memory = program.fresh_memory()
+    memory[program.external_slots[0] : program.external_slots[0] + 6] = [1, 2, 3, 4, 5, 6]
+    wrench = _run(program, hand, memory)
+    force = sum(law.wrench(hand).force for law in laws)
+    np.testing.assert_allclose(wrench, np.concatenate([force + np.array([1, 2, 3]), [4, 5, 6]]), rtol=1e-14)
+    # The trace tells of the nearest curve, here the inner one.
+    assert memory[TRACE_ROW] == 0
+    distance = np.hypot(0.045, 0.01) - 0.03
+    assert memory[TRACE_DISTANCE] == pytest.approx(distance, abs=1e-7)
+    np.testing.assert_allclose(memory[TRACE_POINT : TRACE_POINT + 3], inner.point(memory[TRACE_PHASE]), atol=1e-15)
+
+
+def test_memory_changes_the_cost_and_not_the_value():
+    program = Follow(CIRCLE, 200.0, 4.0).program()
+    memory = program.fresh_memory()
+    for t in np.linspace(0, 4, 50):
+        hand = HandState.at(CIRCLE.point(t) * 1.3, [0.1, 0, 0])
+        np.testing.assert_allclose(_run(program, hand, memory), _run(program, hand, program.fresh_memory()), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Follow(CIRCLE, -1.0, 1.0), "k_r must be finite and at least 0 N/m, got -1.0"),
+        (lambda: Follow(CIRCLE, 1.0, np.inf), "b_d"),
+        (lambda: Follow(CIRCLE, 1.0, 1.0, epsilon=0.0), "epsilon must be at least 0.0001 m, got 0.0"),
+        (lambda: Bunny(CIRCLE, 1.0, np.nan, 0.1), "b_d"),
+        (lambda: Bunny(CIRCLE, 1.0, 1.0, 0.0), "delta"),
+        (lambda: Bunny(CIRCLE, 1.0, 1.0, 0.1, "sideways"), "one of point, along, got 'sideways'"),
+        (lambda: Program(np.zeros((0, 4), np.int64), np.zeros(0), np.zeros(8)), "one wrench"),
+    ],
+)
+def test_bad_gains_are_refused_with_the_numbers(make, says):
+    with pytest.raises(ParameterError, match=says):
+        make()
