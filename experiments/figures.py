@@ -47,6 +47,11 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
     -------
     list of Path
         The files, in the order in which a reader wants them.
+
+    Raises
+    ------
+    RecordingError
+        If the recording lacks what is drawn.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
@@ -67,8 +72,8 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand against curve and tube, seen along z and along y of the hand frame [mm]."""
-    curve, path = 1e3 * recording.arrays["curve"], 1e3 * _rows(recording, "ticks", "p")
-    radius = 1e3 * float(recording.arrays["tube_radius"])
+    curve, path = 1e3 * recording.array("curve"), 1e3 * _rows(recording, "ticks", "p")
+    radius = 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
@@ -89,7 +94,7 @@ def path_figure(recording: Recording) -> Figure:
 def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve, pushes shaded, and again at a scale for a hand left alone [mm]."""
     t = _rows(recording, "ticks", "t")
-    distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.arrays["tube_radius"])
+    distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
@@ -126,8 +131,8 @@ def forces_figure(recording: Recording) -> Figure:
 def torques_figure(recording: Recording) -> Figure:
     """Torques of the three motors against what they can give for long and for a moment [mN m]."""
     t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
-    continuous = 1e3 * recording.arrays["motor_continuous"]
-    peak = 1e3 * recording.arrays["motor_peak"]
+    continuous = 1e3 * recording.array("motor_continuous")
+    peak = 1e3 * recording.array("motor_peak")
     figure, axes = _panels(3, 1, height=4.8)
     for i, ax in enumerate(axes):
         ax.plot(t, torque[:, i], color=AXES[i])
@@ -144,7 +149,7 @@ def torques_figure(recording: Recording) -> Figure:
 def tracking_figure(recording: Recording) -> Figure:
     """How well the physical figure follows the animation, and what that takes; flights shaded."""
     t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
-    weight = float(recording.arrays["body_weight"])
+    weight = float(recording.array("body_weight"))
     residual = 100 * np.linalg.norm(_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
     ground = 100 * _rows(recording, "frames", "ground")[:, 2] / weight
     curves = (
@@ -166,7 +171,7 @@ def tracking_figure(recording: Recording) -> Figure:
 
 
 def _rows(recording: Recording, group: str, name: str) -> Array:
-    channel = recording.groups[group][name]
+    channel = recording.channel(group, name)
     return channel[:: max(1, -(-len(channel) // POINTS))]
 
 

@@ -67,11 +67,16 @@ def write_report(
         What happened, a sentence each.
     figures : sequence of Path
         PNG files, which are put into the page.
+
+    Raises
+    ------
+    RecordingError
+        If the recording lacks what is drawn.
     """
-    t = recording.groups["ticks"]["t"]
+    t = recording.channel("ticks", "t")
     seconds = float(t[-1] - t[0])
     replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
-    radius, drawn = float(recording.arrays["tube_radius"]), drawn_tube(recording)
+    radius, drawn = float(recording.array("tube_radius")), drawn_tube(recording)
     tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
     images = [
         f'<img alt="{figure.stem}" src="data:image/png;base64,{base64.b64encode(figure.read_bytes()).decode()}">'

@@ -306,6 +306,7 @@ class Recording:
     """
 
     def __init__(self, path: Path):
+        self._path = path
         try:
             self._file = h5py.File(path, "r", libver="latest", swmr=True)
         except OSError as error:
@@ -342,6 +343,35 @@ class Recording:
                 self.groups[name] = {
                     key: Channel(_dataset(node, key), rows) for key in _names(node) if key not in _RESERVED
                 }
+
+    def channel(self, group: str, name: str) -> Channel:
+        """A channel that has rows.
+
+        Raises
+        ------
+        RecordingError
+            If there is no such channel, or it has no rows.
+        """
+        channels = self.groups.get(group, {})
+        if name not in channels:
+            raise RecordingError(f"{self._path}: no channel {group}/{name}; {group} has {sorted(channels)}")
+        if len(channels[name]) == 0:
+            raise RecordingError(
+                f"{self._path}: {group}/{name} has no rows; the run ended before the first was written"
+            )
+        return channels[name]
+
+    def array(self, name: str) -> Array:
+        """An array that does not change during the run.
+
+        Raises
+        ------
+        RecordingError
+            If there is none of that name.
+        """
+        if name not in self.arrays:
+            raise RecordingError(f"{self._path}: no array {name}; there are {sorted(self.arrays)}")
+        return self.arrays[name]
 
     @property
     def complete(self) -> bool:

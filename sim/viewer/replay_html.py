@@ -21,7 +21,7 @@ from sim.viewer.shapes import Shape, body_shapes, tube
 Array = npt.NDArray[np.float64]
 
 FPS = 30.0
-SECONDS = 120.0  # of a longer run, the beginning is shown
+SECONDS = 60.0  # of a longer run, the beginning is shown
 MAGNIFICATION = 4.0
 PHANTOM_AT = np.array([1.35, -0.55, 1.0])  # where the origin of the hand frame is drawn [m]
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
@@ -49,6 +49,11 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     -------
     str
         A self-contained HTML document.
+
+    Raises
+    ------
+    RecordingError
+        If any of that is missing, or the run ended before anything was recorded.
     """
     quiet = io.StringIO()  # viser announces its address and its end, which mean nothing here
     with contextlib.redirect_stdout(quiet):
@@ -63,8 +68,8 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
 
 def drawn_tube(recording: Recording) -> float:
     """Radius with which the tube is drawn [m]: ε, or less where that would hide the curve and the hand."""
-    extent = float(np.max(np.ptp(recording.arrays["curve"], axis=0)))
-    return min(float(recording.arrays["tube_radius"]), TUBE_SHARE * extent)
+    extent = float(np.max(np.ptp(recording.array("curve"), axis=0)))
+    return min(float(recording.array("tube_radius")), TUBE_SHARE * extent)
 
 
 class _Actor:
@@ -99,11 +104,12 @@ class _Stage:
 
     def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel):
         self._scene = scene
-        self._ticks, self._frames = recording.groups["ticks"], recording.groups["frames"]
+        self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
+        self._frames = {name: recording.channel("frames", name) for name in ("t", "qpos", "reference")}
         self._data = mujoco.MjData(model)
         self._model = model
         self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
-        self._p_WH = recording.arrays["p_WH"]
+        self._p_WH = recording.array("p_WH")
         figure = body_shapes(model, "figure/")
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
@@ -115,7 +121,7 @@ class _Stage:
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
-        self._draw_curve(recording.arrays["curve"], drawn_tube(recording))
+        self._draw_curve(recording.array("curve"), drawn_tube(recording))
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )

@@ -200,6 +200,22 @@ def test_a_group_without_rate_or_channels_is_refused(rate, channels):
         Group(rate, channels)
 
 
+def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
+    with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {"curve": [1.0]}) as recorder:
+        recorder.append("ticks", block(0, 5))
+    with Recording(tmp_path / "run.h5") as recording:
+        assert len(recording.channel("ticks", "p")) == 5
+        assert recording.array("curve") == [1.0]
+        with pytest.raises(RecordingError, match=r"no channel ticks/q; ticks has \['applied', 'p', 't'\]"):
+            recording.channel("ticks", "q")
+        with pytest.raises(RecordingError, match=r"no channel pings/q; pings has \[\]"):
+            recording.channel("pings", "q")
+        with pytest.raises(RecordingError, match=r"frames/t has no rows"):
+            recording.channel("frames", "t")
+        with pytest.raises(RecordingError, match=r"no array tube; there are \['curve'\]"):
+            recording.array("tube")
+
+
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path):
     (tmp_path / "text.h5").write_text("no HDF5")
     with h5py.File(tmp_path / "other.h5", "w", libver="latest") as file:
