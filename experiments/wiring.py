@@ -1,0 +1,232 @@
+"""Where concrete parts are put together: from a configuration to a servo that runs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.safety import ForceLimiter
+from models.errors import ModelError
+from models.mocap.clip import Clip
+from models.mocap.library import embedded, embedded_names, load
+from models.phantom.parameters import PREMIUM_1_5
+from models.scene import FIGURE, P_WH, SceneConfig
+from sim.devices.phantom_port import phantom_port
+from sim.figure import Figure
+from sim.plant import make_hand, make_plant
+from sim.reference import make_reference, poses_along
+from sim.servo import Field, Servo
+from sim.users.arm import Arm
+from sim.users.intent import Push
+from sim.world import World, phantom_angles
+
+Array = npt.NDArray[np.float64]
+
+FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """A run: with the seed, all that decides what happens.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
+        or files (BVH, AMC, DeepMimic). Fewer than four are repeated.
+    mode : {"follow", "bunny"}
+        Field of force.
+    map : {"cylindrical"}
+        Haptic map.
+    user : {"relaxed", "trace", "push"}
+        A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
+    seconds : float
+        Simulated time [s].
+    seed : int
+        Of where exactly the hand lets go of the stylus at the start.
+    stiffness : float
+        k_r of the field [N/m].
+    damping : float
+        b_d of the field [N s/m].
+    tube : float
+        Radius ε in which the field is felt [m].
+    bunny_width : float
+        δ of the bunny [m].
+    lap : float
+        Time of a lap of the curve [s].
+    radius : float
+        Of the default curve, a circle about the vertical [m].
+    reach : float
+        Half width of the map's domain about the default curve, in radius and in height [m].
+    cutoff : float
+        Corner frequency of the velocity filter [Hz].
+    smoothing : float
+        Bandwidth of the filter between stylus and figure [Hz].
+    figure_ticks : int
+        Servo ticks between two updates of the figure.
+    scene : SceneConfig
+        Figure's size, servo period and physics step.
+    pushes : tuple of Push
+        What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on.
+    """
+
+    clips: tuple[str, ...] = FIGURE_CLIPS
+    mode: Literal["follow", "bunny"] = "follow"
+    map: Literal["cylindrical"] = "cylindrical"
+    user: Literal["relaxed", "trace", "push"] = "relaxed"
+    seconds: float = 20.0
+    seed: int = 1
+    stiffness: float = 300.0
+    damping: float = 4.0
+    tube: float = 0.25
+    bunny_width: float = 0.02
+    lap: float = 4.0
+    radius: float = 0.0477
+    reach: float = 0.025
+    cutoff: float = 150.0
+    smoothing: float = 6.0
+    figure_ticks: int = 4
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    pushes: tuple[Push, ...] = ()
+
+
+@dataclass(frozen=True)
+class Session:
+    """A run that is wired up and has not begun: the servo, and what it was made of."""
+
+    config: RunConfig
+    clips: tuple[Clip, ...]
+    remarks: tuple[str, ...]
+    curve: Trajectory
+    haptic_map: Cylindrical
+    world: World
+    figure: Figure
+    servo: Servo
+
+    def static(self) -> dict[str, npt.ArrayLike | str]:
+        """What the recording keeps beside the channels."""
+        phases = np.linspace(self.curve.start, self.curve.end, 241)
+        return {
+            "curve": self.curve.point(phases),
+            "curve_span": np.array([self.curve.start, self.curve.end]),
+            "curve_closed": float(self.curve.periodic),
+            "tube_radius": self.config.reach,
+            "p_WH": P_WH,
+            "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
+            "motor_peak": np.array(PREMIUM_1_5.peak_torque),
+            "body_weight": self.figure.state.weight,
+            "clip_names": "\n".join(clip.name for clip in self.clips),
+            **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
+            "clip_fps": np.array([clip.fps for clip in self.clips]),
+        }
+
+
+def load_clips(names: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+    """Clips by name or file, and what has to be said about them.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or a file cannot be read.
+    """
+    clips: list[Clip] = []
+    remarks: list[str] = []
+    for name in names:
+        if name in embedded_names():
+            clips.append(embedded(name))
+        elif not Path(name).suffix:
+            raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}, or give a file")
+        else:
+            loaded = load(Path(name))
+            clips.append(loaded.clip)
+            remarks += [] if loaded.report is None else loaded.report.lines()
+    return tuple(clips), tuple(remarks)
+
+
+def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = ()) -> Session:
+    """Put a run together.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
+    """
+    if not 1 <= len(clips) <= 4:
+        raise ParameterError(f"the cylindrical map blends 1 to 4 clips, got {len(clips)}")
+    if not (np.isfinite(config.seconds) and config.seconds > 0.0):
+        raise ParameterError(f"a run of {config.seconds} s; expected a positive, finite time")
+    for name in ("lap", "radius", "reach"):
+        value = getattr(config, name)
+        if not (np.isfinite(value) and value > 0.0):
+            raise ParameterError(f"{name} is {value}; expected a positive, finite number")
+    world = World(config.scene)
+    curve = Trajectory.circle(config.radius, config.lap)
+    for phase in np.linspace(curve.start, curve.end, 64):
+        phantom_angles(curve.point(phase))
+    corners = [clips[i % len(clips)] for i in range(4)]
+    haptic_map = Cylindrical(
+        [(clip.poses, clip.fps) for clip in corners],
+        (config.radius - config.reach, config.radius + config.reach),
+        (-config.reach, config.reach),
+    )
+    compiled = haptic_map.compiled()
+    period = config.scene.servo_period
+    reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing)
+    start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
+    poses = np.empty((1, haptic_map.nq))
+    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
+    world.reset(start, poses[0])
+    figure = Figure(world.model, world.data, world.figure, FIGURE)
+    program = _law(config, curve).program()
+    limiter = ForceLimiter(period)
+    servo = Servo(
+        plant=make_plant(world),
+        port=phantom_port(world.model, world.data, period, config.cutoff),
+        field=Field(
+            ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
+            limiter=limiter.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
+        ),
+        hand=make_hand(_user(config, curve)),
+        reference=reference,
+        figure=figure.state,
+        figure_ticks=config.figure_ticks,
+    )  # fmt: skip
+    return Session(config, clips, remarks, curve, haptic_map, world, figure, servo)
+
+
+def stylus_path(points: Array) -> Array:
+    """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
+    return np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))))
+
+
+def _law(config: RunConfig, curve: Trajectory) -> Follow | Bunny:
+    if config.mode == "follow":
+        return Follow(curve, config.stiffness, config.damping, config.tube)
+    return Bunny(curve, config.stiffness, config.damping, config.bunny_width)
+
+
+def _user(config: RunConfig, curve: Trajectory) -> Arm:
+    pushes = config.pushes
+    if config.user == "push" and not pushes:
+        laps = range(1, max(2, int(config.seconds / config.lap)))
+        pushes = tuple(push for lap in laps for push in lap_pushes(lap * config.lap, config.lap))
+    if config.user == "trace":
+        times = np.arange(0.0, config.seconds, 0.01)
+        return Arm(path=curve.point(times % config.lap), period=0.01, pushes=pushes)
+    return Arm(pushes=pushes)
+
+
+def lap_pushes(start: float, lap: float) -> tuple[Push, Push]:
+    """A push outwards and one inwards in the lap that begins at a time [s]."""
+    return (
+        Push(start + 0.125 * lap, 0.2 * lap, 5.0),
+        Push(start + 0.625 * lap, 0.2 * lap, -5.0),
+    )

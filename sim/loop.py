@@ -1,0 +1,172 @@
+"""A run: the servo's compiled blocks one after the other, streamed to a recorder, in memory that does not grow."""
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
+from models.humanoid.skeleton import N_POSE
+from models.mocap.clip import pose_difference
+from models.scene import FIGURE
+from sim.recorder import Group, Recorder
+from sim.servo import FrameLog, Servo, TickLog, run_block
+from sim.world import World
+
+Array = npt.NDArray[np.float64]
+
+BLOCK_SECONDS = 0.2  # of simulated time between two looks at the clock and the recorder
+
+
+class RunTimes(NamedTuple):
+    """How fast a run was.
+
+    Attributes
+    ----------
+    simulated, wall : float
+        Seconds of simulated time, and what they took.
+    """
+
+    simulated: float
+    wall: float
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over the time it took."""
+        return self.simulated / self.wall if self.wall > 0.0 else float("inf")
+
+
+def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
+    """Empty logs for a block of ticks."""
+    plant = servo.plant
+    frames = -(-ticks // servo.figure_ticks)
+    return (
+        TickLog(
+            hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
+            user=np.zeros((ticks, 3)), torque=np.zeros((ticks, 3)), trace=np.zeros((ticks, TRACE_SIZE)),
+            ctrl=np.zeros((ticks, len(plant.ctrl))), applied=np.zeros((ticks, plant.substeps, 3)),
+            residual=np.zeros((ticks, 6)),
+        ),
+        FrameLog(
+            t=np.zeros(frames), qpos=np.zeros((frames, len(plant.qpos))), reference=np.zeros((frames, N_POSE)),
+            report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
+        ),
+    )  # fmt: skip
+
+
+def groups(servo: Servo) -> dict[str, Group]:
+    """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's."""
+    plant = servo.plant
+    ticks = Group(
+        1.0 / plant.period,
+        {
+            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "field": (6,), "force": (3,), "user": (3,),
+            "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "ctrl": (len(plant.ctrl),),
+            "applied": (plant.substeps, 3), "residual": (6,),
+        },
+    )  # fmt: skip
+    frames = Group(
+        1.0 / (plant.period * servo.figure_ticks),
+        {
+            "t": (), "qpos": (len(plant.qpos),), "reference": (N_POSE,), "joint_error": (), "root_error": (),
+            "residual": (6,), "ground": (3,), "flight": (), "saturated": (),
+        },
+    )  # fmt: skip
+    return {"ticks": ticks, "frames": frames}
+
+
+class Loop:
+    """A servo and its world, run block by block.
+
+    Parameters
+    ----------
+    servo : Servo
+        See `sim.servo`.
+    world : World
+        Whose addresses the servo holds; kept alive here.
+    recorder : Recorder, optional
+        Made with `groups`.
+    """
+
+    def __init__(self, servo: Servo, world: World, recorder: Recorder | None = None):
+        self.servo, self.world, self.recorder = servo, world, recorder
+        self._block = servo.figure_ticks * max(1, round(BLOCK_SECONDS / servo.plant.period / servo.figure_ticks))
+        self._root = int(world.model.joint(FIGURE + "root").qposadr[0])
+        self._tick = 0
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        return self._tick * self.servo.plant.period
+
+    def run(self, seconds: float, progress: Callable[[float], None] = lambda _: None) -> RunTimes:
+        """Run on for some time.
+
+        Parameters
+        ----------
+        seconds : float
+            Rounded to whole figure updates.
+        progress : callable
+            Called with the simulated time after every block.
+        """
+        plant = self.servo.plant
+        every = self.servo.figure_ticks
+        wanted = every * round(seconds / (plant.period * every))
+        ticks, frames = make_logs(self.servo, self._block)
+        first, begin = self._tick, time.perf_counter()
+        while self._tick < first + wanted:
+            n = min(self._block, first + wanted - self._tick)
+            run_block(self.servo, self._tick, n, False, ticks, frames)
+            self._tick += n
+            if self.recorder is not None:
+                self._record(self.recorder, ticks, frames, n)
+            progress(self.time)
+        return RunTimes(wanted * plant.period, time.perf_counter() - begin)
+
+    def _record(self, recorder: Recorder, ticks: TickLog, frames: FrameLog, n: int) -> None:
+        m = -(-n // self.servo.figure_ticks)
+        hand = ticks.hand[:n]
+        recorder.append(
+            "ticks",
+            {
+                "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
+                "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
+                "phase": ticks.trace[:n, TRACE_PHASE],
+                "nearest": ticks.trace[:n, TRACE_POINT : TRACE_POINT + 3], "distance": ticks.trace[:n, TRACE_DISTANCE],
+                "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
+            },
+        )  # fmt: skip
+        poses, reference, report = (
+            frames.qpos[:m, self._root : self._root + N_POSE],
+            frames.reference[:m],
+            frames.report[:m],
+        )
+        joint_error, root_error = pose_errors(poses, reference)
+        recorder.append(
+            "frames",
+            {
+                "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joint_error": joint_error,
+                "root_error": root_error, "residual": report[:, 2:], "ground": frames.ground[:m],
+                "flight": (report[:, 0] == 0.0).astype(np.float64), "saturated": report[:, 1],
+            },
+        )  # fmt: skip
+
+
+def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
+    """How far poses are from others: RMS over the joints of the angle between rotations [rad], and root distance [m].
+
+    Parameters
+    ----------
+    poses, reference : Array
+        Shape (n, 75) each.
+
+    Returns
+    -------
+    joints, root : Array
+        Shape (n,) each.
+    """
+    difference = pose_difference(poses, reference)
+    turns = difference[:, 6:].reshape(len(poses), -1, 3)
+    return np.sqrt(np.mean(np.sum(turns**2, axis=2), axis=1)), np.linalg.norm(difference[:, :3], axis=1)

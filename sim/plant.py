@@ -1,0 +1,98 @@
+"""The world as compiled code steps it: MuJoCo's memory and the hand on the stylus, one servo period at a time."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from models.scene import FIGURE, PHANTOM
+from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, push_stylus, true_motion
+from sim.native import mj_step
+from sim.users.arm import Arm, CompiledArm, hand_force
+from sim.world import World
+
+Array = npt.NDArray[np.float64]
+
+
+class Plant(NamedTuple):
+    """The world and its rates.
+
+    Attributes
+    ----------
+    model, data : int
+        Addresses of MjModel and MjData.
+    qpos, ctrl, applied : Array
+        Views of MuJoCo's own memory: state, motor commands, external generalised forces.
+    ground : Array
+        View of the constraint force on the root's linear degrees of freedom: the ground's whole push [N], shape (3,).
+    arm_v : tuple of three ints
+        Degrees of freedom of θ1, θ2, θ3.
+    substeps : int
+        Physics steps a servo period.
+    period : float
+        Servo period T [s].
+    """
+
+    model: int
+    data: int
+    qpos: Array
+    ctrl: Array
+    applied: Array
+    ground: Array
+    arm_v: tuple[int, int, int]
+    substeps: int
+    period: float
+
+
+class Hand(NamedTuple):
+    """The simulated user, what the hand feels (true position and velocity) and its force and torques; all in H."""
+
+    arm: CompiledArm
+    p: Array
+    v: Array
+    force: Array
+    torque: Array
+
+
+def make_plant(world: World) -> Plant:
+    """Wire up a world; it must outlive the plant, which holds its addresses."""
+    model, data = world.model, world.data
+    root = int(model.joint(FIGURE + "root").dofadr[0])
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    return Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=data.qfrc_constraint[root : root + 3], arm_v=(a, b, c), substeps=world.config.substeps(),
+        period=world.config.servo_period,
+    )  # fmt: skip
+
+
+def make_hand(arm: Arm) -> Hand:
+    """A simulated user before its first tick."""
+    return Hand(arm.compiled(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
+
+
+@njit
+def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
+    """Step the physics from time t for one servo period.
+
+    Parameters
+    ----------
+    plant, port, hand
+        Updated.
+    t : float
+        [s]
+    replay : bool
+        Take the hand's torques from `applied` instead of asking the hand.
+    applied : Array
+        The hand's torques about θ1, θ2, θ3 at each physics step [N m], written or read, shape (substeps, 3).
+    """
+    for i in range(plant.substeps):
+        if not replay:
+            true_motion(port, hand.p, hand.v)
+            hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)
+            push_stylus(port, hand.force, hand.torque)
+            applied[i] = hand.torque
+        for j in range(3):
+            plant.applied[plant.arm_v[j]] = applied[i, j]
+        mj_step(plant.model, plant.data)

@@ -1,0 +1,164 @@
+"""From the stylus to what the figure should do: pose, velocity and acceleration of h along the hand's motion."""
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.evaluate import evaluate_map
+from sim.compiled import entry_point
+from sim.errors import SimError
+from sim.native import mj_differentiate_pos
+
+Array = npt.NDArray[np.float64]
+
+
+class CompiledReference(NamedTuple):
+    """State and scratch of the reference, as the servo loop holds it.
+
+    Attributes
+    ----------
+    figure_model : int
+        Address of the model of the figure alone, whose tangent space the reference lives in.
+    smoothing : float
+        θ = exp(−ω T) of the tracking filter, for the period T at which it runs.
+    period : float
+        T [s].
+    kind, params, memory
+        The haptic map and its state (the lap).
+    hand : Array
+        Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
+    started : Array
+        0 until the hand has been seen, shape (1,).
+    pose, velocity, acceleration : Array
+        What the figure should do, shapes (75,), (57,), (57,).
+    """
+
+    figure_model: int
+    smoothing: float
+    period: float
+    kind: int
+    params: Array
+    memory: Array
+    hand: Array
+    started: Array
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    scratch_memory: Array
+    scratch_x: Array
+    before: Array
+    after: Array
+    to_before: Array
+    to_after: Array
+
+
+@njit
+def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -> None:
+    r"""Critically damped tracking filter of second degree (fading memory; Morrison 1969).
+
+    Predict with constant acceleration, then correct position, velocity and acceleration by the residual r with
+    1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and (1 − θ)³/T². A hand at constant acceleration is followed without lag.
+    """
+    g = 1.0 - smoothing**3
+    h = 1.5 * (1.0 - smoothing) ** 2 * (1.0 + smoothing) / period
+    k = (1.0 - smoothing) ** 3 / period**2
+    for i in range(3):
+        predicted = hand[0, i] + period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+        speed = hand[1, i] + period * hand[2, i]
+        residual = measured[i] - predicted
+        hand[0, i] = predicted + g * residual
+        hand[1, i] = speed + h * residual
+        hand[2, i] += k * residual
+
+
+@njit
+def update_reference(reference: CompiledReference, stylus: Array) -> None:
+    r"""Advance the reference by one period.
+
+    With x(s) = p + s ṗ + ½ s² p̈ the smoothed motion of the hand, the velocity and acceleration of h∘x are central
+    differences on the figure's configuration manifold over ±T:
+    v = ½ ((q₊ ⊖ q) − (q₋ ⊖ q)) / T and a = ((q₊ ⊖ q) + (q₋ ⊖ q)) / T².
+
+    Parameters
+    ----------
+    reference : CompiledReference
+        Updated: hand, memory, pose (75), velocity (57), acceleration (57).
+    stylus : Array
+        Measured position in H and orientation wxyz, shape (7,).
+    """
+    hand, period, x = reference.hand, reference.period, reference.scratch_x
+    if reference.started[0] == 0.0:
+        reference.started[0] = 1.0
+        hand[0, :] = stylus[:3]
+    else:
+        smooth_hand(hand, stylus[:3], reference.smoothing, period)
+    x[3:] = stylus[3:]
+    x[:3] = hand[0]
+    evaluate_map(reference.kind, reference.params, x, reference.memory, reference.pose)
+    for sign, pose, difference in (
+        (-1.0, reference.before, reference.to_before),
+        (1.0, reference.after, reference.to_after),
+    ):
+        for i in range(3):
+            x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+        reference.scratch_memory[:] = reference.memory
+        evaluate_map(reference.kind, reference.params, x, reference.scratch_memory, pose)
+        mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
+    for i in range(reference.velocity.shape[0]):
+        reference.velocity[i] = 0.5 * (reference.to_after[i] - reference.to_before[i]) / period
+        reference.acceleration[i] = (reference.to_after[i] + reference.to_before[i]) / period**2
+
+
+@entry_point
+def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: Array) -> None:
+    """Evaluate a map along a path of the stylus.
+
+    Parameters
+    ----------
+    kind, params, memory
+        The map; its memory is updated.
+    points : Array
+        Positions in H and orientations wxyz, shape (n, 7).
+    poses : Array
+        Set, shape (n, 75).
+    """
+    for i in range(points.shape[0]):
+        evaluate_map(kind, params, points[i], memory, poses[i])
+
+
+def make_reference(
+    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float
+) -> CompiledReference:
+    """The reference of a run, before its first update.
+
+    Parameters
+    ----------
+    figure_model
+        The figure alone; must outlive the reference.
+    compiled : CompiledMap
+        The haptic map.
+    period : float
+        T, between two updates [s].
+    bandwidth : float
+        Of the tracking filter, ω/2π [Hz].
+
+    Raises
+    ------
+    SimError
+        If the bandwidth is not positive, or too high for the period.
+    """
+    if not 0.0 < bandwidth < 0.5 / period:
+        raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
+    kind, params, memory = compiled
+    nq, nv = figure_model.nq, figure_model.nv
+    return CompiledReference(
+        figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
+        kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), started=np.zeros(1), pose=np.zeros(nq),
+        velocity=np.zeros(nv), acceleration=np.zeros(nv), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
+        before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+    )  # fmt: skip

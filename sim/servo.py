@@ -1,0 +1,174 @@
+"""The servo: one compiled loop over device, law of force, limiter, hand, haptic map, figure and physics.
+
+Each tick of period T:
+
+1. `sense`: encoders → hand vector in H.
+2. `evaluate`: the field's program → wrench, and where on the curve the hand is.
+3. `limit_force`: what the device may be asked for.
+4. `actuate`: τ = Jᵀ F + N → the Phantom's motors.
+5. Every `figure_ticks` ticks: `update_reference` (h and its derivatives along the hand's motion), `figure_torque`.
+6. For each physics step: the hand's force → external torques on the linkage; `mj_step`.
+
+The loop holds no Python object and not the GIL. The same loop replays recorded controls: steps 1–5 and the hand are
+then replaced by what they gave, so a run is repeated bit for bit.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.program import evaluate
+from controllers.safety import limit_force
+from sim.compiled import entry_point
+from sim.devices.phantom_port import PhantomPort, actuate, sense
+from sim.figure import FigureState, figure_torque
+from sim.plant import Hand, Plant, advance
+from sim.reference import CompiledReference, update_reference
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+class Field(NamedTuple):
+    """A compiled field and its limiter: programs, parameters, memory, and the last wrench."""
+
+    ops: IntArray
+    params: Array
+    memory: Array
+    limits: Array
+    limiter: Array
+    wrench: Array
+    force: Array
+
+
+class Servo(NamedTuple):
+    """All that the loop works on; the figure is updated every `figure_ticks` ticks."""
+
+    plant: Plant
+    port: PhantomPort
+    field: Field
+    hand: Hand
+    reference: CompiledReference
+    figure: FigureState
+    figure_ticks: int
+
+
+class TickLog(NamedTuple):
+    """What a block of ticks leaves behind: one row a tick. A replay reads `ctrl`, `applied` and `residual` instead.
+
+    Attributes
+    ----------
+    hand : Array
+        The hand vector as measured, shape (n, 15).
+    field, force, user : Array
+        Wrench of the field (6), force after the limiter (3), force of the hand at the end of the tick (3), in H.
+    torque : Array
+        Torques at the Phantom's joints [N m], shape (n, 3).
+    trace : Array
+        Phase, closest point, distance (see `controllers.fields.instructions`), shape (n, 8).
+    ctrl : Array
+        All motor commands, shape (n, nu).
+    applied : Array
+        The hand's torques about θ1, θ2, θ3 at each physics step, shape (n, substeps, 3).
+    residual : Array
+        Residual wrench at the figure's root, shape (n, 6).
+    """
+
+    hand: Array
+    field: Array
+    force: Array
+    user: Array
+    torque: Array
+    trace: Array
+    ctrl: Array
+    applied: Array
+    residual: Array
+
+
+class FrameLog(NamedTuple):
+    """What a block of figure updates leaves behind: one row each.
+
+    Attributes
+    ----------
+    t : Array
+        Time [s], shape (m,).
+    qpos : Array
+        Configuration of the world, shape (m, nq).
+    reference : Array
+        The animation's pose, shape (m, 75).
+    report : Array
+        What the figure's control tells (see `sim.figure`), shape (m, 8).
+    ground : Array
+        Force of the ground on the figure [N], in the world, shape (m, 3).
+    """
+
+    t: Array
+    qpos: Array
+    reference: Array
+    report: Array
+    ground: Array
+
+
+@njit
+def field_force(servo: Servo) -> None:
+    """Evaluate and limit the field at the measured hand, and command the motors."""
+    field, hand = servo.field, servo.port.hand
+    evaluate(field.ops, field.params, field.memory, hand, field.wrench)
+    limit_force(field.limits, field.limiter, field.wrench, field.force)
+    actuate(servo.port, field.force)
+
+
+@njit
+def move_figure(servo: Servo) -> None:
+    """Update the animation at the measured stylus, and the torques that follow it."""
+    reference = servo.reference
+    update_reference(reference, servo.port.hand[1:8])
+    figure_torque(servo.figure, reference.pose, reference.velocity, reference.acceleration)
+
+
+@entry_point
+def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """Run n ticks from tick number `first`, or replay them.
+
+    Parameters
+    ----------
+    servo : Servo
+        Everything in it is updated.
+    first, n : int
+        Number of the first tick, a multiple of the figure's ticks, and how many to run.
+    replay : bool
+        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
+    ticks, frames : TickLog, FrameLog
+        Written (or read, see `replay`) row by row.
+    """
+    plant, port, every = servo.plant, servo.port, servo.figure_ticks
+    for k in range(n):
+        t = (first + k) * plant.period
+        update_figure = (first + k) % every == 0
+        if replay:
+            plant.ctrl[:] = ticks.ctrl[k]
+            servo.figure.applied[:] = ticks.residual[k]
+        else:
+            sense(port, t, 0.0)
+            field_force(servo)
+            if update_figure:
+                move_figure(servo)
+            ticks.hand[k] = port.hand
+            ticks.field[k] = servo.field.wrench
+            ticks.force[k] = servo.field.force
+            ticks.torque[k] = port.torque
+            ticks.trace[k] = servo.field.memory[:TRACE_SIZE]
+            ticks.ctrl[k] = plant.ctrl
+            ticks.residual[k] = servo.figure.applied
+        if update_figure:
+            row = k // every
+            frames.t[row] = t
+            frames.qpos[row] = plant.qpos
+            frames.reference[row] = servo.reference.pose
+            frames.report[row] = servo.figure.report
+            frames.ground[row] = plant.ground
+        advance(plant, port, servo.hand, t, replay, ticks.applied[k])
+        ticks.user[k] = servo.hand.force

@@ -1,0 +1,146 @@
+"""The simulated hand: an arm's impedance on the stylus. It feels position and velocity, never the field."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sim.errors import SimError
+from sim.users.intent import Push, push_table
+
+Array = npt.NDArray[np.float64]
+
+
+@njit
+def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) -> None:
+    """Add the pushes active at time t to a force.
+
+    Parameters
+    ----------
+    pushes : Array
+        Rows of `sim.users.intent.push_table`, shape (n, 11).
+    begun : Array
+        When each push began [s], NaN before it has; shape (n,), updated.
+    t : float
+        Time [s].
+    p : Array
+        Hand position in H [m], shape (3,).
+    force : Array
+        Added to [N], in H, shape (3,).
+    """
+    for i in range(pushes.shape[0]):
+        start, duration, peak = pushes[i, 0], pushes[i, 1], pushes[i, 2]
+        if math.isnan(begun[i]):
+            radius = pushes[i, 10]
+            away = math.sqrt((p[0] - pushes[i, 7]) ** 2 + (p[1] - pushes[i, 8]) ** 2 + (p[2] - pushes[i, 9]) ** 2)
+            if t < start or (radius > 0.0 and away > radius):
+                continue
+            begun[i] = t if radius > 0.0 else start
+        phase = (t - begun[i]) / duration
+        if phase > 1.0:
+            continue
+        bump = peak * math.sin(math.pi * phase) ** 2
+        if pushes[i, 6] == 0.0:
+            for k in range(3):
+                force[k] += bump * pushes[i, 3 + k]
+        else:
+            reach = math.sqrt(p[0] ** 2 + p[1] ** 2)
+            if reach > 1e-9:
+                force[0] += bump * p[0] / reach
+                force[1] += bump * p[1] / reach
+
+
+@njit
+def arm_force(
+    stiffness: float, damping: float, samples: Array, period: float, t: float, p: Array, v: Array, force: Array
+) -> None:
+    """Set the force of an arm that holds on to its own path: F = k (p_d − p) + b (ṗ_d − v).
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N/m], b [N s/m].
+    samples : Array
+        The intended path in H at equal steps of `period` seconds, shape (n, 3); n = 0: no grip, no force. The path ends
+        at rest in its last sample.
+    period : float
+        [s]
+    t, p, v, force
+        Time [s], hand position [m], velocity [m/s] and result [N], in H.
+    """
+    force[:] = 0.0
+    n = samples.shape[0]
+    if n == 0:
+        return
+    place = t / period
+    i = min(int(place), n - 1)
+    j = min(i + 1, n - 1)
+    s = place - i if j > i else 0.0
+    for k in range(3):
+        wanted = samples[i, k] + s * (samples[j, k] - samples[i, k])
+        speed = (samples[j, k] - samples[i, k]) / period
+        force[k] = stiffness * (wanted - p[k]) + damping * (speed - v[k])
+
+
+class CompiledArm(NamedTuple):
+    """An `Arm` as plain numbers and arrays; `begun` is its only state."""
+
+    stiffness: float
+    damping: float
+    path: Array
+    period: float
+    pushes: Array
+    begun: Array
+
+
+@njit
+def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
+    """Set the force of the hand on the stylus, in H: arm impedance plus pushes."""
+    arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
+    push_force(arm.pushes, arm.begun, t, p, force)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A user: an arm that is relaxed or traces a path of its own, and pushes at given places and times.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        Of the arm about its intended path [N/m], [N s/m]; unused without a path.
+    path : Array
+        Intended positions in H [m], shape (n, 3), `period` seconds apart; none for a relaxed hand.
+    period : float
+        [s]
+    pushes : sequence of Push
+        What the hand does beside it.
+
+    Raises
+    ------
+    SimError
+        If an impedance is negative or not finite, or the path is not an (n, 3) array of finite numbers.
+    """
+
+    stiffness: float = 300.0
+    damping: float = 5.0
+    path: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    period: float = 1e-3
+    pushes: Sequence[Push] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in (("stiffness", self.stiffness), ("damping", self.damping)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SimError(f"the arm's {name} is {value}; it must be finite and not negative")
+        if not (math.isfinite(self.period) and self.period > 0.0):
+            raise SimError(f"the period of the arm's path is {self.period} s; it must be positive")
+        if self.path.ndim != 2 or self.path.shape[1] != 3 or not np.all(np.isfinite(self.path)):
+            raise SimError(f"the arm's path has shape {self.path.shape}; expected (n, 3), all finite")
+
+    def compiled(self) -> CompiledArm:
+        """The arm as the servo loop holds it."""
+        return CompiledArm(self.stiffness, self.damping, np.ascontiguousarray(self.path), self.period,
+                           push_table(self.pushes), np.full(len(self.pushes), np.nan))  # fmt: skip

@@ -1,0 +1,97 @@
+"""The world as it is stepped: the compiled model, its state, and how both are put where a run begins."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import N_POSE, figure_model
+from models.phantom.kinematics import inverse_kinematics, vector_to_device_frame, within_limits
+from models.scene import FIGURE, PHANTOM, SceneConfig, world_model
+from sim.errors import SimError
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class World:
+    """One MuJoCo model with Phantom and figure, and its state.
+
+    Parameters
+    ----------
+    config : SceneConfig
+        Stature, mass and the two rates.
+
+    Raises
+    ------
+    ModelError
+        If the rates do not divide, or stature or mass are outside their intervals.
+    """
+
+    config: SceneConfig = field(default_factory=SceneConfig)
+    model: mujoco.MjModel = field(init=False, repr=False)
+    data: mujoco.MjData = field(init=False, repr=False)
+    figure: mujoco.MjModel = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        model = world_model(self.config)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "data", mujoco.MjData(model))
+        object.__setattr__(self, "figure", figure_model(self.config.stature, self.config.mass))
+
+    def reset(self, p_H: Array, pose: Array) -> None:
+        """Put the stylus at a point and the figure in a pose, both at rest.
+
+        Parameters
+        ----------
+        p_H : Array
+            Stylus tip in the hand frame [m], shape (3,).
+        pose : Array
+            The figure's pose, shape (75,).
+
+        Raises
+        ------
+        SimError
+            If the Phantom cannot reach the point.
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        theta = phantom_angles(p_H)
+        qpos = self.data.qpos
+        for name, angle in (
+            ("theta1", theta[0]),
+            ("theta2", theta[1]),
+            ("theta3", theta[2]),
+            ("elbow", theta[2] - theta[1]),
+            ("twin", theta[1] - theta[2]),
+        ):
+            qpos[self.model.joint(PHANTOM + name).qposadr[0]] = angle
+        root = int(self.model.joint(FIGURE + "root").qposadr[0])
+        qpos[root : root + N_POSE] = pose
+        mujoco.mj_forward(self.model, self.data)
+
+    def warnings(self) -> dict[str, int]:
+        """MuJoCo's warnings since the last reset, by name; empty if there was none."""
+        names = [warning.name.removeprefix("mjWARN_").lower() for warning in mujoco.mjtWarning.__members__.values()]
+        counts = (int(warning.number) for warning in self.data.warning)
+        return {name: count for name, count in zip(names, counts, strict=False) if count}
+
+
+def phantom_angles(p_H: Array) -> tuple[float, float, float]:
+    """Joint angles θ1, θ2, θ3 that put the stylus tip at a point of the hand frame.
+
+    Raises
+    ------
+    SimError
+        If the point is out of reach or beyond a joint's stop; the message has the numbers.
+    """
+    x, y, z = (float(value) for value in p_H)
+    theta1, theta2, theta3, reachable = inverse_kinematics.py_func(vector_to_device_frame.py_func((x, y, z)))
+    if not reachable:
+        raise SimError(f"the Phantom does not reach ({x:.3f}, {y:.3f}, {z:.3f}) m of the hand frame")
+    if not within_limits.py_func((theta1, theta2, theta3)):
+        degrees = ", ".join(f"{np.degrees(angle):.0f}°" for angle in (theta1, theta2, theta3))
+        raise SimError(
+            f"({x:.3f}, {y:.3f}, {z:.3f}) m of the hand frame needs joint angles {degrees}: beyond the Phantom's stops"
+        )
+    return theta1, theta2, theta3
