@@ -69,7 +69,7 @@ def cheer() -> Choreography:
     spread = replace(thrown, raised=158, plane=80, elbow=8)
     again = replace(thrown, raised=140, elbow=25)
     falling = replace(low, raised=52, elbow=60)
-    crouch, bounce, tall = 0.79, 0.85, 0.905
+    crouch, bounce, tall = 0.78, 0.845, 0.895
     return Choreography(
         "cheer",
         3.0,

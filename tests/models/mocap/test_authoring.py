@@ -106,7 +106,7 @@ def test_trunk_pelvis_and_head_turn_the_way_their_words_say():
     np.testing.assert_allclose(pelvis @ UP, [0, np.sin(np.deg2rad(10)), np.cos(np.deg2rad(10))], atol=1e-9)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=60, derandomize=True)
 @given(
     side=st.sampled_from(["left", "right"]),
     reach=st.floats(0.3, 0.81),
@@ -118,10 +118,7 @@ def test_trunk_pelvis_and_head_turn_the_way_their_words_say():
 def test_a_solved_leg_puts_the_foot_exactly_where_it_is_asked_with_a_knee_that_only_bends(
     side, reach, forwards, outwards, turns, knee
 ):
-    pelvis, foot = (
-        Rotation.from_euler("ZYX", np.array(turns).reshape(2, 1, 3)[0]),
-        Rotation.from_euler("ZYX", [turns[3:]]),
-    )
+    pelvis, foot = Rotation.from_euler("ZYX", [turns[:3]]), Rotation.from_euler("ZYX", [turns[3:]])
     root = np.array([[0.3, -0.2, 0.9]])
     sign = 1 if side == "left" else -1
     hip = root + pelvis.apply([0, sign * 0.0875, 0])
@@ -142,14 +139,15 @@ def test_a_solved_leg_puts_the_foot_exactly_where_it_is_asked_with_a_knee_that_o
 
 
 def test_a_leg_asked_beyond_its_reach_straightens_smoothly_and_never_overextends():
-    n = 2001
-    root, still = np.zeros((n, 3)), Rotation.identity(n)
-    ankle = np.array([0.0, 0.0875, 0.0]) + np.outer(np.linspace(0.7, 1.2, n), [0.3, 0.0, -np.sqrt(1 - 0.09)])
-    knee = solve_leg("left", root, still, ankle, still, np.zeros(n))[1].as_rotvec()[:, 1]
-    assert np.all(np.diff(knee) < 0)
-    assert knee.min() > np.deg2rad(2)
-    bends = np.abs(np.diff(knee, n=3))
-    assert bends.max() < 20 * np.median(bends[bends > 0]) + 1e-5
+    changes = []
+    for n in (1001, 2001):
+        root, still = np.zeros((n, 3)), Rotation.identity(n)
+        ankle = np.array([0.0, 0.0875, 0.0]) + np.outer(np.linspace(0.7, 1.2, n), [0.3, 0.0, -np.sqrt(1 - 0.09)])
+        knee = solve_leg("left", root, still, ankle, still, np.zeros(n))[1].as_rotvec()[:, 1]
+        assert np.all(np.diff(knee) < 0)
+        assert knee[-1] > np.deg2rad(2)
+        changes.append(np.abs(np.diff(knee, n=3)).max() * n**2)
+    assert changes[1] < 0.65 * changes[0]  # second derivatives do not jump: their changes shrink with the step
 
 
 def stepping():
