@@ -17,7 +17,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from sim.recorder import Recording
+from sim.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 
 Array = npt.NDArray[np.float64]

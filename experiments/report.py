@@ -7,7 +7,7 @@ from pathlib import Path
 
 import mujoco
 
-from sim.recorder import Recording
+from sim.recording import Recording
 from sim.viewer.palette import FIELD, USER
 from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
 

@@ -1,15 +1,9 @@
-"""Recordings: what a run did, streamed to HDF5 so that a killed run loses at most its last quarter of a second.
+"""Recording a run: streamed to HDF5, so that a killed run loses at most its last quarter of a second.
 
 The file is written in HDF5's single-writer mode (SWMR), in which every flush leaves a file that can be opened. What
 counts is counted last: ``<group>/rows`` is raised only after the rows have been flushed, so a reader never sees rows
 that were still on their way. A file is born whole under another name and then renamed, so it is never half a header.
-Other programs open the file of a killed run with ``h5py.File(path, "r", swmr=True)``, or after ``h5clear -s``.
-
-Layout::
-
-    config, versions      JSON texts          seed     integer
-    static/<name>         arrays and texts    summary  JSON as bytes, of which ``summary_bytes`` count; 0 until the end
-    <group>/<channel>     float64 (n, *shape), of which ``<group>/rows`` count, at ``<group>/rate`` [Hz]
+The layout is that of `sim.recording`, which reads it.
 """
 
 import json
@@ -26,17 +20,13 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from sim.errors import SimError
+from sim.recording import RESERVED, RecordingError, dataset_of, group_of
+from sim.recording import Recording as Recording
 
 Array = npt.NDArray[np.float64]
 
 CHUNK_SECONDS = 0.25  # what a killed run can lose
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
-_RESERVED = {"rows", "rate"}
-
-
-class RecordingError(SimError):
-    """A recording that cannot be made, continued or read."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +52,8 @@ class Group:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise RecordingError(f"rate is {self.rate} Hz; it must be positive")
-        if not self.channels or _RESERVED & self.channels.keys():
-            raise RecordingError(f"channels are {sorted(self.channels)}; at least one, and none of {sorted(_RESERVED)}")
+        if not self.channels or RESERVED & self.channels.keys():
+            raise RecordingError(f"channels are {sorted(self.channels)}; at least one, and none of {sorted(RESERVED)}")
 
     @property
     def chunk(self) -> int:
@@ -71,31 +61,13 @@ class Group:
         return max(1, round(self.rate * CHUNK_SECONDS))
 
 
-def _dataset(node: h5py.Group, name: str) -> h5py.Dataset:
-    dataset = node[name]
-    if not isinstance(dataset, h5py.Dataset):
-        raise KeyError(f"{node.name}/{name} is not a dataset")
-    return dataset
-
-
-def _group(node: h5py.Group, name: str) -> h5py.Group:
-    group = node[name]
-    if not isinstance(group, h5py.Group):
-        raise KeyError(f"{node.name}/{name} is not a group")
-    return group
-
-
-def _names(node: h5py.Group) -> list[str]:
-    return [str(name) for name in node]
-
-
 class _Stream:
     """A group on its way to the file: one buffer of fixed size per channel, written when full."""
 
     def __init__(self, group: Group, node: h5py.Group):
         self._name = node.name
-        self._datasets = {name: _dataset(node, name) for name in group.channels}
-        self._rows = _dataset(node, "rows")
+        self._datasets = {name: dataset_of(node, name) for name in group.channels}
+        self._rows = dataset_of(node, "rows")
         self._buffers = {name: np.empty((group.chunk, *shape)) for name, shape in group.channels.items()}
         self._chunk = group.chunk
         self._filled = 0
@@ -206,7 +178,7 @@ class Recorder:
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
         self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
-        self._streams = {name: _Stream(group, _group(self._file, name)) for name, group in groups.items()}
+        self._streams = {name: _Stream(group, group_of(self._file, name)) for name, group in groups.items()}
 
     def append(self, group: str, blocks: Mapping[str, Array]) -> None:
         """Append rows to every channel of a group.
@@ -235,151 +207,11 @@ class Recorder:
             stream.flush()
         if summary is not None:
             text = np.frombuffer(json.dumps(summary).encode(), dtype=np.uint8)
-            dataset, count = _dataset(self._file, "summary"), _dataset(self._file, "summary_bytes")
+            dataset, count = dataset_of(self._file, "summary"), dataset_of(self._file, "summary_bytes")
             dataset.resize(len(text), axis=0)
             dataset[:] = text
             dataset.flush()
             count[0] = len(text)
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-class Channel:
-    """Rows of a channel, read from the file when they are sliced.
-
-    ``channel[i]``, ``channel[a:b]`` and ``channel[::k]`` give float64 arrays; ``len(channel)`` is the number of
-    rows that count when the recording was opened.
-    """
-
-    def __init__(self, dataset: h5py.Dataset, rows: int):
-        self._dataset = dataset
-        self._rows = rows
-        self.shape = (rows, *dataset.shape[1:])
-
-    def __len__(self) -> int:
-        return self._rows
-
-    def __getitem__(self, rows: int | slice) -> Array:
-        if isinstance(rows, slice):
-            start, stop, step = rows.indices(self._rows)
-            return self._dataset[start:stop:step]
-        if not -self._rows <= rows < self._rows:
-            raise IndexError(f"{self._dataset.name}: row {rows}; there are {self._rows}")
-        return np.asarray(self._dataset[rows % self._rows])
-
-
-class Recording:
-    """A recording, finished or not, opened for reading; also while it is still being written.
-
-    Parameters
-    ----------
-    path : Path
-        File made by a `Recorder`.
-
-    Attributes
-    ----------
-    config : dict
-        Configuration of the run.
-    seed : int
-    versions : dict
-        Versions of Python and of the packages that decide what a run does.
-    summary : dict or None
-        What `Recorder.close` was given; None if the run did not get there.
-    arrays, texts : dict
-        What does not change during the run (`static` of the `Recorder`), by kind.
-    groups : dict
-        For each group its channels by name.
-    rates : dict
-        For each group its rate [Hz].
-
-    Raises
-    ------
-    RecordingError
-        If the file is missing, or not a recording.
-    """
-
-    def __init__(self, path: Path):
-        self._path = path
-        try:
-            self._file = h5py.File(path, "r", libver="latest", swmr=True)
-        except OSError as error:
-            raise RecordingError(f"{path}: cannot be opened ({error}); expected the run.h5 of a run") from None
-        try:
-            self._read()
-        except (KeyError, TypeError, ValueError) as error:
-            self._file.close()
-            raise RecordingError(f"{path}: not a recording ({error}); expected the run.h5 of a run") from None
-
-    def _read(self) -> None:
-        file = self._file
-        self.config: dict[str, object] = json.loads(_dataset(file, "config")[()])
-        self.versions: dict[str, str] = json.loads(_dataset(file, "versions")[()])
-        self.seed = int(_dataset(file, "seed")[()])
-        summary = bytes(_dataset(file, "summary")[: _dataset(file, "summary_bytes")[0]])
-        self.summary: dict[str, object] | None = json.loads(summary) if summary else None
-        self.arrays: dict[str, Array] = {}
-        self.texts: dict[str, str] = {}
-        static = _group(file, "static")
-        for name in _names(static):
-            value = _dataset(static, name)[()]
-            if isinstance(value, bytes):
-                self.texts[name] = value.decode()
-            else:
-                self.arrays[name] = np.asarray(value, dtype=np.float64)
-        self.groups: dict[str, dict[str, Channel]] = {}
-        self.rates: dict[str, float] = {}
-        for name in _names(file):
-            node = file[name]
-            if isinstance(node, h5py.Group) and "rate" in node:
-                rows = int(_dataset(node, "rows")[0])
-                self.rates[name] = float(_dataset(node, "rate")[()])
-                self.groups[name] = {
-                    key: Channel(_dataset(node, key), rows) for key in _names(node) if key not in _RESERVED
-                }
-
-    def channel(self, group: str, name: str) -> Channel:
-        """A channel that has rows.
-
-        Raises
-        ------
-        RecordingError
-            If there is no such channel, or it has no rows.
-        """
-        channels = self.groups.get(group, {})
-        if name not in channels:
-            raise RecordingError(f"{self._path}: no channel {group}/{name}; {group} has {sorted(channels)}")
-        if len(channels[name]) == 0:
-            raise RecordingError(
-                f"{self._path}: {group}/{name} has no rows; the run ended before the first was written"
-            )
-        return channels[name]
-
-    def array(self, name: str) -> Array:
-        """An array that does not change during the run.
-
-        Raises
-        ------
-        RecordingError
-            If there is none of that name.
-        """
-        if name not in self.arrays:
-            raise RecordingError(f"{self._path}: no array {name}; there are {sorted(self.arrays)}")
-        return self.arrays[name]
-
-    @property
-    def complete(self) -> bool:
-        """Whether the run came to its end."""
-        return self.summary is not None
-
-    def close(self) -> None:
-        """Close the file; channels can then no longer be read."""
         self._file.close()
 
     def __enter__(self) -> Self:

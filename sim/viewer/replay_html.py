@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from sim.recorder import Channel, Recording
+from sim.recording import Channel, Recording
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER, rgb
 from sim.viewer.shapes import Shape, body_shapes, tube
 

@@ -17,7 +17,8 @@ from experiments.figures import (
     torques_figure,
     tracking_figure,
 )
-from sim.recorder import Group, Recorder, Recording
+from sim.recorder import Group, Recorder
+from sim.recording import Recording
 
 ANGLE = np.linspace(0, 2 * np.pi, 61)
 CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
@@ -150,7 +151,7 @@ def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
 def test_no_display_is_needed(tmp_path):
     record(tmp_path / "run.h5").close()
     script = (
-        "import sys; from pathlib import Path; from sim.recorder import Recording; "
+        "import sys; from pathlib import Path; from sim.recording import Recording; "
         "from experiments.figures import draw_figures; draw_figures(Recording(Path(sys.argv[1])), Path(sys.argv[2])); "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )

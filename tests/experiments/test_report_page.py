@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from experiments import report
-from sim.recorder import Group, Recorder, Recording
+from sim.recorder import Group, Recorder
+from sim.recording import Recording
 
 REPLAY = '<html><body class="a">3 & 4 < 5</body></html>'
 

@@ -10,7 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from sim.recorder import CHUNK_SECONDS, Group, Recorder, Recording, RecordingError
+from sim.recorder import CHUNK_SECONDS, Group, Recorder
+from sim.recording import Recording, RecordingError
 
 CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
 GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
