@@ -84,9 +84,12 @@ class FigureState(NamedTuple):
     contact_reach: float
     flight_height: float
     lift_time: float
+    linear_limit: float
+    angular_limit: float
     acceleration: Array
     rotation: Array
     share: Array
+    lost: Array
     edges: Array
     edge_share: Array
     edge_force: Array
@@ -135,11 +138,18 @@ def _turned(rotation: Array, vector: Array, out: Array) -> None:
 
 
 @njit
+def _shortening(vector: Array, longest: float) -> float:
+    """Factor that makes a 3-vector at most so long."""
+    return min(1.0, longest / (np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2) + 1e-12))
+
+
+@njit
 def _wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """a* of all 57 degrees of freedom: the reference's acceleration and critically damped feedback on the manifold."""
     a, k, c = s.acceleration, s.root_rate**2, 2.0 * s.root_rate
+    limit = _shortening(a_r[:3], s.linear_limit)
     for i in range(3):
-        a[i] = a_r[i] + c * (v_r[i] - s.qvel[i]) + k * (q_r[i] - s.qpos[i])
+        a[i] = limit * a_r[i] + c * (v_r[i] - s.qvel[i]) + k * (q_r[i] - s.qpos[i])
     error, moved = s.rotation[0], s.rotation[1]
     for joint in range(s.xpos.shape[0]):
         k, c = s.root_rate**2, 2.0 * s.root_rate
@@ -151,8 +161,9 @@ def _wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> 
         for i in range(3):
             a[t + i] = c * (moved[i] - s.qvel[t + i]) + k * error[i]
         _turned(error, a_r[t : t + 3], moved)
+        limit = _shortening(moved, s.angular_limit)
         for i in range(3):
-            a[t + i] += moved[i]
+            a[t + i] += limit * moved[i]
 
 
 @njit
@@ -211,8 +222,15 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     a[:6] = 0.0
     for leg in range(2):
         stance_response(
-            s.legs[leg], s.points[4 * leg : 4 * leg + 4], s.share[4 * leg : 4 * leg + 4], s.xpos, s.xmat, s.qvel, a,
-            s.offset, s.response[leg],
+            s.legs[leg],
+            s.points[4 * leg : 4 * leg + 4],
+            s.share[4 * leg : 4 * leg + 4],
+            s.xpos,
+            s.xmat,
+            s.qvel,
+            a,
+            s.offset,
+            s.response[leg],
         )
         for k in range(9):
             t = 3 + 3 * s.legs[leg, k // 3] + k % 3
@@ -266,10 +284,17 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
         for k in range(n):
             torque += M[i, k] * a[k]
         limit = s.torque_limit[i - 6]
+        s.ctrl[i - 6] = min(max(torque, -limit), limit)
+        s.lost[i - 6] = torque - s.ctrl[i - 6]
         if abs(torque) > limit:
             saturated += 1
-            torque = min(max(torque, -limit), limit)
-        s.ctrl[i - 6] = torque
+    if saturated > 0 and support > 0.0:
+        for leg in range(2):
+            for k in range(9):
+                t = 3 * s.legs[leg, k // 3] + k % 3 - 3
+                for m in range(6):
+                    w[m] += s.response[leg, k, m] * s.lost[t]
+        _bound(w, support * s.force_bound, support * s.moment_bound)
     s.applied[:] = w
     s.report[0] = support
     s.report[1] = saturated
@@ -283,10 +308,16 @@ def _bounded_residual(s: FigureState, support: float) -> None:
     w[:3] = y[:3] * s.weight
     for i in range(3):
         w[3 + i] = (R[i] * y[3] + R[3 + i] * y[4] + R[6 + i] * y[5]) * s.weight * _LEVER
-    for first, bound in ((0, s.force_bound), (3, s.moment_bound)):
-        size = np.sqrt(w[first] ** 2 + w[first + 1] ** 2 + w[first + 2] ** 2)
-        if size > support * bound:
-            w[first : first + 3] *= support * bound / size
+    _bound(w, support * s.force_bound, support * s.moment_bound)
+
+
+@njit
+def _bound(wrench: Array, force: float, moment: float) -> None:
+    """Shorten force and moment to their bounds."""
+    for first, bound in ((0, force), (3, moment)):
+        size = np.sqrt(wrench[first] ** 2 + wrench[first + 1] ** 2 + wrench[first + 2] ** 2)
+        if size > bound:
+            wrench[first : first + 3] *= bound / size
 
 
 @njit
@@ -301,7 +332,11 @@ def _contact_torques(s: FigureState, given: Array) -> None:
             given[i] += f[i]
         body = s.contact_body[c]
         while body >= 0:
-            x, y, z = s.points[c, 0] - origin[body, 0], s.points[c, 1] - origin[body, 1], s.points[c, 2] - origin[body, 2]
+            x, y, z = (
+                s.points[c, 0] - origin[body, 0],
+                s.points[c, 1] - origin[body, 1],
+                s.points[c, 2] - origin[body, 2],
+            )
             mx, my, mz = y * f[2] - z * f[1], z * f[0] - x * f[2], x * f[1] - y * f[0]
             for i in range(3):
                 given[3 + 3 * body + i] += R[body, i] * mx + R[body, 3 + i] * my + R[body, 6 + i] * mz
@@ -322,14 +357,16 @@ class FigureGains:
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
     """
 
-    joint_rate: float = 25.0
-    root_rate: float = 25.0
-    force_bound: float = 0.5
-    moment_bound: float = 0.1
+    joint_rate: float = 40.0
+    root_rate: float = 40.0
+    force_bound: float = 1.0
+    moment_bound: float = 0.2
     reference_reach: float = 0.015
     contact_reach: float = 0.001
     flight_height: float = 0.015
     lift_time: float = 0.02
+    linear_limit: float = 40.0
+    angular_limit: float = 500.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -399,8 +436,8 @@ class Figure:
             weight=weight, radius=float(m.geom_size[geoms[0], 0]), friction=0.9 * float(m.geom_friction[geoms[0], 0]),
             joint_rate=gains.joint_rate, root_rate=gains.root_rate, force_bound=gains.force_bound * weight,
             moment_bound=gains.moment_bound * weight * 1.75, reference_reach=gains.reference_reach,
-            contact_reach=gains.contact_reach, flight_height=gains.flight_height, lift_time=gains.lift_time, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
-            share=np.zeros(n), edges=np.zeros((N_EDGES * n, 6)), edge_share=np.zeros(N_EDGES * n),
+            contact_reach=gains.contact_reach, flight_height=gains.flight_height, lift_time=gains.lift_time, linear_limit=gains.linear_limit, angular_limit=gains.angular_limit, acceleration=np.zeros(N_TANGENT), rotation=np.zeros((2, 3)),
+            share=np.zeros(n), lost=np.zeros(N_TANGENT - 6), edges=np.zeros((N_EDGES * n, 6)), edge_share=np.zeros(N_EDGES * n),
             edge_force=np.zeros(N_EDGES * n), force=np.zeros((n, 3)), scaled=np.zeros(6), residual=np.zeros(6),
             demand=np.zeros(6), given=np.zeros(N_TANGENT), wrench=np.zeros(6), root_M=np.zeros((6, 6)),
             root_bias=np.zeros(6), wanted_root=np.zeros(6), points=np.zeros((n, 3)),
