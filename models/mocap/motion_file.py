@@ -10,13 +10,14 @@ from models.errors import ModelError
 
 FILE_LIMIT = 128_000_000  # bytes
 LINE_LIMIT = 1_000_000  # bytes
+LINES_LIMIT = 5_000_000
 JOINT_LIMIT = 1_000
 FRAME_LIMIT = 1_000_000
 VALUE_LIMIT = 16_000_000  # numbers in one file; 128 MB as float64
 MAGNITUDE_LIMIT = 1e7  # of a length or an angle in the file's own unit
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?")
-_COUNT = re.compile(r"\d{1,12}")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+_COUNT = re.compile(r"[0-9]{1,12}")
 
 
 class MotionFileError(ModelError):
@@ -42,7 +43,7 @@ def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
     Raises
     ------
     MotionFileError
-        If the file cannot be opened, is empty, binary or larger than `limit` bytes.
+        If the file cannot be opened, is empty, binary, or larger than `limit` bytes or `LINES_LIMIT` lines.
     """
     try:
         with path.open("rb") as file:
@@ -57,7 +58,10 @@ def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
         raise MotionFileError(path, line, "binary content (a zero byte)", "a text file")
     if not content.strip():
         raise MotionFileError(path, 1, "file is empty", "a motion")
-    return content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    content = content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if content.count(b"\n") > LINES_LIMIT:
+        raise MotionFileError(path, LINES_LIMIT, "file goes on", f"at most {LINES_LIMIT} lines")
+    return content
 
 
 def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -97,8 +101,9 @@ def numbers(tokens: list[str], path: Path, line: int) -> list[float]:
         values = [float(token) for token in tokens]
     except ValueError:
         return [number(token, path, line) for token in tokens]
-    # float() also takes underscores and names of non-numbers: max() and the slow path settle those.
-    if not all(abs(value) <= MAGNITUDE_LIMIT for value in values) or any("_" in token for token in tokens):
+    # float() also takes underscores, the digits of other scripts and names of non-numbers: `number` refuses those.
+    text = "".join(tokens)
+    if "_" in text or not text.isascii() or not all(abs(value) <= MAGNITUDE_LIMIT for value in values):
         return [number(token, path, line) for token in tokens]
     return values
 

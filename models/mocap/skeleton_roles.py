@@ -14,7 +14,8 @@ _SIDED = {
     "clavicle": ("clavicle", "collar", "collarbone", "shoulder"),
     "upper_arm": ("upperarm", "uparm", "humerus", "shldr", "arm", "shoulder"),
     "forearm": ("forearm", "lowerarm", "lowarm", "elbow", "radius"),
-    "hand": ("hand", "wrist"),
+    "hand": ("fingerbase", "hand"),
+    "wrist": ("wrist", "hand"),
     "thigh": ("upleg", "upperleg", "thigh", "femur", "hip"),
     "shank": ("lowleg", "lowerleg", "shin", "calf", "tibia", "knee", "leg"),
     "foot": ("foot", "ankle"),
@@ -70,11 +71,11 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
         for part in ("clavicle", "upper_arm", "forearm", "thigh", "shank", "foot"):
             if f"{side}_{part}" in named:
                 segments[f"{side}_{part}"] = named[f"{side}_{part}"]
-        # Where both exist the wrist is the end of the forearm, and the hand beyond it has all of the rotation.
+        # Where both exist the wrist is the end of the forearm, and the hand beyond it (CMU) has all of the rotation.
         wrist, hand = named.get(f"{side}_wrist"), named.get(f"{side}_hand")
         if (last := hand if hand is not None else wrist) is not None:
             segments[f"{side}_hand"] = last
-        chain = (("upper_arm", named.get(f"{side}_forearm")), ("forearm", wrist if wrist is not None else hand),
+        chain = (("upper_arm", named.get(f"{side}_forearm")), ("forearm", wrist),
                  ("thigh", named.get(f"{side}_shank")), ("shank", named.get(f"{side}_foot")),
                  ("foot", named.get(f"{side}_toe")))  # fmt: skip
         for part, end in chain:
@@ -117,7 +118,6 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
     for side in ("left", "right"):
         for part, aliases in _SIDED.items():
             find(f"{side}_{part}", side, aliases)
-        find(f"{side}_wrist", side, ("wrist",))
         # A shoulder is the clavicle where the skeleton has an arm beside it, and the arm where it has not.
         if found.get(f"{side}_clavicle") == found.get(f"{side}_upper_arm"):
             found.pop(f"{side}_clavicle", None)

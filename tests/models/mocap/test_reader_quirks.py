@@ -1,0 +1,242 @@
+"""What the formats allow and naive readers stumble over, in files of a few lines."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.mocap.asf_amc import read_amc
+from models.mocap.bvh import read_bvh
+from models.mocap.deepmimic import read_deepmimic
+from models.mocap.library import read_motion
+
+CHAIN = """HIERARCHY
+ROOT Hips
+{
+\tOFFSET 1.0 2.0 3.0
+\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+\tJOINT Bip01 L Thigh
+\t{
+\t\tOFFSET 0 -5.9e-014 4
+\t\tCHANNELS 3 Yrotation Xrotation Zrotation
+\t\tEnd Site
+\t\t{
+\t\t\tOFFSET 0 0 0
+\t\t}
+\t}
+}
+MOTION
+Frames: 2
+Frame Time: .0083333
+10 20 30 10 20 30 40 50 60
+11 21 31 370 20 30 40 50 -300
+"""
+
+
+def read_text(tmp_path, text, name="motion.bvh"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_motion(path)
+
+
+def places(motion):
+    return motion.global_positions(motion.global_rotations())
+
+
+def test_each_joint_has_its_own_order_of_rotations(tmp_path):
+    motion = read_text(tmp_path, CHAIN)
+    root = Rotation.from_euler("ZXY", [10, 20, 30], degrees=True)
+    thigh = root * Rotation.from_euler("YXZ", [40, 50, 60], degrees=True)
+    turned = Rotation.from_quat(motion.global_rotations()[0], scalar_first=True)
+    np.testing.assert_allclose((turned * Rotation.concatenate([root, thigh]).inv()).magnitude(), 0.0, atol=1e-12)
+    assert motion.fps == 120.0
+    assert motion.joints == ("Hips", "Bip01 L Thigh")
+
+
+def test_angles_that_wrap_by_a_full_turn_are_the_same_rotation(tmp_path):
+    motion = read_text(tmp_path, CHAIN)
+    first, second = (Rotation.from_quat(motion.rotations[k], scalar_first=True) for k in (0, 1))
+    np.testing.assert_allclose((first * second.inv()).magnitude(), 0.0, atol=1e-12)
+
+
+def test_position_channels_replace_the_offset_on_any_joint(tmp_path):
+    text = CHAIN.replace("CHANNELS 3 Yrotation", "CHANNELS 4 Zposition Yrotation").replace(" 40 ", " 7 40 ")
+    motion = read_text(tmp_path, text)
+    np.testing.assert_allclose(motion.translations[0], [[10, 20, 30], [0, -5.9e-14, 7]])
+    np.testing.assert_allclose(motion.offsets, [[1, 2, 3], [0, -5.9e-14, 4]])
+
+
+def test_rotations_may_stand_before_positions(tmp_path):
+    text = CHAIN.replace(
+        "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation",
+        "6 Zrotation Xrotation Yrotation Xposition Yposition Zposition",
+    ).replace("10 20 30 10 20 30 40", "10 20 30 10 20 30 40")
+    motion, plain = read_text(tmp_path, text), read_text(tmp_path, CHAIN)
+    np.testing.assert_allclose(motion.rotations[0], plain.rotations[0])
+    np.testing.assert_allclose(motion.translations[0, 0], [10, 20, 30])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.replace("\n", "\r\n", 9),
+        lambda text: text.rstrip("\n"),
+        lambda text: text.replace(" ", "\t").replace("Bip01\tL\tThigh", "Bip01 L Thigh"),
+        lambda text: text.replace("\n", "  \t\n"),
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("Frames: 2", "Frames:2").replace("Frame Time: .", "Frame Time:\t."),
+        lambda text: text.replace("\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 0 0\n\t\t}\n", ""),
+        lambda text: text.replace("Xrotation", "XROTATION").replace("End Site", "END SITE").replace("ROOT", "Root"),
+        lambda text: text.replace("ROOT Hips\n{", "ROOT Hips {"),
+    ],
+)
+def test_the_same_motion_written_differently(tmp_path, change):
+    np.testing.assert_array_equal(places(read_text(tmp_path, change(CHAIN))), places(read_text(tmp_path, CHAIN)))
+
+
+def test_one_frame_and_positions_without_rotations(tmp_path):
+    text = """HIERARCHY
+ROOT a
+{ OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition
+JOINT b { OFFSET 0 1 0 CHANNELS 3 Zposition Yposition Xposition } }
+MOTION
+Frames: 1
+Frame Time: 0.545
+1 2 3 4 5 6
+"""
+    motion = read_text(tmp_path, text)
+    np.testing.assert_array_equal(places(motion)[0], [[1, 2, 3], [7, 7, 7]])
+    assert motion.fps == pytest.approx(1 / 0.545)
+
+
+def test_the_joint_that_travels_need_not_be_the_first(tmp_path):
+    text = """HIERARCHY
+ROOT reference
+{ OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation
+JOINT Hips { OFFSET 9 9 9 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation } }
+MOTION
+Frames: 2
+Frame Time: 0.04
+90 0 0 1 0 0 0 0 0
+90 0 0 2 0 0 0 0 0
+"""
+    np.testing.assert_allclose(places(read_text(tmp_path, text))[:, 1], [[0, 1, 0], [0, 2, 0]], atol=1e-15)
+
+
+def test_frame_times_are_taken_for_whole_rates_only_when_they_are_rounded_ones(tmp_path):
+    rates = {".0083333": 120.0, "0.033333": 30.0, "0.016667": 60.0, "0.008342": 1 / 0.008342, "0.0417083750417": 23.976}
+    for written, rate in rates.items():
+        assert read_text(tmp_path, CHAIN.replace(".0083333", written)).fps == pytest.approx(rate, rel=1e-9), written
+
+
+ASF = """# skeleton
+:version 1.10
+:name test
+:units
+  mass 1.0
+  length 0.45
+  angle {angle}
+:documentation
+   begin anything at all
+:root
+   order {order}
+   axis XYZ
+   position 0 0 0
+   orientation 0 0 0
+:bonedata
+  begin
+     id 1
+     name thigh
+     direction 0 -1 0
+     length 2
+     axis {axis} XYZ
+    dof rx rz
+    limits (-10 10)
+           (-20 20)
+  end
+  begin
+     id 2
+     name shank
+     direction 0 -1 0
+     length 3
+     axis 0 0 0 XYZ
+  end
+:hierarchy
+  begin
+    root thigh
+    thigh shank
+  end
+"""
+AMC = ":FULLY-SPECIFIED\n:{mode}\n1\nroot {root}\nthigh {thigh}\n2\nroot {root}\nthigh {thigh}\n"
+
+
+def read_acclaim(tmp_path, asf, amc):
+    (tmp_path / "7.asf").write_bytes(asf.encode())
+    (tmp_path / "7_03.amc").write_bytes(amc.encode())
+    return read_amc(tmp_path / "7_03.amc")
+
+
+def test_amc_in_radians_with_another_order_and_crlf_is_the_same_motion(tmp_path):
+    degrees = read_acclaim(
+        tmp_path,
+        ASF.format(angle="deg", order="TX TY TZ RX RY RZ", axis="10 20 30"),
+        AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25"),
+    )
+    turn, hinge = np.deg2rad([40, 50, 60]), np.deg2rad([15, -25])
+    radians = read_acclaim(
+        tmp_path,
+        ASF.format(angle="rad", order="RZ TY RX RY TX TZ", axis="{} {} {}".format(*np.deg2rad([10, 20, 30]))),
+        AMC.format(mode="RADIANS", root=f"{turn[2]} 2 {turn[0]} {turn[1]} 1 3", thigh=f"{hinge[0]} {hinge[1]}").replace(
+            "\n", "\r\n"
+        ),
+    )
+    np.testing.assert_allclose(places(radians), places(degrees), atol=1e-12)
+    root = Rotation.from_euler("xyz", [40, 50, 60], degrees=True)
+    own = Rotation.from_euler("xyz", [10, 20, 30], degrees=True)
+    thigh = own * Rotation.from_euler("xz", [15, -25], degrees=True) * own.inv()
+    np.testing.assert_allclose(
+        places(degrees)[0, 2], np.array([1, 2, 3]) + (root * thigh).apply([0, -2, 0]), atol=1e-12
+    )
+    np.testing.assert_allclose(degrees.tips[2], [0, -3, 0])
+
+
+def deepmimic_row(duration, x, turn):
+    half = turn / 2
+    return [duration, x, 1.0, 0.0, np.cos(half), 0.0, np.sin(half), 0.0, *([1.0, 0, 0, 0] * 3), 0.0,
+            *([1.0, 0, 0, 0] * 2), 0.0, *([1.0, 0, 0, 0]), 0.0, *([1.0, 0, 0, 0] * 2), 0.0]  # fmt: skip
+
+
+def test_deepmimic_quaternions_are_normalised_and_their_signs_made_continuous(tmp_path):
+    rows = [deepmimic_row(0.02, 0.0, 0.1 * k) for k in range(4)]
+    rows[2] = [*rows[2][:4], *(-1.7 * value for value in rows[2][4:8]), *rows[2][8:]]
+    rows[-1][0] = 0.0
+    (tmp_path / "m.txt").write_text(json.dumps({"Loop": "wrap", "Frames": rows}))
+    motion = read_deepmimic(tmp_path / "m.txt")
+    np.testing.assert_allclose(motion.rotations[:, 0, 2], np.sin(0.05 * np.arange(4)), atol=1e-12)
+    assert motion.fps == 50.0
+
+
+def test_deepmimic_rows_of_unequal_duration_are_resampled(tmp_path):
+    times = np.array([0.0, 0.02, 0.06, 0.1])
+    rows = [deepmimic_row(d, 5 * t, t) for d, t in zip([*np.diff(times), 0.0], times, strict=True)]
+    (tmp_path / "m.json").write_text(json.dumps({"Frames": rows}))
+    motion = read_deepmimic(tmp_path / "m.json")
+    assert motion.n_frames == 6
+    np.testing.assert_allclose(motion.translations[:, 0, 0], 5 * 0.02 * np.arange(6), atol=1e-12)
+    np.testing.assert_allclose(2 * np.arcsin(motion.rotations[:, 0, 2]), 0.02 * np.arange(6), atol=1e-6)
+
+
+def test_the_format_is_told_by_content_where_the_suffix_does_not(tmp_path):
+    assert read_text(tmp_path, CHAIN, name="motion.txt").joints[0] == "Hips"
+    text = json.dumps({"Frames": [deepmimic_row(0.1, 0.0, 0.0)]})
+    assert read_text(tmp_path, text, name="motion").joints[0] == "root"
+
+
+def test_names_in_other_encodings_are_read(tmp_path):
+    motion = read_text(tmp_path, CHAIN.encode().replace(b"Hips", "Hüfte".encode("latin-1")))
+    assert motion.joints[0].startswith("H")
+    assert read_bvh(tmp_path / "motion.bvh").n_frames == 2
