@@ -361,9 +361,9 @@ class FigureGains:
     root_rate: float = 40.0
     force_bound: float = 1.0
     moment_bound: float = 0.2
-    reference_reach: float = 0.015
+    reference_reach: float = 0.03
     contact_reach: float = 0.001
-    flight_height: float = 0.015
+    flight_height: float = 0.02
     lift_time: float = 0.02
     linear_limit: float = 40.0
     angular_limit: float = 500.0
