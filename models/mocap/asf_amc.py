@@ -15,10 +15,9 @@ import numpy.typing as npt
 
 from models.mocap import quaternions
 from models.mocap.motion_file import (
-    FRAME_LIMIT,
     JOINT_LIMIT,
-    VALUE_LIMIT,
     MotionFileError,
+    check_size,
     number,
     numbered_lines,
     numbers,
@@ -47,7 +46,7 @@ class _Bone:
 
 @dataclass
 class _Skeleton:
-    """An ASF file: bones by name, children before nobody's parents, and units."""
+    """An ASF file: bones by name, parents by child in the order of the joints, and units."""
 
     bones: dict[str, _Bone]
     parents: dict[str, str]
@@ -240,8 +239,7 @@ def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
             if not (fields[0].isascii() and fields[0].isdigit()):
                 raise MotionFileError(path, line, f"found {quoted(fields[0])}", "the number of a frame")
             row, n_frames = {}, n_frames + 1
-            if n_frames > FRAME_LIMIT or len(values) > VALUE_LIMIT:
-                raise MotionFileError(path, line, "too many frames", f"at most {FRAME_LIMIT} of {VALUE_LIMIT} numbers")
+            check_size(n_frames, len(skeleton.bones), len(values), path, line)
         else:
             bone = moving.get(fields[0])
             if bone is None or n_frames == 0 or fields[0] in row:

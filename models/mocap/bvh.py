@@ -21,8 +21,8 @@ from models.mocap.clip import Clip
 from models.mocap.motion_file import (
     FRAME_LIMIT,
     JOINT_LIMIT,
-    VALUE_LIMIT,
     MotionFileError,
+    check_size,
     count,
     frame_rate,
     number,
@@ -67,7 +67,7 @@ def read_bvh(path: Path) -> SourceMotion:
     """
     lines = numbered_lines(path)
     joints, n_columns = _read_hierarchy(lines, path)
-    frames, fps = _read_frames(lines, n_columns, path)
+    frames, fps = _read_frames(lines, len(joints), n_columns, path)
     offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
     tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
@@ -183,7 +183,7 @@ def _read_end_site(tokens: _Tokens) -> list[float]:
     return tip
 
 
-def _read_frames(lines: Iterator[tuple[int, str]], n_columns: int, path: Path) -> tuple[Array, float]:
+def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int, path: Path) -> tuple[Array, float]:
     """The frames' channels, shape (frames, channels), and their rate."""
     rest = ((line, text) for line, text in lines if text.strip())
     line, text = next(rest, (0, ""))
@@ -191,9 +191,7 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_columns: int, path: Path) -
     if match is None:
         raise MotionFileError(path, line, f"found {quoted(text.strip())} after MOTION", "Frames: n")
     n_frames = count(match[1], FRAME_LIMIT, "number of frames", path, line)
-    if n_frames == 0 or n_frames * n_columns > VALUE_LIMIT:
-        what = f"{n_frames} frames of {n_columns} channels"
-        raise MotionFileError(path, line, what, f"at least 1 frame and at most {VALUE_LIMIT} numbers")
+    check_size(n_frames, n_joints, n_frames * n_columns, path, line)
     line, text = next(rest, (line + 1, ""))
     match = re.fullmatch(r"\s*Frame\s+Time\s*:\s*(\S+)\s*", text, re.IGNORECASE)
     if match is None:

@@ -37,7 +37,7 @@ class PlanarDisplacement:
         return moved
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Clip:
     """A motion of the figure; frame k is at time k / fps.
 

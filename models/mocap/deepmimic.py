@@ -15,11 +15,10 @@ import numpy.typing as npt
 
 from models.mocap import quaternions
 from models.mocap.motion_file import (
-    FRAME_LIMIT,
     JOINT_LIMIT,
     MAGNITUDE_LIMIT,
-    VALUE_LIMIT,
     MotionFileError,
+    check_size,
     frame_rate,
     quoted,
     read_text,
@@ -74,7 +73,7 @@ def read_deepmimic(path: Path) -> SourceMotion:
     text, document = _parse(path)
     character = path.with_name(path.stem.partition("_")[0] + "_character.txt")
     joints = _read_character(character) if character.is_file() and character != path else _HUMANOID
-    durations, rows = _read_rows(text, document, 1 + sum(_WIDTH[joint.kind] for joint in joints), path)
+    durations, rows = _read_rows(text, document, joints, path)
     offsets = np.array([joint.attach for joint in joints])
     translations = np.broadcast_to(offsets, (len(rows), *offsets.shape)).copy()
     translations[:, 0] += rows[:, 1:4]
@@ -131,13 +130,13 @@ def _line_of_row(text: str, row: int) -> int:
     return text.count("\n", 0, place) + 1
 
 
-def _read_rows(text: str, document: dict[str, object], width: int, path: Path) -> tuple[Array, Array]:
+def _read_rows(text: str, document: dict[str, object], joints: tuple[_Joint, ...], path: Path) -> tuple[Array, Array]:
     """Durations [s], shape (rows,), and all the numbers, shape (rows, width)."""
+    width = 1 + sum(_WIDTH[joint.kind] for joint in joints)
     if not isinstance(rows := document.get("Frames"), list) or not rows:
         raise MotionFileError(path, 1, "no list of Frames", '"Frames": [[duration, x, y, z, …], …]')
     rows = cast("list[object]", rows)
-    if len(rows) > FRAME_LIMIT or len(rows) * width > VALUE_LIMIT:
-        raise MotionFileError(path, 1, f"{len(rows)} frames", f"at most {FRAME_LIMIT}, of {VALUE_LIMIT} numbers")
+    check_size(len(rows), len(joints), len(rows) * width, path, 1)
     for index, row in enumerate(rows):
         values = cast("list[object]", row) if isinstance(row, list) else []
         if len(values) != width or not all(_is_number(value) for value in values):
@@ -161,10 +160,7 @@ def _at_equal_steps(durations: Array, translations: Array, rotations: Array, pat
         return translations, rotations, fps
     times = np.append(0.0, np.cumsum(steps))
     n_frames = int(times[-1] * fps + 1e-6) + 1
-    if n_frames > FRAME_LIMIT or n_frames * rotations[0].size > VALUE_LIMIT:
-        raise MotionFileError(
-            path, 1, f"{n_frames} frames when resampled to {fps:g} per second", f"at most {FRAME_LIMIT}"
-        )
+    check_size(n_frames, rotations.shape[1], n_frames, path, 1)
     at = np.arange(n_frames) / fps
     before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(steps) - 1)
     share = ((at - times[before]) / steps[before])[:, None, None]

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from models.errors import ModelError
 
-FILE_LIMIT = 128_000_000  # bytes
+FILE_LIMIT = 64_000_000  # bytes
 LINE_LIMIT = 1_000_000  # bytes
 LINES_LIMIT = 5_000_000
 JOINT_LIMIT = 1_000
 FRAME_LIMIT = 1_000_000
-VALUE_LIMIT = 16_000_000  # numbers in one file; 128 MB as float64
+VALUE_LIMIT = 8_000_000  # numbers in one file
+ROTATION_LIMIT = 4_000_000  # frames × joints: 18 minutes of 31 joints at 120 frames per second
 MAGNITUDE_LIMIT = 1e7  # of a length or an angle in the file's own unit
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
@@ -119,6 +120,19 @@ def count(token: str, limit: int, what: str, path: Path, line: int) -> int:
     if not _COUNT.fullmatch(token) or int(token) > limit:
         raise MotionFileError(path, line, f"{what} is {quoted(token)}", f"a whole number up to {limit}")
     return int(token)
+
+
+def check_size(n_frames: int, n_joints: int, n_values: int, path: Path, line: int) -> None:
+    """Refuse motions without frames, and those too large to hold, before anything of that size is made.
+
+    Raises
+    ------
+    MotionFileError
+        If there are no frames or more than `FRAME_LIMIT`, `ROTATION_LIMIT` or `VALUE_LIMIT` allow.
+    """
+    if not 1 <= n_frames <= FRAME_LIMIT or n_frames * n_joints > ROTATION_LIMIT or n_values > VALUE_LIMIT:
+        limits = f"1 to {FRAME_LIMIT} frames, {ROTATION_LIMIT} rotations and {VALUE_LIMIT} numbers at most"
+        raise MotionFileError(path, line, f"{n_frames} frames of {n_joints} joints, {n_values} numbers", limits)
 
 
 def frame_rate(seconds: float, path: Path, line: int) -> float:

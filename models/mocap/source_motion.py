@@ -11,7 +11,7 @@ from models.mocap import quaternions
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SourceMotion:
     """Joint rotations and offsets per frame, in the file's own axes and unit of length.
 

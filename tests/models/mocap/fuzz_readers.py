@@ -1,7 +1,7 @@
 """Coverage-guided fuzzing of the readers: `python fuzz_readers.py -max_total_time=300` (libFuzzer's options).
 
-Any exception but the project's own ends the run and leaves the input in a `crash-…` file. Real files, where the folder of
-motion capture lies beside the project, and the tests' seeds start it off.
+Any exception but the project's own ends the run and leaves the input in a `crash-…` file. It starts from the tests'
+seeds and from real files, where the folder of motion capture lies beside the project.
 """
 
 import contextlib

@@ -160,6 +160,28 @@ def test_the_same_clip_in_two_units_gives_the_same_steps(mocap):
     np.testing.assert_allclose(pose_difference(small.poses[0], large.poses[0])[3:], 0.0, atol=0.01)
 
 
+AXES = [turn for turn in Rotation.create_group("O") if turn.magnitude() > 0.1]
+
+
+@pytest.mark.parametrize("turn", AXES[::4], ids=[str(turn.as_rotvec(degrees=True).round()) for turn in AXES[::4]])
+def test_any_axes_and_any_unit_give_the_same_clip(mocap, turn):
+    motion = read_motion(mocap / "snu/run.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    q = turn.as_quat(scalar_first=True)
+    other = replace(
+        motion,
+        offsets=100 * turn.apply(motion.offsets),
+        tips=100 * turn.apply(motion.tips),
+        translations=100 * quaternions.rotated(q, motion.translations),
+        rotations=quaternions.product(quaternions.product(q, motion.rotations), quaternions.conjugate(q)),
+    )
+    (clip, report), (same, turned) = retarget(motion, roles), retarget(other, roles)
+    np.testing.assert_allclose(pose_difference(clip.poses, same.poses), 0.0, atol=1e-9)
+    assert turned.scale == pytest.approx(report.scale / 100)
+    sign, axis = np.sign(turn.apply([0, 1, 0]).sum()), int(np.argmax(np.abs(turn.apply([0, 1, 0]))))
+    assert turned.up == f"{'+' if sign > 0 else '−'}{'XYZ'[axis]}"
+
+
 def test_junk_is_listed_and_does_not_take_a_part(mocap):
     _, report = load(mocap / "snu/kick.bvh")
     assert {"R_Foot", "R_Tibia", "L_Humerus", "Torso"} <= set(report.unused)
