@@ -8,16 +8,18 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.ground import Heights, ground_correction, ground_table
+from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.haptic_map.loops import Loop, checked_clip, closed_loop
 from controllers.haptic_map.mean import mean_derivative, mean_rotation
+from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
 
 CYLINDRICAL = 1
 _CLIPS = 4
-_SAMPLES, _CHANNELS, _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _DRIFT = range(7)
+_SAMPLES, _CHANNELS, _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _GROUND, _DRIFT = range(8)
 _ROWS = _DRIFT + 3 * _CLIPS
-LAP_X, LAP_Y, LAP_HEADING, LAST_ANGLE, LAPS, MEMORY = range(6)
 
 _MARGIN = 0.15  # share of the interval at each edge over which the blend eases in
 _AXIS = 1e-3  # [m] nearer to the axis the derivative stops growing
@@ -40,50 +42,14 @@ def eased(s: float) -> tuple[float, float]:
 
 
 @njit
-def sine_quotients(angle: float) -> tuple[float, float, float, float]:
-    """S = sin α/α, C = (1 − cos α)/α, and their derivatives: the planar exponential moves by [S −C; C S] v."""
-    if abs(angle) < 1e-2:
-        a2 = angle * angle
-        return (
-            1.0 - a2 / 6.0 + a2 * a2 / 120.0,
-            angle * (0.5 - a2 / 24.0 + a2 * a2 / 720.0),
-            angle * (-1.0 / 3.0 + a2 / 30.0),
-            0.5 - a2 / 8.0 + a2 * a2 / 144.0,
-        )
-    sine, cosine = np.sin(angle), np.cos(angle)
-    s, c = sine / angle, (1.0 - cosine) / angle
-    return s, c, (cosine - s) / angle, (sine - c) / angle
-
-
-@njit
-def _update_lap(memory: Array, angle: float, drift: Array) -> None:
-    """Carry the lap's frame A over the seam: A·exp(ξ) forwards, A·exp(−ξ) backwards."""
-    change = angle - memory[LAST_ANGLE]
-    memory[LAST_ANGLE] = angle
-    # False for NaN, the first tick.
-    if abs(change) > np.pi:
-        way = 1.0 if change < 0.0 else -1.0
-        s, c, _, _ = sine_quotients(way * drift[2])
-        x, y = way * (s * drift[0] - c * drift[1]), way * (c * drift[0] + s * drift[1])
-        cosine, sine = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
-        memory[LAP_X] += cosine * x - sine * y
-        memory[LAP_Y] += sine * x + cosine * y
-        memory[LAP_HEADING] += way * drift[2]
-        memory[LAPS] += way
-
-
-@njit
 def _interpolate(params: Array, angle: float, value: Array, slope: Array) -> None:
     """Channels of each clip and their derivatives by the angle, from uniform cubic B-splines."""
     samples, channels = int(params[_SAMPLES]), int(params[_CHANNELS])
     s = angle * samples / (2.0 * np.pi)
     row = min(int(s), samples - 1)
-    u = s - row
-    v, rate = 1.0 - u, samples / (2.0 * np.pi)
-    b0, b1, b3 = v * v * v / 6.0, (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, u * u * u / 6.0
-    b2 = 1.0 - b0 - b1 - b3
-    d0, d1, d3 = -0.5 * v * v * rate, (1.5 * u * u - 2.0 * u) * rate, 0.5 * u * u * rate
-    d2 = -d0 - d1 - d3
+    b0, b1, b2, b3 = basis(s - row)
+    d0, d1, d2, d3 = basis_slope(s - row)
+    rate = samples / (2.0 * np.pi)
     stride = _CLIPS * channels
     for clip in range(_CLIPS):
         first = _ROWS + row * stride + clip * channels
@@ -92,7 +58,7 @@ def _interpolate(params: Array, angle: float, value: Array, slope: Array) -> Non
         p2, p3 = params[first : first + channels], params[first + stride : first + stride + channels]
         for k in range(channels):
             value[clip, k] = b0 * p0[k] + b1 * p1[k] + b2 * p2[k] + b3 * p3[k]
-            slope[clip, k] = d0 * p0[k] + d1 * p1[k] + d2 * p2[k] + d3 * p3[k]
+            slope[clip, k] = rate * (d0 * p0[k] + d1 * p1[k] + d2 * p2[k] + d3 * p3[k])
 
 
 @njit
@@ -140,24 +106,27 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
             rho[1, k] += weights[i] * slope[i, k]
             rho[2, k] += changes[0, i] * value[i, k]
             rho[3, k] += changes[1, i] * value[i, k]
-    _update_lap(memory, angle, drift[0])
+    update_lap(memory, angle, drift[0])
+    if params[_GROUND] > 0.0:
+        lift, by_angle, by_a, by_b = ground_correction(params, int(params[_GROUND]), angle, a, b)
+        rho[0, 2] += lift
+        rho[1, 2] += by_angle
+        rho[2, 2] += by_a * a_slope
+        rho[3, 2] += by_b * b_slope
 
     # Root: A · exp(s ξ) · ρ, with s = θ/2π and the heading α = s ω + A's.
     s = angle / (2.0 * np.pi)
-    turn = s * drift[0, 2]
-    q_s, q_c, d_s, d_c = sine_quotients(turn)
-    heading = memory[LAP_HEADING] + turn
+    local, turn_rate = np.empty((3, 3)), np.empty(3)
+    ahead, left = drift_motion(drift, s, local, turn_rate)
+    heading = memory[LAP_HEADING] + s * drift[0, 2]
     lap_c, lap_s = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
     cosine, sine = np.cos(heading), np.sin(heading)
-    ahead, left = s * (q_s * drift[0, 0] - q_c * drift[0, 1]), s * (q_c * drift[0, 0] + q_s * drift[0, 1])
     pose[0] = memory[LAP_X] + lap_c * ahead - lap_s * left + cosine * rho[0, 0] - sine * rho[0, 1]
     pose[1] = memory[LAP_Y] + lap_s * ahead + lap_c * left + sine * rho[0, 0] + cosine * rho[0, 1]
     pose[2] = rho[0, 2]
     tangents = jacobian.shape[0] > 0
     # Columns: derivatives by θ, r, z; then the chain rule to the stylus.
-    local = np.empty((3, 3))
     chain = np.zeros((3, 3))
-    turn_rate = np.empty(3)
     if tangents:
         inside = max(radius, _AXIS)
         chain[0, 0], chain[0, 1] = -x[1] / (inside * inside), x[0] / (inside * inside)
@@ -165,15 +134,6 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         chain[2, 2] = 1.0
         jacobian[:] = 0.0
         for k in range(3):
-            if k == 0:
-                turn_rate[k] = drift[0, 2] / (2.0 * np.pi)
-                local[0, k] = (np.cos(turn) * drift[0, 0] - np.sin(turn) * drift[0, 1]) / (2.0 * np.pi)
-                local[1, k] = (np.sin(turn) * drift[0, 0] + np.cos(turn) * drift[0, 1]) / (2.0 * np.pi)
-            else:
-                turn_rate[k] = s * drift[k, 2]
-                e_s, e_c = d_s * turn_rate[k], d_c * turn_rate[k]
-                local[0, k] = s * (q_s * drift[k, 0] - q_c * drift[k, 1] + e_s * drift[0, 0] - e_c * drift[0, 1])
-                local[1, k] = s * (q_c * drift[k, 0] + q_s * drift[k, 1] + e_c * drift[0, 0] + e_s * drift[0, 1])
             rho_x, rho_y = rho[1 + k, 0] - turn_rate[k] * rho[0, 1], rho[1 + k, 1] + turn_rate[k] * rho[0, 0]
             v_x = lap_c * local[0, k] - lap_s * local[1, k] + cosine * rho_x - sine * rho_y
             v_y = lap_s * local[0, k] + lap_c * local[1, k] + sine * rho_x + cosine * rho_y
@@ -208,21 +168,13 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
             pose[column + j] = q[j]
 
 
-def _control_points(samples: Array) -> Array:
-    """B-spline coefficients of the periodic C² splines through samples (N, m, nq), shape (N + 3, m, nq).
-
-    A quaternion that comes back as −q has its spline closed with that sign.
-    """
-    n = len(samples)
-    signs = np.ones(samples.shape[1:])
-    for first in range(3, samples.shape[2], 4):
-        dots = (samples[-1, :, first : first + 4] * samples[0, :, first : first + 4]).sum(axis=1)
+def _closing_signs(channels: Array) -> Array:
+    """Signs (m, nq) with which remainders (N, m, nq) close: −1 for a quaternion that comes back as −q."""
+    signs = np.ones(channels.shape[1:])
+    for first in range(3, channels.shape[2], 4):
+        dots = (channels[-1, :, first : first + 4] * channels[0, :, first : first + 4]).sum(axis=1)
         signs[:, first : first + 4] = np.where(dots < 0.0, -1.0, 1.0)[:, None]
-    # Twice round the lap everything is periodic, and (c₋₁ + 4 c₀ + c₁)/6 = sample is a circular convolution.
-    response = (4.0 + 2.0 * np.cos(np.pi * np.arange(n + 1) / n)) / 6.0
-    spectrum = np.fft.rfft(np.concatenate([samples, signs * samples]), axis=0) / response[:, None, None]
-    control = np.fft.irfft(spectrum, 2 * n, axis=0)
-    return np.concatenate([control[-1:], control[: n + 2]])
+    return signs
 
 
 class Cylindrical(HapticMap):
@@ -248,6 +200,8 @@ class Cylindrical(HapticMap):
         (`closed_loop`), and all are aligned to the first in time (`alignment`).
     r_range, z_range : tuple of two floats
         Intervals [m] over which the clips blend; r_min > 0.
+    heights : Heights, optional
+        Heights of the points of a pose that may touch the ground, so that blends do not sink into it (see `ground`).
 
     Raises
     ------
@@ -260,6 +214,7 @@ class Cylindrical(HapticMap):
         clips: Sequence[tuple[Array, float]],
         r_range: tuple[float, float],
         z_range: tuple[float, float],
+        heights: Heights | None = None,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -277,9 +232,11 @@ class Cylindrical(HapticMap):
         self.r_range, self.z_range = r_range, z_range
         samples = int(np.clip(max(len(clip) for clip in poses) - 1, 64, 2048))
         channels = aligned_channels(self.loops, samples)
-        header = [samples, channels.shape[2], *r_range, *z_range]
         drifts = np.concatenate([loop.drift for loop in self.loops])
-        self._params = np.concatenate([header, drifts, _control_points(channels).ravel()])
+        rows = control_points(channels, _closing_signs(channels)).ravel()
+        table = np.zeros(0) if heights is None else ground_table(channels, heights)
+        header = [samples, channels.shape[2], *r_range, *z_range, 0.0 if heights is None else _ROWS + len(rows)]
+        self._params = np.concatenate([header, drifts, rows, table])
         self._nq = channels.shape[2]
 
     @property

@@ -1,0 +1,45 @@
+"""Uniform cubic B-splines round a lap: C² through samples, four rows to read wherever one is."""
+
+import numpy as np
+from numba import njit
+
+from controllers.state import Array
+
+
+@njit
+def basis(u: float) -> tuple[float, float, float, float]:
+    """Weights of the four control points of an interval at u in [0, 1]; their sum is 1."""
+    v = 1.0 - u
+    b0, b1, b3 = v * v * v / 6.0, (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, u * u * u / 6.0
+    return b0, b1, 1.0 - b0 - b1 - b3, b3
+
+
+@njit
+def basis_slope(u: float) -> tuple[float, float, float, float]:
+    """Derivatives of the four weights by u; their sum is 0."""
+    v = 1.0 - u
+    d0, d1, d3 = -0.5 * v * v, 1.5 * u * u - 2.0 * u, 0.5 * u * u
+    return d0, d1, -d0 - d1 - d3, d3
+
+
+def control_points(samples: Array, signs: Array) -> Array:
+    """Control points of the splines that meet samples at equal steps of the lap.
+
+    Parameters
+    ----------
+    samples : Array, shape (n, ...)
+    signs : Array
+        1 where the lap closes, −1 where it comes back with the opposite sign (a quaternion may); broadcasts.
+
+    Returns
+    -------
+    Array, shape (n + 3, ...)
+        Rows k to k + 3 belong to the interval from sample k to the next.
+    """
+    n = len(samples)
+    # Twice round the lap everything is periodic, and (c₋₁ + 4 c₀ + c₁)/6 = sample is a circular convolution.
+    response = (4.0 + 2.0 * np.cos(np.pi * np.arange(n + 1) / n)) / 6.0
+    spectrum = np.fft.rfft(np.concatenate([samples, signs * samples]), axis=0)
+    spectrum /= response.reshape(-1, *[1] * (samples.ndim - 1))
+    control = np.fft.irfft(spectrum, 2 * n, axis=0)
+    return np.concatenate([control[-1:], control[: n + 2]])
