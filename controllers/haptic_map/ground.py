@@ -3,11 +3,12 @@ r"""Blends stand on the ground: a correction of the height that makes up for ben
 The mean of a squat and a stance has legs longer than the mean height of their roots allows: its feet sink. With the
 soft minimum ℓ of the heights of the points that may touch the ground, the root of a blend is raised by
 
-.. math:: c(\theta, a, b) = \sum_i w_i \,\ell(h_i(\theta)) - \ell\bigl(\bar h(\theta, a, b)\bigr)
+.. math:: c(\theta, a, b) = f\bigl(\textstyle\sum_i w_i \,\ell(h_i(\theta))\bigr) - f\bigl(\ell(\bar h(\theta, a, b))\bigr)
 
-so the lowest point of the blend is as high as the clips' are on average; a clip alone is left as it is. What points
-these are is the caller's knowledge. c is tabulated: cubic B-splines round the lap, polynomials of degree 4 in the
-weights a and b.
+so the lowest point of the blend is as high as the clips' are on average; a clip alone is left as it is. f(x) = x
+below the ground and H tanh(x/H) above: in flight there is nothing to correct. What points these are is the caller's
+knowledge. c is smoothed over a sixty-fourth of the lap and tabulated: cubic B-splines round the lap, polynomials of
+degree 4 in the weights a and b.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,9 @@ Heights = Callable[[Array], Array]  # poses (n, nq) → heights above the ground
 
 _NODES = 5  # of each weight, 0, ¼, … 1
 _SAMPLES = 128
-_SOFTNESS = 0.005  # [m] of the minimum
+_SOFTNESS = 0.02  # [m] of the minimum
+_FLIGHT = 0.1  # [m] above which height no longer matters
+_BLUR = 2.0  # [samples] so that a change of feet does not jerk the pelvis
 
 
 # Coefficients of Lagrange's polynomials on the nodes: row k holds the powers 0…4 of the one that is 1 at node k.
@@ -72,6 +75,10 @@ def _soft_minimum(heights: Array) -> Array:
     return least - _SOFTNESS * np.log(np.exp((least[:, None] - heights) / _SOFTNESS).sum(axis=1))
 
 
+def _grounded(height: Array) -> Array:
+    return np.where(height < 0.0, height, _FLIGHT * np.tanh(height / _FLIGHT))
+
+
 def ground_table(channels: Array, heights: Heights) -> Array:
     """Table of c for four aligned loops, shape ((128 + 3) × 5 × 5,).
 
@@ -103,4 +110,7 @@ def ground_table(channels: Array, heights: Heights) -> Array:
     ease = np.stack([1.0 - nodes, nodes])
     corners = low[:, :: _NODES - 1, :: _NODES - 1]
     mean = np.einsum("nij,ia,jb->nab", corners, ease, ease)
-    return control_points(mean - low, np.ones(1)).ravel()
+    correction = _grounded(mean) - _grounded(low)
+    blur = np.exp(-0.5 * (2.0 * np.pi * _BLUR * np.fft.rfftfreq(_SAMPLES)) ** 2)
+    spectrum = np.fft.rfft(correction, axis=0) * blur[:, None, None]
+    return control_points(np.fft.irfft(spectrum, _SAMPLES, axis=0), np.ones(1)).ravel()
