@@ -6,6 +6,7 @@ where the toes' contact points are too low the ankle bends them up, about its ow
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
 
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
 from models.mocap import quaternions
@@ -14,11 +15,12 @@ Array = npt.NDArray[np.float64]
 
 _LEVEL = 0.06  # the four contact points of a sole that is level differ by less in height [m]
 _SHARE = 0.25  # of the supporting, level soles are at or below the floor
+_SMOOTHING = 0.02  # standard deviation of the window that smooths the bend of the toes [s]
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 _PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
 
 
-def on_the_floor(root: Array, segments: Array) -> tuple[Array, Array]:
+def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array]:
     """The motion shifted vertically, by one constant, onto the floor, with toes bent up where they would go through it.
 
     Parameters
@@ -27,6 +29,8 @@ def on_the_floor(root: Array, segments: Array) -> tuple[Array, Array]:
         Positions of the pelvis [m], z up.
     segments : array of shape (frames, 18, 4)
         Rotations of the segments in the world.
+    fps : float
+        Frames per second [1/s].
 
     Returns
     -------
@@ -39,6 +43,8 @@ def on_the_floor(root: Array, segments: Array) -> tuple[Array, Array]:
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
     floor = _floor(heights)
     bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
+    # A foot that points straight down leaves the floor at once, and its bend with it: faster than any ankle.
+    bend = gaussian_filter1d(bend, _SMOOTHING * fps, axis=0, mode="nearest")
     segments = segments.copy()
     segments[:, _FEET] = quaternions.product(feet, quaternions.about_axis(1, bend))
     return root - np.array([0.0, 0.0, floor]), segments

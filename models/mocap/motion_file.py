@@ -102,9 +102,10 @@ def numbers(tokens: list[str], path: Path, line: int) -> list[float]:
         values = [float(token) for token in tokens]
     except ValueError:
         return [number(token, path, line) for token in tokens]
-    # float() also takes underscores, the digits of other scripts and names of non-numbers: `number` refuses those.
+    # float() also takes underscores, the digits of other scripts, "nan" and "infinity": `number` refuses those.
     text = "".join(tokens)
-    if "_" in text or not text.isascii() or not all(abs(value) <= MAGNITUDE_LIMIT for value in values):
+    odd = "_" in text or "n" in text or "N" in text or not text.isascii()
+    if odd or max(map(abs, values), default=0.0) > MAGNITUDE_LIMIT:
         return [number(token, path, line) for token in tokens]
     return values
 

@@ -106,7 +106,7 @@ def retarget(motion: SourceMotion, roles: Roles) -> tuple[Clip, RetargetReport]:
     own_leg, leg = _leg_lengths(zero, roles, motion)
     hips = positions[:, [roles.segments["left_thigh"], roles.segments["right_thigh"]]].mean(axis=1)
     root = own_leg / leg * quaternions.rotated(axes, hips - hips[0])
-    clip = Clip(_poses(*on_the_floor(root, segments)), motion.fps, motion.path.stem)
+    clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     report = RetargetReport(
         {body: motion.joints[joint] for body, joint in roles.segments.items()},
         unused(roles, motion.joints),
