@@ -74,6 +74,8 @@ class Clip:
         if norms.min() < 1e-6:
             frame = int(np.argmin(norms.min(axis=(1, 2))))
             raise ModelError(f"clip {self.name!r}: frame {frame} has a zero quaternion; expected unit quaternions")
+        # A unit quaternion stays as it is, to the last bit, so that a clip made from a clip's poses is the same clip.
+        norms[np.abs(norms - 1.0) < 1e-14] = 1.0
         poses[:, 3:] = quaternions.sign_continuous(rotations / norms).reshape(len(poses), -1)
         object.__setattr__(self, "poses", poses)
 
