@@ -62,8 +62,8 @@ def groups(servo: Servo) -> dict[str, Group]:
     ticks = Group(
         1.0 / plant.period,
         {
-            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "field": (6,), "force": (3,), "user": (3,),
-            "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "ctrl": (len(plant.ctrl),),
+            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "field": (6,), "force": (3,),
+            "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "ctrl": (len(plant.ctrl),),
             "applied": (plant.substeps, 3), "residual": (6,),
         },
     )  # fmt: skip
@@ -77,6 +77,10 @@ def groups(servo: Servo) -> dict[str, Group]:
     return {"ticks": ticks, "frames": frames}
 
 
+Observer = Callable[[TickLog, FrameLog, int], None]
+"""Called after each block with its logs and the number of ticks in them; the logs are used again."""
+
+
 class Loop:
     """A servo and its world, run block by block.
 
@@ -86,14 +90,14 @@ class Loop:
         See `sim.servo`.
     world : World
         Whose addresses the servo holds; kept alive here.
-    recorder : Recorder, optional
-        Made with `groups`.
+    observe : Observer, optional
+        What is done with each block, such as `record_into`.
     """
 
-    def __init__(self, servo: Servo, world: World, recorder: Recorder | None = None):
-        self.servo, self.world, self.recorder = servo, world, recorder
-        self._block = servo.figure_ticks * max(1, round(BLOCK_SECONDS / servo.plant.period / servo.figure_ticks))
-        self._root = int(world.model.joint(FIGURE + "root").qposadr[0])
+    def __init__(self, servo: Servo, world: World, observe: Observer = lambda ticks, frames, n: None):
+        self.servo, self.world, self._observe = servo, world, observe
+        every = servo.figure_ticks
+        self._block = every * max(1, round(BLOCK_SECONDS / servo.plant.period / every))
         self._tick = 0
 
     @property
@@ -111,8 +115,7 @@ class Loop:
         progress : callable
             Called with the simulated time after every block.
         """
-        plant = self.servo.plant
-        every = self.servo.figure_ticks
+        plant, every = self.servo.plant, self.servo.figure_ticks
         wanted = every * round(seconds / (plant.period * every))
         ticks, frames = make_logs(self.servo, self._block)
         first, begin = self._tick, time.perf_counter()
@@ -120,38 +123,43 @@ class Loop:
             n = min(self._block, first + wanted - self._tick)
             run_block(self.servo, self._tick, n, False, ticks, frames)
             self._tick += n
-            if self.recorder is not None:
-                self._record(self.recorder, ticks, frames, n)
+            self._observe(ticks, frames, n)
             progress(self.time)
         return RunTimes(wanted * plant.period, time.perf_counter() - begin)
 
-    def _record(self, recorder: Recorder, ticks: TickLog, frames: FrameLog, n: int) -> None:
-        m = -(-n // self.servo.figure_ticks)
-        hand = ticks.hand[:n]
-        recorder.append(
-            "ticks",
-            {
-                "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
-                "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
-                "phase": ticks.trace[:n, TRACE_PHASE],
-                "nearest": ticks.trace[:n, TRACE_POINT : TRACE_POINT + 3], "distance": ticks.trace[:n, TRACE_DISTANCE],
-                "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
-            },
-        )  # fmt: skip
-        poses, reference, report = (
-            frames.qpos[:m, self._root : self._root + N_POSE],
-            frames.reference[:m],
-            frames.report[:m],
-        )
-        joint_error, root_error = pose_errors(poses, reference)
-        recorder.append(
-            "frames",
-            {
-                "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joint_error": joint_error,
-                "root_error": root_error, "residual": report[:, 2:], "ground": frames.ground[:m],
-                "flight": (report[:, 0] == 0.0).astype(np.float64), "saturated": report[:, 1],
-            },
-        )  # fmt: skip
+
+def record_into(recorder: Recorder, servo: Servo, world: World) -> Observer:
+    """An observer that appends every block to a recorder made with `groups`."""
+    root = int(world.model.joint(FIGURE + "root").qposadr[0])
+
+    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        recorder.append("ticks", tick_channels(ticks, n))
+        recorder.append("frames", frame_channels(frames, -(-n // servo.figure_ticks), root))
+
+    return observe
+
+
+def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
+    """The first n ticks of a block by channel."""
+    hand, trace = ticks.hand[:n], ticks.trace[:n]
+    return {
+        "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
+        "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
+        "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
+        "distance": trace[:, TRACE_DISTANCE], "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n],
+        "residual": ticks.residual[:n],
+    }  # fmt: skip
+
+
+def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
+    """The first m figure updates of a block by channel; `root` is where the figure's pose stands in qpos."""
+    reference, report = frames.reference[:m], frames.report[:m]
+    joint_error, root_error = pose_errors(frames.qpos[:m, root : root + N_POSE], reference)
+    return {
+        "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joint_error": joint_error,
+        "root_error": root_error, "residual": report[:, 2:8], "ground": frames.ground[:m],
+        "flight": (report[:, 0] == 0.0).astype(np.float64), "saturated": report[:, 1],
+    }  # fmt: skip
 
 
 def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from typing import Self
 
 from controllers.state import HandState, Vec3
 from sim.devices.base import DeviceError, checked_force
-from sim.recorder import Recording
+from sim.recording import Recording
 
 
 class ReplayDevice:

@@ -1,0 +1,165 @@
+"""The ``hvf`` command: haptic vector fields from the command line."""
+
+import time
+
+_STARTED = time.perf_counter()
+
+import sys  # noqa: E402
+from collections.abc import Sequence  # noqa: E402
+from dataclasses import dataclass, field  # noqa: E402
+from pathlib import Path  # noqa: E402
+from typing import Annotated  # noqa: E402
+
+import tyro  # noqa: E402
+
+from controllers.errors import ControllerError  # noqa: E402
+from experiments.wiring import RunConfig  # noqa: E402
+from models.errors import ModelError  # noqa: E402
+from sim.errors import SimError  # noqa: E402
+
+Positional = tyro.conf.Positional
+
+
+@dataclass(frozen=True)
+class Run:
+    """Run a hand, a field, a map and a figure, and write what happened into a folder."""
+
+    config: tyro.conf.OmitArgPrefixes[RunConfig] = field(default_factory=RunConfig)
+    out: Path = Path("runs/run")
+    """Folder to write."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.run import run
+
+        run(self.config, self.out, self.overwrite, _STARTED)
+        return 0
+
+
+@dataclass(frozen=True)
+class Demo:
+    """The four-clip cylinder of the paper's Fig. 3: two relaxed laps, then one with pushes outwards and inwards."""
+
+    out: Path = Path("runs/demo")
+    """Folder to write."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.demo import demo_config
+        from experiments.run import run
+
+        run(demo_config(), self.out, self.overwrite, _STARTED)
+        return 0
+
+
+@dataclass(frozen=True)
+class Convert:
+    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH."""
+
+    source: Positional[Path]
+    """Motion file to read."""
+    target: Positional[Path]
+    """BVH file to write."""
+    overwrite: bool = False
+    """Replace the target if it exists."""
+
+    def __call__(self) -> int:
+        """Convert, and say what the file was taken for."""
+        from models.mocap.library import convert
+
+        report = convert(self.source, self.target, overwrite=self.overwrite).report
+        for line in report.lines() if report else ("the figure's own skeleton: nothing to retarget",):
+            print(line)
+        return 0
+
+
+@dataclass(frozen=True)
+class Track:
+    """Let the physical figure follow clips on its own, and report how well it does."""
+
+    clips: Positional[tuple[str, ...]] = ()
+    """Names of embedded clips, or files; all embedded clips by default."""
+    seconds: float = 10.0
+    """Simulated time for each [s]."""
+    json: bool = False
+    """Print the reports as JSON."""
+
+    def __call__(self) -> int:
+        """Track."""
+        from experiments.track import track_clips
+
+        track_clips(self.clips, self.seconds, self.json)
+        return 0
+
+
+@dataclass(frozen=True)
+class Report:
+    """Draw the figures and the page of a run again, from its recording."""
+
+    folder: Positional[Path]
+    """Folder of a run."""
+
+    def __call__(self) -> int:
+        """Draw."""
+        from experiments.run import write_report_of
+
+        write_report_of(self.folder)
+        return 0
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Run a recording's configuration again and compare, bit for bit."""
+
+    folder: Positional[Path]
+    """Folder of a run."""
+
+    def __call__(self) -> int:
+        """Exit code 0 if every tick is the same, 1 if not."""
+        from experiments.reproduce import reproduce
+
+        return reproduce(self.folder)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure speed, as ratios within one run."""
+
+    def __call__(self) -> int:
+        """Measure."""
+        from experiments.benchmarks import bench
+
+        bench()
+        return 0
+
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Convert, tyro.conf.subcommand("convert")]
+    | Annotated[Track, tyro.conf.subcommand("track")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; bad input is one line on stderr and exit code 2."""
+    command: Command = tyro.cli(Command, prog="hvf", args=arguments, description=__doc__)  # pyright: ignore[reportArgumentType, reportUnknownVariableType, reportCallIssue]
+    try:
+        return command()
+    except (ModelError, ControllerError, SimError, OSError) as error:
+        print(f"hvf: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("hvf: stopped; what was recorded so far is kept", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+"""Whether a recorded run happens again, bit for bit, from its recorded configuration."""
+
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from experiments.run import RECORDING, clips_of, config_of
+from experiments.wiring import wire
+from sim.loop import Loop, tick_channels
+from sim.recording import Recording
+from sim.servo import FrameLog, TickLog
+
+
+class _Comparison:
+    """Compares the blocks of a run with a recording as they come; keeps the first difference."""
+
+    def __init__(self, recording: Recording):
+        self._recording = recording
+        self.rows = 0
+        self.difference: str | None = None
+
+    def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
+        for name, block in tick_channels(ticks, n).items():
+            recorded = self._recording.channel("ticks", name)[self.rows : self.rows + n]
+            same = np.equal(recorded, block[: len(recorded)]) | (np.isnan(recorded) & np.isnan(block[: len(recorded)]))
+            if self.difference is None and not np.all(same):
+                row = int(np.argmin(np.all(same.reshape(len(same), -1), axis=1)))
+                self.difference = f"{name} differs first at tick {self.rows + row}"
+        self.rows += n
+
+
+def reproduce(folder: Path) -> int:
+    """Run a recording's configuration again, say whether every tick is the same, and return an exit code."""
+    with Recording(folder / RECORDING) as recording:
+        for package, recorded in recording.versions.items():
+            if package != "python" and version(package) != recorded:
+                print(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+        config = config_of(recording)
+        session = wire(config, clips_of(recording))
+        comparison = _Comparison(recording)
+        recorded_ticks = len(recording.channel("ticks", "t"))
+        Loop(session.servo, session.world, comparison).run(recorded_ticks * session.servo.plant.period)
+    if comparison.difference is not None:
+        print(f"not the same: {comparison.difference}")
+        return 1
+    print(f"the same, bit for bit, over {recorded_ticks} ticks")
+    return 0

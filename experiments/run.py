@@ -1,0 +1,185 @@
+"""A run from a configuration to a folder: recording, summary, animations, figures, page."""
+
+import json
+import resource
+import shutil
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from experiments.summary import RunSummary, SpeedSummary, summarise
+from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from models.mocap.bvh import write_bvh
+from models.mocap.clip import Clip
+from models.scene import SceneConfig, world_model
+from sim.compiled import is_cached
+from sim.errors import SimError
+from sim.loop import Loop, groups, record_into
+from sim.recorder import Recorder
+from sim.recording import Recording
+from sim.reference import poses_along
+from sim.users.intent import Push
+
+Array = npt.NDArray[np.float64]
+
+RECORDING, SUMMARY, REPORT, EDITED, DEFAULT, FIGURES = (
+    "run.h5",
+    "summary.json",
+    "report.html",
+    "edited.bvh",
+    "default.bvh",
+    "figures",
+)
+BVH_FPS = 50.0
+
+
+def run(config: RunConfig, out: Path, overwrite: bool, started: float) -> RunSummary:
+    """Run and write everything into a folder.
+
+    Parameters
+    ----------
+    config : RunConfig
+        What to run.
+    out : Path
+        Folder; made when it is missing.
+    overwrite : bool
+        Whether a run that it holds may be replaced.
+    started : float
+        `time.perf_counter` when the program began.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If something about the configuration or a file is wrong; the folder is then as it was.
+    """
+    console = Console(stderr=True)
+    check_folder(out, overwrite)
+    clips, remarks = load_clips(config.clips)
+    session = wire(config, clips, remarks)
+    for remark in remarks:
+        console.print(remark, highlight=False)
+    if not is_cached():
+        console.print("Compiling the servo loop; this happens once for each version of the code.")
+    clear_folder(out)
+    with Recorder(
+        out / RECORDING, config_dict(config), config.seed, groups(session.servo), session.static()
+    ) as recorder:
+        speed = _simulate(session, recorder, console, started)
+        recorder.flush()
+        default, summary = _measure(out, session, speed)
+        told = asdict(summary) | {"lines": summary.lines()}
+        recorder.close(told)
+    _write_animations(out, default)
+    (out / SUMMARY).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    write_report_of(out)
+    for line in summary.lines():
+        print(line)
+    console.print(f"Written to {out}: {REPORT} (open it in a browser), {EDITED}, {DEFAULT}, {SUMMARY}, {RECORDING}.")
+    return summary
+
+
+def check_folder(out: Path, overwrite: bool) -> None:
+    """Refuse a folder that cannot be written, or whose run may not be replaced."""
+    if out.exists() and not out.is_dir():
+        raise SimError(f"{out}: is a file; expected a folder to write the run into")
+    if (out / RECORDING).exists() and not overwrite:
+        raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
+
+
+def clear_folder(out: Path) -> None:
+    """Make the folder, and remove what an earlier run left in it; other files stay."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name in (RECORDING, SUMMARY, REPORT, EDITED, DEFAULT):
+        (out / name).unlink(missing_ok=True)
+    shutil.rmtree(out / FIGURES, ignore_errors=True)
+
+
+def config_dict(config: RunConfig) -> dict[str, object]:
+    """The configuration as JSON takes it."""
+    return asdict(config)
+
+
+def config_of(recording: Recording) -> RunConfig:
+    """The configuration of a recording.
+
+    Raises
+    ------
+    SimError
+        If it is of another version of the program.
+    """
+    values = dict(recording.config)
+    try:
+        values["scene"] = SceneConfig(**values["scene"])  # pyright: ignore[reportCallIssue]
+        values["pushes"] = tuple(Push(**push) for push in values["pushes"])  # pyright: ignore
+        values["clips"] = tuple(values["clips"])  # pyright: ignore[reportArgumentType]
+        return RunConfig(**values)  # pyright: ignore[reportArgumentType]
+    except (TypeError, KeyError) as error:
+        raise SimError(f"the recording's configuration is of another version of the program ({error})") from None
+
+
+def clips_of(recording: Recording) -> tuple[Clip, ...]:
+    """The clips of a recording, as they were on the figure."""
+    names = recording.texts["clip_names"].split("\n")
+    rates = recording.array("clip_fps")
+    return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
+
+
+def _simulate(session: Session, recorder: Recorder, console: Console, started: float) -> SpeedSummary:
+    loop = Loop(session.servo, session.world, record_into(recorder, session.servo, session.world))
+    seconds = session.config.seconds
+    first = session.servo.plant.period * session.servo.figure_ticks
+    loop.run(first)
+    first_tick = time.perf_counter() - started
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
+        TimeRemainingColumn(), console=console,
+    ) as bar:  # fmt: skip
+        task = bar.add_task("simulating", total=seconds)
+        times = loop.run(seconds - first, lambda t: bar.update(task, completed=t))
+    return SpeedSummary(times.real_time_factor, first_tick, _peak_memory_mb())
+
+
+def _peak_memory_mb() -> float:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
+
+
+def _measure(out: Path, session: Session, speed: SpeedSummary) -> tuple[Array, RunSummary]:
+    """Poses at the nearest points of the curve, frame by frame, and the summary."""
+    with Recording(out / RECORDING) as recording:
+        stride = session.servo.figure_ticks
+        nearest = recording.channel("ticks", "nearest")[::stride]
+        compiled = session.haptic_map.compiled()
+        default = np.empty((len(nearest), session.haptic_map.nq))
+        poses_along(compiled.kind, compiled.params, compiled.memory, stylus_path(nearest), default)
+        return default, summarise(recording, default, speed, session.world.warnings())
+
+
+def _write_animations(out: Path, default: Array) -> None:
+    with Recording(out / RECORDING) as recording:
+        reference = recording.channel("frames", "reference")
+        stride = max(1, round(recording.rates["frames"] / BVH_FPS))
+        fps = recording.rates["frames"] / stride
+        write_bvh(Clip(reference[::stride], fps, "edited"), out / EDITED)
+        write_bvh(Clip(default[::stride], fps, "default"), out / DEFAULT)
+
+
+def write_report_of(folder: Path) -> None:
+    """Draw the figures and the page of a run from its recording."""
+    from experiments.figures import draw_figures
+    from experiments.report import write_report
+
+    with Recording(folder / RECORDING) as recording:
+        if recording.summary is None:
+            raise SimError(f"{folder}: the run did not come to its end; there is no summary to report")
+        config = config_of(recording)
+        figures = draw_figures(recording, folder / FIGURES)
+        lines = recording.summary["lines"]
+        title = f"{config.mode.upper()} over {', '.join(config.clips)}"
+        write_report(folder / REPORT, recording, world_model(config.scene), title, lines, figures)  # pyright: ignore
