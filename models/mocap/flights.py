@@ -25,12 +25,15 @@ FPS = 120.0
 _HIP = 0.0875  # from the middle to a hip [m]: the feet stand below the hips
 # Symmetric degrees of freedom, and what a radian (metre) of distance from the sketch costs.
 _ACTIVE = (
-    ("position", "x", 0.3), ("position", "z", 0.3), ("root", "y", 1.0), ("abdomen", "y", 4.0), ("chest", "y", 4.0),
+    ("position", "x", 0.3), ("position", "z", 0.3), ("root", "y", 0.5), ("abdomen", "y", 4.0), ("chest", "y", 4.0),
     ("head", "y", 6.0), ("left_clavicle", "x", 8.0), ("left_clavicle", "z", 8.0), ("left_shoulder", "x", 4.0),
     ("left_shoulder", "y", 4.0), ("left_shoulder", "z", 4.0), ("left_elbow", "z", 4.0), ("left_hip", "y", 2.0),
     ("left_knee", "y", 2.0), ("left_ankle", "y", 2.0),
 )  # fmt: skip
 _COLUMNS = [coordinate(joint, axis) for joint, axis, _ in _ACTIVE]
+
+
+_ROUGH = Weights(force=3.0, moment=6.0, flight=1.0, slip=100.0, depth=50.0, limit=20.0, strain=1.0)
 
 
 class Key(NamedTuple):
@@ -121,7 +124,7 @@ JUMP = Flight(
         _stand(2.2, 0.35),
         _stand(2.4, 0.35),
     ),
-    off=(0.82, 0.94), down=(1.45, 1.40), travel=0.35, intervals=48, weights=Weights(),
+    off=(0.82, 0.94), down=(1.45, 1.40), travel=0.35, intervals=48, weights=Weights(flight=10.0),
 )  # fmt: skip
 
 BACKFLIP = Flight(
@@ -129,18 +132,19 @@ BACKFLIP = Flight(
     keys=(
         _stand(0.0, 0.0),
         _stand(0.2, 0.0),
-        Key(0.62, 78, 86, 26, 24, 14, -18, _BACK, (-0.10, 0.66)),
-        Key(0.90, -8, 10, -36, -18, -14, -14, Arm(raised=150, plane=12, elbow=12), (-0.02, 1.02)),
-        Key(1.06, 70, 80, -25, -75, 10, 5, Arm(raised=100, plane=15, elbow=30), (-0.08, 1.38)),
-        Key(1.18, 122, 132, -15, -150, 40, 18, Arm(raised=42, plane=20, elbow=80), (-0.14, 1.52)),
-        Key(1.34, 122, 132, -15, -250, 40, 18, Arm(raised=42, plane=20, elbow=80), (-0.20, 1.45)),
-        Key(1.46, 60, 60, -15, -312, 15, 0, Arm(raised=60, plane=15, elbow=30), (-0.24, 1.22)),
-        Key(1.58, 40, 26, -4, -340, 5, -8, Arm(raised=65, plane=20, elbow=22), (-0.28, 0.98)),
-        Key(1.84, 86, 88, 27, -334, 20, -22, Arm(raised=58, plane=20, elbow=25), (-0.34, 0.64)),
-        _stand(2.4, -0.25, -360.0),
-        _stand(2.6, -0.25, -360.0),
+        Key(0.66, 84, 90, 28, 26, 16, -20, _BACK, (-0.10, 0.63)),
+        Key(1.00, -8, 10, -36, -16, -12, -14, Arm(raised=150, plane=12, elbow=12), (-0.02, 1.02)),
+        Key(1.15, 75, 80, -25, -75, 10, 5, Arm(raised=100, plane=15, elbow=30), (-0.08, 1.38)),
+        Key(1.26, 112, 122, -15, -150, 38, 18, Arm(raised=45, plane=20, elbow=75), (-0.14, 1.50)),
+        Key(1.44, 112, 122, -15, -255, 38, 18, Arm(raised=45, plane=20, elbow=75), (-0.20, 1.42)),
+        Key(1.57, 65, 60, -15, -315, 18, 0, Arm(raised=60, plane=15, elbow=30), (-0.24, 1.20)),
+        Key(1.68, 45, 26, -4, -338, 8, -8, Arm(raised=65, plane=20, elbow=22), (-0.28, 0.98)),
+        Key(1.94, 86, 88, 27, -334, 20, -22, Arm(raised=58, plane=20, elbow=25), (-0.34, 0.64)),
+        _stand(2.5, -0.25, -360.0),
+        _stand(2.7, -0.25, -360.0),
     ),
-    off=(0.80, 0.90), down=(1.62, 1.58), travel=-0.25, intervals=52, weights=Weights(jerk=2e-5),
+    off=(0.90, 1.00), down=(1.73, 1.68), travel=-0.25, intervals=60,
+    weights=Weights(force=30.0, moment=60.0, flight=7.0, slip=600.0, depth=800.0, jerk=2e-5),
 )  # fmt: skip
 
 
@@ -164,13 +168,13 @@ def _stances(flight: Flight) -> list[Stance]:
     for sphere, (name, (x, across, _)) in enumerate(zip(FOOT_CONTACTS, soles(), strict=True)):
         part = int("toe" in name)
         y = across + (_HIP if name.startswith("left") else -_HIP)
-        stances.append(Stance(sphere, 0.0, flight.off[part], (x, y)))
-        stances.append(Stance(sphere, flight.down[part], flight.keys[-1].time, (x + flight.travel, y)))
+        stances.append(Stance(sphere, -np.inf, flight.off[part], (x, y)))
+        stances.append(Stance(sphere, flight.down[part], np.inf, (x + flight.travel, y)))
     return stances
 
 
-def task(flight: Flight) -> Task:
-    """The whole flight as a task for the spacetime optimisation."""
+def task(flight: Flight, weights: Weights) -> Task:
+    """The whole flight as a task for the spacetime optimisation, from push-off to recovery."""
     frames = 3 * flight.intervals
     duration = flight.keys[-1].time
     columns = np.eye(N_TANGENT)[:, _COLUMNS]
@@ -179,13 +183,17 @@ def task(flight: Flight) -> Task:
         duration=duration, intervals=flight.intervals, embed=embed, mirror=None, speed=0.0,
         sketch=_sketch(flight.keys, np.arange(frames) * duration / frames)[:, _COLUMNS],
         tracking=np.tile([cost for _, _, cost in _ACTIVE], (frames, 1)), stances=_stances(flight),
-        clearance=np.zeros((frames, len(FOOT_CONTACTS))), weights=flight.weights,
+        clearance=np.zeros((frames, len(FOOT_CONTACTS))), weights=weights,
     )  # fmt: skip
 
 
 def _clip(flight: Flight) -> Clip:
-    motion = Motion(task(flight))
-    motion.solve(60)
+    # Straight from the sketch to the true weights there are poor minima on the way; a rough solution avoids them.
+    rough = Motion(task(flight, _ROUGH))
+    rough.solve(40, 1e-3)
+    motion = Motion(task(flight, flight.weights))
+    motion.unknowns = rough.unknowns
+    motion.solve(80, 3e-5)
     frames = round(flight.keys[-1].time * FPS) + 1
     return Clip(poses(motion.coordinates(np.arange(frames) / FPS)), FPS, flight.name)
 

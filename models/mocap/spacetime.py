@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STRONG = 0.9  # share of the joints' largest torques beyond which effort counts as strain
+_LAG = 0.012  # a sphere stands this long before and after it pushes [s]: no force without touch
 _MARGIN = 0.02  # to the joints' limits [rad]
 
 
@@ -54,7 +55,7 @@ class Weights(NamedTuple):
     force, moment : float
         Residual force, per body weight; residual moment, per body weight × metre.
     flight : float
-        Factor on both while nothing stands.
+        Factor on both while nothing pushes.
     slip, depth : float
         Displacement of a standing sphere, depth of a swinging one below its clearance [1/m].
     limit : float
@@ -70,7 +71,7 @@ class Weights(NamedTuple):
     flight: float = 5.0
     slip: float = 300.0
     depth: float = 200.0
-    limit: float = 50.0
+    limit: float = 150.0
     effort: float = 0.4
     strain: float = 10.0
     sway: float = 3e-3
@@ -197,11 +198,13 @@ class Motion:
         self._maps = [(design @ self._expand).reshape(frames, n, -1) for design in designs]
         self._offsets = [(design @ self._ends.ravel()).reshape(frames, n) for design in designs]
         self._reach = [np.flatnonzero(np.any(rows, axis=0)) for rows in self._maps[0]]
-        self._standing = np.zeros((frames, 8), dtype=bool)
+        self._standing, self._pushing = np.zeros((frames, 8), dtype=bool), np.zeros((frames, 8), dtype=bool)
         self._places = np.full((frames, 8, 3), CONTACT_RADIUS)
         for stance in task.stances:
             now = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
             self._standing[now, stance.sphere] = True
+            firm = (task.times > stance.start + _LAG) & (task.times < stance.end - _LAG)
+            self._pushing[firm, stance.sphere] = True
             self._places[now, stance.sphere, :2] = stance.place
         misfit = (task.sketch - self._offsets[0]).ravel()
         self.unknowns: Array = np.linalg.lstsq(self._maps[0].reshape(frames * n, -1), misfit, rcond=None)[0]
@@ -220,14 +223,14 @@ class Motion:
         u[:, 0] += task.speed * task.times[frames]
         du[:, 0] += task.speed
         demand = self.floor.demand(*states(u, du, ddu))
-        standing = self._standing[frames]
+        standing, pushing = self._standing[frames], self._pushing[frames]
         if answer is None:
-            grip = self.floor.grip(demand, standing)
+            grip = self.floor.grip(demand, pushing)
         else:
             held = answer.grip[frames]
             grip = held + np.einsum("mij,mj->mi", answer.gain[frames], residual(demand, held) - answer.residual[frames])
         missing = residual(demand, grip)
-        scale = np.where(standing.any(axis=1), 1.0, w.flight)[:, None] / self.floor.body_weight
+        scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / self.floor.body_weight
         slip = w.slip * standing[:, :, None] * (demand.spheres - self._places[frames])
         low = demand.spheres[:, :, 2] - CONTACT_RADIUS - task.clearance[frames]
         share = demand.torque_on(grip) / torque_limit()

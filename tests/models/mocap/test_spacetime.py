@@ -1,0 +1,147 @@
+"""Coordinates, floor forces and the spacetime optimisation, against MuJoCo and differences."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from models.errors import ModelError
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model, rest_pose
+from models.mocap import flights, gait
+from models.mocap.coordinates import coordinate, poses, reflection, states
+from models.mocap.floor_forces import Floor, residual
+from models.mocap.spacetime import Motion, Task
+
+STANDING = np.ones((1, 8), dtype=bool)
+
+
+@pytest.fixture(scope="module")
+def figure():
+    model = figure_model()
+    return model, mujoco.MjData(model)
+
+
+def random_state(rng, scale=0.6):
+    u = scale * rng.standard_normal((4, N_TANGENT))
+    return u, 2 * rng.standard_normal((4, N_TANGENT)), 10 * rng.standard_normal((4, N_TANGENT))
+
+
+def test_states_agree_with_mujocos_differences(figure):
+    model, _ = figure
+    u, du, ddu = random_state(np.random.default_rng(0))
+    q, v, a = states(u, du, ddu)
+    h = 1e-5
+    for k in range(len(u)):
+
+        def pose(t, k=k):
+            return poses(u[k] + t * du[k] + t * t / 2 * ddu[k])
+
+        ahead, behind = np.empty(N_TANGENT), np.empty(N_TANGENT)
+        mujoco.mj_differentiatePos(model, ahead, h, pose(0), pose(h))
+        mujoco.mj_differentiatePos(model, behind, h, pose(-h), pose(0))
+        np.testing.assert_allclose(q[k], pose(0))
+        np.testing.assert_allclose(v[k], (ahead + behind) / 2, atol=1e-4)
+        np.testing.assert_allclose(a[k], (ahead - behind) / h, atol=5e-3)
+
+
+def test_reflected_coordinates_are_the_mirror_image(figure):
+    model, data = figure
+    u = 0.4 * np.random.default_rng(1).standard_normal(N_TANGENT)
+    bodies = []
+    for coordinates in (u, reflection() @ u):
+        data.qpos[:] = poses(coordinates)
+        mujoco.mj_kinematics(model, data)
+        bodies.append({model.body(i).name: data.xpos[i].copy() for i in range(1, model.nbody)})
+    swap = {"left": "right", "right": "left"}
+    for name, place in bodies[0].items():
+        side, _, rest = name.partition("_")
+        twin = f"{swap[side]}_{rest}" if side in swap else name
+        np.testing.assert_allclose(bodies[1][twin], place * (1, -1, 1), atol=1e-12)
+
+
+def test_an_unknown_coordinate_is_named():
+    assert coordinate("left_knee", "y") == 3 * (2 + 12) + 1
+    with pytest.raises(ModelError, match="tail"):
+        coordinate("tail", "x")
+
+
+def test_floor_carries_a_figure_that_stands():
+    floor = Floor()
+    zero = np.zeros((1, N_TANGENT))
+    demand = floor.demand(rest_pose()[None], zero, zero)
+    grip = floor.grip(demand, STANDING)
+    assert np.abs(residual(demand, grip)).max() < 0.1
+    assert grip.min() >= 0
+    assert grip.sum() == pytest.approx(floor.body_weight, rel=1e-3)
+
+
+def test_floor_gives_nothing_to_a_figure_in_the_air_and_cannot_pull():
+    floor = Floor()
+    zero = np.zeros((1, N_TANGENT))
+    demand = floor.demand(rest_pose()[None], zero, zero)
+    np.testing.assert_array_equal(floor.grip(demand, ~STANDING), 0)
+    falling = zero.copy()
+    falling[0, 2] = -3 * 9.81
+    demand = floor.demand(rest_pose()[None], zero, falling)
+    left = residual(demand, floor.grip(demand, STANDING))
+    assert left[0, 2] == pytest.approx(-2 * floor.body_weight, rel=1e-6)
+
+
+def test_friction_is_bounded():
+    floor = Floor()
+    zero, sideways = np.zeros((1, N_TANGENT)), np.zeros((1, N_TANGENT))
+    sideways[0, 1] = 3 * 9.81
+    demand = floor.demand(rest_pose()[None], zero, sideways)
+    left = residual(demand, floor.grip(demand, STANDING))
+    assert np.linalg.norm(left[0, :3]) > 0.5 * floor.body_weight
+
+
+def test_torques_agree_with_mujocos_contact_jacobian(figure):
+    model, data = figure
+    rng = np.random.default_rng(2)
+    q, v, a = states(*random_state(rng, 0.3))
+    floor = Floor()
+    demand = floor.demand(q, v, a)
+    grip = rng.uniform(0, 200, (4, 32))
+    torque = demand.torque_on(grip)
+    edges = demand.columns()[0, :3, :4].T
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+        mujoco.mj_inverse(model, data)
+        wanted = data.qfrc_inverse.copy()
+        for sphere, name in enumerate(FOOT_CONTACTS):
+            geom = model.geom(name)
+            jacobian = np.empty((3, N_TANGENT))
+            point = data.geom_xpos[geom.id] - (0, 0, CONTACT_RADIUS)
+            mujoco.mj_jac(model, data, jacobian, None, point, geom.bodyid[0])
+            wanted -= jacobian.T @ (grip[k, 4 * sphere : 4 * sphere + 4] @ edges)
+        np.testing.assert_allclose(torque[k], wanted[6:], atol=1e-8)
+        at_com = residual(demand, grip)[k]
+        np.testing.assert_allclose(at_com[:3], wanted[:3], atol=1e-8)
+
+
+def test_gauss_newton_gradient_agrees_with_differences():
+    motion = Motion(gait.task(gait.WALK))
+    motion.solve(6)
+    errors = motion.errors(motion.unknowns)
+    _, gradient = motion._normal_equations(errors)
+    direction = np.random.default_rng(3).standard_normal(len(gradient))
+    direction /= np.linalg.norm(direction)
+    h = 1e-6
+    costs = [0.5 * np.sum(motion.errors(motion.unknowns + s * h * direction).weighted ** 2) for s in (1, -1)]
+    assert gradient @ direction == pytest.approx((costs[0] - costs[1]) / (2 * h), rel=0.03)
+
+
+def test_solving_lowers_the_cost_at_every_iteration_and_keeps_the_ends_at_rest():
+    motion = Motion(flights.task(flights.JUMP, flights.JUMP.weights))
+    start, end = motion.coordinates(np.array([0.0, flights.JUMP.keys[-1].time - 1e-9]))
+    costs = motion.solve(2)
+    assert len(costs) == 3
+    assert costs[0] > costs[1] > costs[2]
+    after = motion.coordinates(np.array([0.0, flights.JUMP.keys[-1].time - 1e-9]))
+    np.testing.assert_allclose(after, [start, end], atol=1e-9)
+
+
+def test_arrays_that_do_not_fit_are_refused():
+    task = gait.task(gait.WALK)
+    with pytest.raises(ModelError, match="clearance"):
+        Motion(Task(**{**vars(task), "clearance": np.zeros((3, 8))}))
