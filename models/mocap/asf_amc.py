@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 FPS = 120.0
 _INCH = 0.0254
-_FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz", "l")
+_FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 
 @dataclass
@@ -169,7 +169,7 @@ def _new_bone(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> 
 def _read_root_line(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> None:
     root, keyword, rest = skeleton.bones["root"], fields[0].lower(), fields[1:]
     if keyword == "order":
-        root.freedoms = _freedoms(rest, _FREEDOMS[:6], path, line)
+        root.freedoms = _freedoms(rest, _FREEDOMS, path, line)
     elif keyword == "axis":
         root.order = _axis_order(rest, path, line)
     elif keyword == "position":
@@ -190,7 +190,7 @@ def _read_bone_line(bone: _Bone, fields: list[str], path: Path, line: int) -> No
         bone.axis, bone.order = _vector(rest[:3], path, line), _axis_order(rest[3:], path, line)
     elif keyword == "dof":
         # A bone that slides or stretches would need a different skeleton: no database gives one.
-        bone.freedoms = _freedoms(rest, _FREEDOMS[3:6], path, line)
+        bone.freedoms = _freedoms(rest, _FREEDOMS[3:], path, line)
 
 
 def _vector(fields: list[str], path: Path, line: int) -> list[float]:

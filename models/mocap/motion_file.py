@@ -25,10 +25,11 @@ class MotionFileError(ModelError):
     """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line."""
 
     def __init__(self, path: Path | str, line: int, what: str, expected: str) -> None:
-        super().__init__(f"{_one_line(str(path), 4096)}:{line}: {_one_line(what, 300)}; expected {expected}")
+        super().__init__(f"{printable(str(path), 4096)}:{line}: {printable(what, 300)}; expected {expected}")
 
 
-def _one_line(text: str, limit: int) -> str:
+def printable(text: str, limit: int) -> str:
+    """Text from a file on one line of at most `limit` characters, without anything that a terminal would obey."""
     text = "".join(character if character.isprintable() else "?" for character in text)
     return text if len(text) <= limit else text[: limit - 1] + "…"
 

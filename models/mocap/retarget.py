@@ -21,7 +21,7 @@ from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.footing import on_the_floor
-from models.mocap.motion_file import MotionFileError
+from models.mocap.motion_file import MotionFileError, printable
 from models.mocap.skeleton_roles import Roles, missing, unused
 from models.mocap.source_motion import SourceMotion
 
@@ -70,13 +70,14 @@ class RetargetReport(NamedTuple):
 
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
-        return (
+        lines = (
             f"axes: up is {self.up}, the skeleton at rest faces {self.facing}",
             f"unit: {self.unit}; one unit becomes {self.scale:.5g} m, by the length of the legs",
             "taken: " + ", ".join(f"{joint} as {body}" for body, joint in self.taken.items()),
             "unused: " + (", ".join(self.unused) or "none"),
             "missing: " + (", ".join(self.missing) or "none"),
         )
+        return tuple(printable(line, 4000) for line in lines)
 
 
 def retarget(motion: SourceMotion, roles: Roles) -> tuple[Clip, RetargetReport]:

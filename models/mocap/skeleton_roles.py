@@ -150,6 +150,9 @@ def unused(roles: Roles, joints: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def missing(roles: Roles) -> tuple[str, ...]:
-    """Segments of the figure that no joint moves, each with the segment it follows."""
+    """Segments of the figure that no joint moves, each with what it follows instead."""
     bodies = (segment for segment in SEGMENTS if segment.body not in roles.segments)
-    return tuple(f"{segment.body} (follows {BODIES[segment.parent]})" for segment in bodies)
+    return tuple(
+        f"{segment.body} (follows {'pelvis and chest' if segment.body == 'abdomen' else BODIES[segment.parent]})"
+        for segment in bodies
+    )

@@ -335,6 +335,14 @@ def test_what_cannot_be_opened_is_told_in_one_line(tmp_path):
         load(tmp_path / "a\0b.bvh")
 
 
+def test_names_of_joints_cannot_steer_a_terminal(tmp_path):
+    (tmp_path / "x.bvh").write_text(BVH.replace("ROOT Hips", "ROOT Hips\x1b[2J"))
+    report = load(tmp_path / "x.bvh").report
+    assert report is not None
+    assert "Hips?[2J as pelvis" in "\n".join(report.lines())
+    assert all(line.isprintable() for line in report.lines())
+
+
 def test_a_name_that_would_break_the_line_is_shown_harmlessly(tmp_path):
     (tmp_path / "two\nlines.bvh").write_text("x")
     with pytest.raises(MotionFileError) as caught:
