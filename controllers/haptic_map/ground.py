@@ -3,7 +3,7 @@ r"""Blends stand on the ground: a correction of the height that makes up for ben
 The mean of a squat and a stance has legs longer than the mean height of their roots allows: its feet sink. With the
 soft minimum ℓ of the heights of the points that may touch the ground, the root of a blend is raised by
 
-.. math:: c(\theta, a, b) = f\bigl(\textstyle\sum_i w_i \,\ell(h_i(\theta))\bigr) - f\bigl(\ell(\bar h(\theta, a, b))\bigr)
+.. math:: c(\theta, a, b) = f(\textstyle\sum_i w_i \,\ell(h_i(\theta))) - f(\ell(\bar h(\theta, a, b)))
 
 so the lowest point of the blend is as high as the clips' are on average; a clip alone is left as it is. f(x) = x
 below the ground and H tanh(x/H) above: in flight there is nothing to correct. What points these are is the caller's

@@ -1,0 +1,46 @@
+"""Small clips of a made-up figure for the tests of haptic maps: a root and three joints, smooth and exactly cyclic."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+JOINTS = 3
+
+
+def wxyz(rotation):
+    return np.roll(rotation.as_quat(), 1, axis=-1)
+
+
+def matrices(quaternions):
+    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1)).as_matrix()
+
+
+def swinging(seed, frames=120, travel=0.0, turns=0.0, amplitude=0.5, phase=0.0):
+    """Poses (frames + 1, 19) of a root that sways, travels along x and turns about z, and of joints that swing."""
+    rng = np.random.default_rng(seed)
+    s = np.linspace(0.0, 1.0, frames + 1)
+    lap = 2.0 * np.pi * (s + phase)
+    poses = np.empty((frames + 1, 7 + 4 * JOINTS))
+    poses[:, 0] = travel * s + 0.02 * np.sin(lap)
+    poses[:, 1] = 0.01 * np.cos(lap)
+    poses[:, 2] = 0.95 + 0.02 * np.cos(2.0 * lap)
+    for joint in range(JOINTS + 1):
+        size, lead = rng.normal(size=3) * amplitude * (0.3 if joint == 0 else 1.0), rng.uniform(0.0, 6.0, 3)
+        rotation = Rotation.from_rotvec(size * np.sin(lap[:, None] + lead))
+        if joint == 0:
+            rotation = Rotation.from_rotvec(np.outer(2.0 * np.pi * turns * s, [0.0, 0.0, 1.0])) * rotation
+        poses[:, 3 + 4 * joint : 7 + 4 * joint] = wxyz(rotation)
+    return poses
+
+
+def difference(end, start):
+    """Tangent from one pose to another: root position, then local rotation vectors."""
+    rotations = []
+    for first in range(3, len(start), 4):
+        a, b = (Rotation.from_quat(np.roll(q[first : first + 4], -1)) for q in (start, end))
+        rotations.append((a.inv() * b).as_rotvec())
+    return np.concatenate([end[:3] - start[:3], *rotations])
+
+
+def stylus(r, angle, z):
+    """Stylus pose at cylindrical coordinates, upright."""
+    return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
