@@ -84,7 +84,7 @@ def path_figure(recording: Recording) -> Figure:
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
         ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label="hand, pushing", zorder=3)
-        ax.margins(0.25)
+        ax.margins(0.3)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)

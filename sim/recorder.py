@@ -100,7 +100,7 @@ class _Stream:
             dataset = self._datasets[name]
             dataset.id.set_extent((total, *buffer.shape[1:]))
             # Whole chunks go straight to the file: five times faster, and no cache that grows.
-            if self._filled == self._chunk:
+            if self._filled == self._chunk and self._written % self._chunk == 0:
                 dataset.id.write_direct_chunk((self._written, *[0] * (buffer.ndim - 1)), buffer)
             else:
                 dataset[self._written : total] = buffer[: self._filled]

@@ -28,7 +28,7 @@ GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physic
 ARROW = 0.6  # drawn length of a large force [m]
 TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
 TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
-TUBE_SHARE = 0.2  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
+TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
@@ -157,7 +157,7 @@ class _Stage:
     def play(self, server: viser.ViserServer) -> str:
         """Run through the recording and return the page."""
         camera = server.initial_camera
-        camera.position, camera.look_at, camera.fov = (4.25, -5.15, 1.8), (0.55, -0.1, 0.9), np.deg2rad(31)
+        camera.position, camera.look_at, camera.fov = (4.1, -4.95, 3.05), (0.55, -0.1, 0.75), np.deg2rad(31)
         serializer = server.get_scene_serializer()
         times, frame_times = self._ticks["t"][:], self._frames["t"][:]
         n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)

@@ -65,7 +65,7 @@ def test_nothing_is_fetched_from_elsewhere(write):
 
 
 def test_what_is_not_drawn_to_scale_is_said(write):
-    assert "drawn with a radius of 10 mm for its 250 mm" in " ".join(write(radius=0.25).texts)
+    assert "drawn with a radius of 15 mm for its 250 mm" in " ".join(write(radius=0.25).texts)
     assert "drawn with a radius" not in " ".join(write(radius=0.002).texts)
     assert "first 60 of 300 seconds" in " ".join(write(radius=0.003).texts)
 

@@ -142,6 +142,19 @@ def test_a_running_recording_can_be_read(tmp_path):
             assert numbered(recording.groups["ticks"]["p"])
 
 
+def test_rows_can_be_flushed_at_any_moment(tmp_path):
+    with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
+        start = 0
+        for n in (70, 430, 1, 999, 250, 250):
+            recorder.append("ticks", block(start, n))
+            recorder.flush()
+            start += n
+            with Recording(tmp_path / "run.h5") as recording:
+                ticks = recording.groups["ticks"]
+                assert len(ticks["t"]) == start
+                assert all(numbered(channel) for channel in ticks.values())
+
+
 def test_memory_does_not_grow_with_the_run(tmp_path):
     """Fifty times the rows may cost a few megabytes more, not the hundred that they occupy."""
     script = """

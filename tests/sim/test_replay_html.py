@@ -172,7 +172,7 @@ def test_a_hand_that_does_not_move_leaves_no_trail_and_no_nan(tmp_path, model):
         assert len(buffer) % 4 or np.all(np.isfinite(np.frombuffer(buffer, np.float32)))
 
 
-@pytest.mark.parametrize(("radius", "drawn"), [(0.01, 0.01), (0.25, 0.02)])
+@pytest.mark.parametrize(("radius", "drawn"), [(0.01, 0.01), (0.25, 0.03)])
 def test_a_tube_that_would_hide_everything_is_drawn_narrower(tmp_path, model, radius, drawn):
     with record(tmp_path / "run.h5", model, seconds=0.1, radius=radius) as recording:
         assert drawn_tube(recording) == pytest.approx(drawn)
