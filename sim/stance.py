@@ -32,7 +32,7 @@ def _cross_add(a: Array, b: Array, out: Array) -> None:
 
 @njit
 def stance_response(
-    bodies: IntArray, points: Array, share: Array, xpos: Array, xmat: Array, v: Array, a: Array,
+    bodies: IntArray, points: Array, share: Array, near: Array, xpos: Array, xmat: Array, v: Array, a: Array,
     offset: Array, response: Array,
 ) -> None:  # fmt: skip
     """Amend the wanted accelerations of one leg so that its loaded contact points rest.
@@ -43,6 +43,8 @@ def stance_response(
         Indices of thigh, shank and foot among the figure's bodies; the root is 0.
     points, share : Array
         Positions (n, 3) of the foot's contact points in the world, floor at z = 0, and their shares (n,).
+    near : Array
+        1 where the reference has the point on the floor, 0 where it has it off the floor, shape (n,).
     xpos, xmat : Array
         Positions (18, 3) and rotation matrices (18, 9) of the figure's bodies.
     v, a : Array
@@ -52,7 +54,8 @@ def stance_response(
     """
     offset[:] = 0.0
     response[:] = 0.0
-    if share.max() <= 0.0:
+    loaded = share.max()
+    if loaded <= 0.0:
         return
     normal = np.eye(N_LEG)
     J, J_root, wanted = np.empty((3, N_LEG)), np.empty((3, 6)), np.empty(3)
@@ -78,9 +81,8 @@ def stance_response(
             _cross_add(omega[level - 1], spin, drift[level])
         omega[level] += relative
     for p in range(share.shape[0]):
-        if share[p] <= 0.0:
+        if near[p] <= 0.0:
             continue
-        weight = _ADHERENCE * share[p]
         arm[:] = points[p] - xpos[bodies[2]]
         spin[:] = 0.0
         _cross_add(omega[3], arm, spin)
@@ -106,12 +108,14 @@ def stance_response(
             J_root[i, i] = 1.0
         for i in range(3):
             for k in range(6):
-                wanted[i] -= _SETTLING * J_root[i, k] * v[k]
+                wanted[i] -= J_root[i, k] * (_SETTLING * v[k] + a[k])
             for k in range(N_LEG):
                 t = 3 + 3 * bodies[k // 3] + k % 3
                 wanted[i] -= J[i, k] * (_SETTLING * v[t] + a[t])
+        wanted[2] -= (0.5 * _SETTLING) ** 2 * max(0.0, points[p, 2])
         for k in range(N_LEG):
             for i in range(3):
+                weight = _ADHERENCE * (share[p] if i < 2 else near[p] * loaded)
                 offset[k] += weight * J[i, k] * wanted[i]
                 for m in range(6):
                     response[k, m] -= weight * J[i, k] * J_root[i, m]

@@ -1,0 +1,133 @@
+"""What the physical figure's control works on: its gains, and views of the world with scratch memory beside them."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+class FigureGains(NamedTuple):
+    """How closely the physical figure tracks, and how much help it may get.
+
+    Attributes
+    ----------
+    joint_rate, root_rate : float
+        ω of the critically damped feedback on joints and root [1/s].
+    root_pull, root_turn : float
+        Largest acceleration that feedback may ask of the root [m/s²], [rad/s²]: a late landing is absorbed, not reversed.
+    linear_limit, angular_limit : float
+        Largest acceleration of root and joints that is taken from the reference [m/s²], [rad/s²]: captured motion is rough.
+    force_bound, moment_bound : float
+        Largest residual force as a share of body weight, and moment as a share of body weight × stature.
+    reference_reach, contact_reach : float
+        Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
+    flight_height : float
+        The reference flies, and no residual is applied, while all its contact points are higher than this [m].
+    lift_time : float
+        How far ahead the reference is looked at for contact points about to be lifted [s].
+    """
+
+    joint_rate: float = 40.0
+    root_rate: float = 25.0
+    root_pull: float = 30.0
+    root_turn: float = 300.0
+    linear_limit: float = 40.0
+    angular_limit: float = 500.0
+    force_bound: float = 1.0
+    moment_bound: float = 0.2
+    reference_reach: float = 0.03
+    contact_reach: float = 0.001
+    flight_height: float = 0.02
+    lift_time: float = 0.02
+
+
+class FigureState(NamedTuple):
+    """Views of the world's MjData, restricted to the figure, and scratch memory.
+
+    Attributes
+    ----------
+    model, data, twin_model, twin_data : int
+        Addresses of the world, and of the figure alone in which the reference pose is looked at.
+    qpos, qvel, bias, passive, ctrl, applied : Array
+        The figure's part of the world's arrays: 75, 57, 57, 57, 51 motors and the 6 degrees of freedom of the root.
+    xpos, xmat : Array
+        Positions (18, 3) and rotation matrices (18, 9) of its bodies.
+    contact_pos, contact, contact_body : Array
+        Positions of the world's geoms, the contact spheres among them (10,), and their bodies among the figure's.
+    twin_qpos, twin_contact_pos, twin_contact : Array
+        The same in the figure alone.
+    world_M, M : Array
+        Dense mass matrix of the world, and the figure's block of it, shape (57, 57).
+    parent, legs : IntArray
+        Parent of each body, and thigh, shank and foot of each leg, shape (2, 3).
+    torque_limit : Array
+        Of the motors [N m], shape (51,).
+    weight, stature, radius, friction : float
+        Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction that is relied on.
+    acceleration, wanted_root : Array
+        Planned acceleration (57), and the root's as the feedback asks for it (6).
+    share, near : Array
+        How much each contact point may bear, and how near the floor it is in the reference, 0 to 1, shape (10,).
+    force, given : Array
+        Planned contact forces [N] in the world (10, 3) and the generalised forces they make (57).
+    wrench : Array
+        Residual: force in the world [N], moment in the root's frame [N m], shape (6,).
+    lost, yielding : Array
+        Torque beyond each motor's limit [N m] and whether its joint gives way, shape (51,).
+    report : Array
+        Support (0 while the reference flies or nothing touches), number of saturated motors, residual (6).
+    """
+
+    model: int
+    data: int
+    twin_model: int
+    twin_data: int
+    gains: FigureGains
+    qpos: Array
+    qvel: Array
+    bias: Array
+    passive: Array
+    ctrl: Array
+    applied: Array
+    xpos: Array
+    xmat: Array
+    contact_pos: Array
+    contact: IntArray
+    contact_body: IntArray
+    twin_qpos: Array
+    twin_contact_pos: Array
+    twin_contact: IntArray
+    world_M: Array
+    M: Array
+    parent: IntArray
+    legs: IntArray
+    torque_limit: Array
+    weight: float
+    stature: float
+    radius: float
+    friction: float
+    acceleration: Array
+    wanted_root: Array
+    rotation: Array
+    share: Array
+    near: Array
+    points: Array
+    edges: Array
+    edge_share: Array
+    edge_force: Array
+    scaled: Array
+    residual: Array
+    force: Array
+    given: Array
+    demand: Array
+    wrench: Array
+    offset: Array
+    response: Array
+    lost: Array
+    yielding: IntArray
+    block: Array
+    correction: Array
+    report: Array
