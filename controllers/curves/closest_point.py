@@ -191,7 +191,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
     nodes, squares = np.empty(64, np.int64), np.empty(64)
     best: float = math.inf
     best_t = float(blob[at + START])
-    # From the warm leaf upwards, each sibling of an ancestor is searched in turn; without one, the root alone.
+    # From the warm leaf upwards, each sibling of an ancestor is searched if it is in reach; without one, the root.
     below = 1
     if np.isfinite(guess):
         below = first_leaf + find_piece(blob, at, wrap_phase(blob, at, guess))
@@ -222,10 +222,16 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
                     best, best_t = distance, start + u
         if below == 1:
             break
-        nodes[0] = below ^ 1
-        squares[0] = _chord_square(blob, tree + NODE * (below ^ 1), px, py, pz)
+        sibling = below ^ 1
+        squares[0] = _chord_square(blob, tree + NODE * sibling, px, py, pz)
         below //= 2
-        top = 1
+        if _out_of_reach(blob, tree + NODE * sibling, squares[0], best):
+            continue
+        nodes[0], top = sibling, 1
+        head = tree + NODE * sibling
+        if (px - blob[head]) ** 2 + (py - blob[head + 1]) ** 2 + (pz - blob[head + 2]) ** 2 < best * best:
+            # The guess is far off, for another run of pieces starts nearer: search from the root, with that bound.
+            nodes[0], squares[0], below = 1, 0.0, 1
     return best_t, best
 
 

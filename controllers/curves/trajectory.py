@@ -209,9 +209,8 @@ class Trajectory:
             knots = np.concatenate([times[:-1], times + times[-1] - times[0]])
             orientation = CubicSpline(knots, twice, bc_type="periodic").c[:, : len(times) - 1]
         else:
-            ends = self.ends if len(times) > 2 or self.ends == "clamped" else "natural"
-            position = CubicSpline(times, positions, bc_type=ends).c
-            orientation = CubicSpline(times, quaternions, bc_type=ends).c
+            position = CubicSpline(times, positions, bc_type=self.ends).c
+            orientation = CubicSpline(times, quaternions, bc_type=self.ends).c
         return np.ascontiguousarray(np.concatenate([position, orientation], axis=2)[::-1].transpose(1, 0, 2))
 
     @property
