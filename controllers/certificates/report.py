@@ -1,0 +1,174 @@
+"""What a certificate says: verdicts with margin, reason and counterexample, and the hash of all that they depend on."""
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Literal, TypeAlias, cast, get_args
+
+import numpy as np
+
+from controllers.errors import ControllerError
+
+Outcome: TypeAlias = Literal["certified", "refuted", "unknown"]
+Json: TypeAlias = bool | int | float | str | list["Json"] | dict[str, "Json"] | None
+
+
+class CertificateError(ControllerError):
+    """A certificate that cannot be read, or that is of other inputs than those at hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is known of one property.
+
+    Parameters
+    ----------
+    verdict : {"certified", "refuted", "unknown"}
+        Proved within the assumptions; broken, as the counterexample shows; or neither.
+    reason : str
+        Why, in one sentence with numbers.
+    margin : float, optional
+        How far the property is from being lost, in the unit that `reason` names; negative when refuted. None when
+        there is no such number.
+    assumptions : tuple of str
+        What has to hold for the verdict.
+    counterexample : mapping
+        Initial state and whatever else a simulation needs to show the failure; only of a refuted property.
+    figures : mapping
+        Numbers and arrays worth keeping beside the verdict: boundaries, spectra, bounds per phase.
+
+    Raises
+    ------
+    CertificateError
+        If the verdict is not one of the three, or refuted without a counterexample, or the reverse.
+    """
+
+    verdict: Outcome
+    reason: str
+    margin: float | None = None
+    assumptions: tuple[str, ...] = ()
+    counterexample: Mapping[str, object] = field(default_factory=dict[str, object])
+    figures: Mapping[str, object] = field(default_factory=dict[str, object])
+
+    def __post_init__(self) -> None:
+        if self.verdict not in get_args(Outcome):
+            raise CertificateError(f"a verdict is one of {', '.join(get_args(Outcome))}, got {self.verdict!r}")
+        if (self.verdict == "refuted") != bool(self.counterexample):
+            raise CertificateError(f"a counterexample goes with what is refuted, and only with it; {self.reason}")
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Verdicts by name, and the hash of all inputs.
+
+    Parameters
+    ----------
+    verdicts : mapping of str to Verdict
+        Such as ``stability``, ``passivity``, ``ballistic``.
+    inputs : str
+        `hash_of` gains, curve, device, period, hand, clip: whatever the verdicts depend on, the code included.
+    """
+
+    verdicts: Mapping[str, Verdict]
+    inputs: str
+
+    def to_json(self) -> dict[str, Json]:
+        """The certificate as JSON takes it: ``inputs`` and one entry a verdict. Numbers not finite become null."""
+        return {"inputs": self.inputs} | {name: _json(verdict) for name, verdict in self.verdicts.items()}
+
+    @staticmethod
+    def from_json(values: object) -> "Certificate":
+        """Inverse of `to_json`.
+
+        Raises
+        ------
+        CertificateError
+            If it is not a certificate.
+        """
+        try:
+            entries = dict(cast(Mapping[str, dict[str, object]], values))
+            inputs = entries.pop("inputs")
+            verdicts: dict[str, Verdict] = {}
+            for name, entry in entries.items():
+                assumptions = tuple(cast(Sequence[str], entry["assumptions"]))
+                verdicts[name] = Verdict(**entry | {"assumptions": assumptions})  # pyright: ignore[reportArgumentType]
+        except (TypeError, KeyError, ValueError) as error:
+            raise CertificateError(
+                f"not a certificate ({error}); expected 'inputs' and one object a verdict with "
+                f"{', '.join(item.name for item in fields(Verdict))}"
+            ) from None
+        if not isinstance(inputs, str):
+            raise CertificateError(f"not a certificate: 'inputs' is {inputs!r}; expected a hash")
+        return Certificate(verdicts, inputs)
+
+    def check(self, inputs: object) -> None:
+        """Whether this certificate is of these inputs.
+
+        Raises
+        ------
+        CertificateError
+            If any of them has changed.
+        """
+        found = hash_of(inputs)
+        if found != self.inputs:
+            raise CertificateError(f"the certificate is of inputs {self.inputs}, these are {found}; certify again")
+
+
+def hash_of(inputs: object) -> str:
+    """Hash of inputs to the last bit, 16 hex digits.
+
+    Parameters
+    ----------
+    inputs
+        Numbers, strings, bytes, arrays, None, and sequences, mappings and dataclasses of them.
+
+    Raises
+    ------
+    CertificateError
+        If there is something else among them, whose text need not be its value.
+    """
+    return hashlib.sha256(_canonical(inputs)).hexdigest()[:16]
+
+
+def _canonical(value: object) -> bytes:
+    """Bytes that differ whenever the values do: every part is preceded by its kind and length."""
+    if isinstance(value, np.ndarray):
+        array = np.ascontiguousarray(value)
+        if array.dtype.hasobject:
+            raise CertificateError("an array of objects cannot be hashed")
+        parts, kind = [str(array.dtype).encode(), str(array.shape).encode(), array.tobytes()], "array"
+    elif isinstance(value, np.generic):
+        return _canonical(value.item())
+    elif value is None or isinstance(value, bool | int | float | str):
+        parts, kind = [repr(value).encode()], type(value).__name__
+    elif isinstance(value, bytes):
+        parts, kind = [value], "bytes"
+    elif is_dataclass(value) and not isinstance(value, type):
+        named = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
+        parts, kind = [type(value).__name__.encode(), _canonical(named)], "dataclass"
+    elif isinstance(value, Mapping):
+        entries = cast(Mapping[object, object], value)
+        parts = [part for pair in sorted((_canonical(k), _canonical(v)) for k, v in entries.items()) for part in pair]
+        kind = "mapping"
+    elif isinstance(value, Sequence):
+        parts, kind = [_canonical(item) for item in cast(Sequence[object], value)], "sequence"
+    else:
+        raise CertificateError(f"an input of type {type(value).__name__} cannot be hashed: {value!r}")
+    return b"".join([f"{kind}{len(parts)}:".encode(), *(f"{len(part)}:".encode() + part for part in parts)])
+
+
+def _json(value: object) -> Json:
+    if isinstance(value, np.ndarray | np.generic):
+        return _json(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _json(item) for key, item in cast(Mapping[object, object], value).items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return {item.name: _json(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, Sequence):
+        return [_json(item) for item in cast(Sequence[object], value)]
+    raise CertificateError(f"a verdict holds {value!r}, which JSON does not take")
