@@ -26,14 +26,12 @@ def sine_quotients(angle: float) -> tuple[float, float, float, float]:
 
 @njit
 def update_lap(memory: Array, angle: float, drift: Array) -> None:
-    """Carry the lap's frame A over the seam: A·exp(ξ) forwards, A·exp(−ξ) backwards.
-
-    The first angle may lie on either side of the seam: one beyond π is taken for one before the start.
-    """
-    last = memory[LAST_ANGLE] if memory[LAST_ANGLE] >= 0.0 else 0.0
+    """Carry the lap's frame A over the seam: A·exp(ξ) forwards, A·exp(−ξ) backwards."""
+    change = angle - memory[LAST_ANGLE]
     memory[LAST_ANGLE] = angle
-    if abs(angle - last) > np.pi:
-        way = 1.0 if angle < last else -1.0
+    # False for NaN, the first tick.
+    if abs(change) > np.pi:
+        way = 1.0 if change < 0.0 else -1.0
         s, c, _, _ = sine_quotients(way * drift[2])
         x, y = way * (s * drift[0] - c * drift[1]), way * (c * drift[0] + s * drift[1])
         cosine, sine = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
