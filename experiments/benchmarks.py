@@ -1,0 +1,137 @@
+"""Speed, as ratios measured within one run: ``make bench``."""
+
+import statistics
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import Trajectory
+from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from sim.compiled import entry_point
+from sim.loop import make_logs
+from sim.servo import FrameLog, TickLog, run_block
+
+Array = npt.NDArray[np.float64]
+
+SECONDS = 2.0  # simulated in each measurement of the loop
+ROUNDS = 7
+
+
+def bench() -> None:
+    """Print every figure with what it has to reach."""
+    config = RunConfig(seconds=SECONDS)
+    clips, _ = load_clips(config.clips)
+    ratio, factor, same = closed_loop_over_replay(lambda: wire(config, clips))
+    print(f"closed loop / replay of its controls, one thread: {ratio:.3f} (≤ 1.05); same states bit for bit: {same}")
+    print(f"real-time factor of one thread: {factor:.2f}")
+    print(f"two threads / twice one thread: {thread_scaling(lambda: wire(config, clips)):.2f} (≥ 0.90)")
+    small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
+    print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
+    print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
+
+
+def closed_loop_over_replay(make: Callable[[], Session]) -> tuple[float, float, bool]:
+    """Time of the closed loop over that of replaying its controls, real-time factor, and whether the states agree.
+
+    Both run through `sim.servo.run_block`, in turn; the median of the ratios of neighbouring runs is taken.
+    """
+    ratios: list[float] = []
+    factors: list[float] = []
+    same = True
+    for _ in range(ROUNDS):
+        session, ticks, frames, n = _prepared(make)
+        closed = _timed(session, n, False, ticks, frames)
+        end = session.world.data.qpos.copy()
+        other, _, unused, _ = _prepared(make)
+        replayed = _timed(other, n, True, ticks, unused)
+        same = same and bool(np.array_equal(end, other.world.data.qpos))
+        ratios.append(closed / replayed)
+        factors.append(SECONDS / closed)
+    return statistics.median(ratios), statistics.median(factors), same
+
+
+def thread_scaling(make: Callable[[], Session]) -> float:
+    """Throughput of two threads, a session each, over twice that of one."""
+    ratios: list[float] = []
+    for _ in range(ROUNDS):
+        session, ticks, frames, n = _prepared(make)
+        alone = _timed(session, n, False, ticks, frames)
+        pair = [_prepared(make) for _ in range(2)]
+        threads = [
+            threading.Thread(target=run_block, args=(session.servo, 0, n, False, ticks, frames))
+            for session, ticks, frames, n in pair
+        ]
+        begin = time.perf_counter()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        ratios.append(alone / (time.perf_counter() - begin))
+    return statistics.median(ratios)
+
+
+def _prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
+    session = make()
+    n = round(SECONDS / session.servo.plant.period)
+    ticks, frames = make_logs(session.servo, n)
+    return session, ticks, frames, n
+
+
+def _timed(session: Session, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> float:
+    begin = time.perf_counter()
+    run_block(session.servo, 0, n, replay, ticks, frames)
+    return time.perf_counter() - begin
+
+
+@njit
+def _closest_many(blob: Array, points: Array, phase: float) -> float:
+    total = 0.0
+    for i in range(points.shape[0]):
+        phase, distance = closest_phase(blob, 0, points[i, 0], points[i, 1], points[i, 2], phase)
+        total += distance
+    return total
+
+
+def closest_point_microseconds(pieces: int) -> float:
+    """Mean time of a closest-point query of a hand that moves along a knotted curve of so many pieces [µs]."""
+    t = np.linspace(0.0, 1.0, pieces + 1)
+    angle = 2.0 * np.pi * t
+    points = np.stack(
+        [np.sin(angle) + 2.0 * np.sin(2.0 * angle), np.cos(angle) - 2.0 * np.cos(2.0 * angle), -np.sin(3.0 * angle)], 1
+    )
+    points[-1] = points[0]
+    curve = Trajectory(t, 0.02 * points, periodic=True)
+    blob = curve.packed()
+    path = curve.point(np.linspace(0.0, 1.0, 4000)) + np.random.default_rng(0).normal(scale=1e-3, size=(4000, 3))
+    _closest_many(blob, path[:2], np.nan)
+    return _microseconds(lambda: _closest_many(blob, path, np.nan), len(path))
+
+
+@entry_point
+def _map_many(kind: int, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    for i in range(points.shape[0]):
+        evaluate_map_jacobian(kind, params, points[i], memory, pose, jacobian)
+
+
+def map_microseconds(session: Session) -> float:
+    """Mean time of h with h_* along the default curve [µs]."""
+    kind, params, memory = session.haptic_map.compiled()
+    pose, jacobian = np.empty(session.haptic_map.nq), np.empty((session.haptic_map.nv, 6))
+    points = stylus_path(session.curve.point(np.linspace(0.0, session.config.lap, 2000)))
+    _map_many(kind, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
+
+
+def _microseconds(call: Callable[[], object], calls: int) -> float:
+    times: list[float] = []
+    for _ in range(ROUNDS):
+        begin = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - begin)
+    return 1e6 * min(times) / calls
