@@ -188,9 +188,9 @@ class Cylindrical(HapticMap):
     ξ (`loops`).
 
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
-    the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are continuous over the seam. If no clip travels or
-    turns, A stays the identity and h is a function of the stylus position alone. h does not depend on the stylus
-    orientation. On the axis r = 0 the phase, hence h, is not defined.
+    the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
+    continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
+    position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.
 
     Parameters
     ----------

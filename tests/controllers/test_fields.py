@@ -184,3 +184,21 @@ def test_memory_changes_the_cost_and_not_the_value():
 def test_bad_gains_are_refused_with_the_numbers(make, says):
     with pytest.raises(ParameterError, match=says):
         make()
+
+
+@pytest.mark.parametrize("law", LAWS[:2], ids=["follow", "bunny by the clock"])
+def test_a_mass_that_is_let_go_traces_the_curve_at_its_pace(law):
+    program, mass, period = law.program(), 0.1, 1e-3
+    memory = program.fresh_memory()
+    p, v = CIRCLE.point(0.0) + np.array([0.008, 0.0, 0.005]), np.zeros(3)
+    path = []
+    for k in range(8000):
+        force = _run(program, HandState.at(p, v, k * period), memory)[:3]
+        v = v + period * force / mass
+        p = p + period * v
+        path.append(memory[TRACE_PHASE])
+        if k > 1000:
+            # The centripetal force m v²/R = 12 mN takes 0.06 mm of the spring.
+            assert memory[TRACE_DISTANCE] < 1.5e-4
+    laps = np.unwrap(np.array(path) * 2 * np.pi / 4.0) / (2 * np.pi)
+    assert laps[-1] - laps[2000] == pytest.approx(6.0 / 4.0, rel=0.01)
