@@ -1,0 +1,91 @@
+"""What the ``hvf`` command says to bad input: one line, exit code 2, nothing lost."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.cli import main
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    code = main(arguments)
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.err.startswith("hvf: ")
+    assert captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+    return captured.err
+
+
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (["--stiffness", "-5"], "-5"),
+        (["--damping", "nan"], "nan"),
+        (["--tube", "0"], "0"),
+        (["--lap", "0"], "lap"),
+        (["--reach", "0.2"], "r_range"),
+        (["--radius", "0.3"], "beyond the Phantom's stops"),
+        (["--seconds", "-1"], "-1"),
+        (["--seconds", "inf"], "inf"),
+        (["--cutoff", "0"], "cutoff"),
+        (["--smoothing", "1000"], "1000"),
+        (["physics-step", "0.0003"], "does not divide"),
+        (["servo-period", "-0.001"], "-0.001"),
+        (["stature", "9"], "stature"),
+        (["mass", "1"], "mass"),
+        (["--clips", "moonwalk"], "squat_dance"),
+        (["--clips", "no/such/file.bvh"], "no/such/file.bvh"),
+        (["--clips", *["cheer"] * 5], "1 to 4"),
+    ],
+)
+def test_a_run_that_cannot_be_is_refused_with_the_numbers(
+    flags: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert told in refused(["run", "--out", str(out), *flags], capsys)
+    assert not out.exists()
+
+
+def test_a_folder_that_holds_a_run_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "run.h5").write_bytes(b"precious")
+    assert "--overwrite" in refused(["run", "--out", str(tmp_path)], capsys)
+    assert (tmp_path / "run.h5").read_bytes() == b"precious"
+
+
+def test_a_bad_configuration_does_not_cost_the_run_that_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.h5").write_bytes(b"precious")
+    refused(["run", "--out", str(tmp_path), "--overwrite", "--stiffness", "-1"], capsys)
+    assert (tmp_path / "run.h5").read_bytes() == b"precious"
+
+
+def test_an_output_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out").write_text("a file")
+    assert "is a file" in refused(["run", "--out", str(tmp_path / "out")], capsys)
+
+
+@pytest.mark.parametrize("command", ["report", "reproduce"])
+def test_a_folder_without_a_run_is_refused(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "run.h5" in refused([command, str(tmp_path)], capsys)
+    (tmp_path / "run.h5").write_bytes(b"not HDF5")
+    assert "run.h5" in refused([command, str(tmp_path)], capsys)
+
+
+def test_a_motion_file_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "bad.bvh"
+    source.write_text("HIERARCHY\nROOT hips\n{\n")
+    assert "bad.bvh:" in refused(["convert", str(source), str(tmp_path / "out.bvh")], capsys)
+
+
+def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from models.mocap.bvh import write_bvh
+    from models.mocap.library import embedded
+
+    source, target = tmp_path / "in.bvh", tmp_path / "out.bvh"
+    write_bvh(embedded("cheer"), source)
+    assert main(["convert", str(source), str(target)]) == 0
+    before = target.read_bytes()
+    assert "--overwrite" in refused(["convert", str(source), str(target)], capsys)
+    assert target.read_bytes() == before
