@@ -144,7 +144,7 @@ BACKFLIP = Flight(
         _stand(2.7, -0.25, -360.0),
     ),
     off=(0.90, 1.00), down=(1.73, 1.68), travel=-0.25, intervals=60,
-    weights=Weights(force=30.0, moment=60.0, flight=7.0, slip=600.0, depth=800.0, jerk=2e-5),
+    weights=Weights(force=30.0, moment=60.0, flight=7.0, slip=600.0, depth=800.0, jerk=6e-5),
 )  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def _clip(flight: Flight) -> Clip:
     rough.solve(40, 1e-3)
     motion = Motion(task(flight, flight.weights))
     motion.unknowns = rough.unknowns
-    motion.solve(80, 3e-5)
+    motion.solve(150, 1e-6)
     frames = round(flight.keys[-1].time * FPS) + 1
     return Clip(poses(motion.coordinates(np.arange(frames) / FPS)), FPS, flight.name)
 

@@ -23,7 +23,7 @@ from models.mocap.floor_forces import Demand, Floor, residual
 Array = npt.NDArray[np.float64]
 
 DEGREE = 5
-_STRONG = 0.9  # share of the joints' largest torques beyond which effort counts as strain
+_STRONG = 0.8  # share of the joints' largest torques beyond which effort counts as strain
 _LAG = 0.012  # a sphere stands this long before and after it pushes [s]: no force without touch
 _MARGIN = 0.02  # to the joints' limits [rad]
 
@@ -61,7 +61,7 @@ class Weights(NamedTuple):
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     effort, strain : float
-        Torque of a joint as a share of its largest; what of it is beyond 90 %.
+        Torque of a joint as a share of its largest; what of it is beyond 80 %.
     sway, jerk : float
         Third derivatives of the root's place [s³/m] and of rotation vectors [s³/rad].
     """

@@ -113,4 +113,5 @@ def test_left_and_right_are_mirror_images(name, measured):
 def test_committed_clip_is_what_the_generator_makes(name):
     made, committed = flights.CLIPS[name](), embedded(name)
     assert made.poses.shape == committed.poses.shape
-    np.testing.assert_allclose(made.poses, committed.poses, atol=1e-4)
+    # Flat optimum: other BLAS kernels were seen to change the backflip by 2e-3 and the jump by 1e-6.
+    np.testing.assert_allclose(made.poses, committed.poses, atol={"jump": 1e-5, "backflip": 1e-2}[name])
