@@ -1,4 +1,4 @@
-"""Alignment of loops in time: first by a shift of the phase, then by a smooth monotone warp that closes."""
+"""Alignment of loops in time: a shift of the phase, then, where it pays, a smooth monotone warp that closes."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -8,7 +8,8 @@ from controllers.state import Array, IntArray
 
 _SAMPLES = 128
 _BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
-_STEEPEST = 0.5  # and changes the pace by at most a half
+_STEEPEST = 0.25  # and changes the pace by at most a quarter
+_WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it bends flights and steps for nothing
 
 
 def _features(loop: Loop) -> Array:
@@ -67,6 +68,17 @@ def _smoothed(lead: Array) -> Array:
     return smooth * min(1.0, _STEEPEST / max(steepest, 1e-12))
 
 
+def _lead(reference: Array, features: Array) -> Array:
+    """Lead of a loop over the reference at each sample [laps]: the smoothed warp, or none where it gains little."""
+    lead = _smoothed(_warp(reference, features))
+    at = np.arange(_SAMPLES) + lead
+    first = np.floor(at).astype(int)
+    share = (at - first)[:, None]
+    warped = (1.0 - share) * features[first % _SAMPLES] + share * features[(first + 1) % _SAMPLES]
+    left, before = float(((warped - reference) ** 2).sum()), float(((features - reference) ** 2).sum())
+    return lead / _SAMPLES if left < _WORTH * before else np.zeros(_SAMPLES)
+
+
 def aligned_channels(loops: list[Loop], samples: int) -> Array:
     """Remainders of all loops at equal steps of the common phase.
 
@@ -90,7 +102,7 @@ def aligned_channels(loops: list[Loop], samples: int) -> Array:
     for loop in loops[1:]:
         features = _features(loop)
         shift = _best_shift(reference, features)
-        lead = _smoothed(_warp(reference, np.roll(features, -shift, axis=0))) / _SAMPLES
+        lead = _lead(reference, np.roll(features, -shift, axis=0))
         knots = np.arange(_SAMPLES + 1) / _SAMPLES
         smooth = CubicSpline(knots, np.append(lead, lead[0]), bc_type="periodic")(phase)
         own = loop.channels(phase + shift / _SAMPLES + smooth, smooth)
