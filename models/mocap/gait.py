@@ -53,8 +53,8 @@ class Gait:
         Flexion of hip and knee, dorsiflexion of the ankle [degrees].
     heel, toe : (float, float)
         Shares of the cycle between which heel and toes stand.
-    width, splay : float
-        Between the feet [m], and of each foot outwards [degrees].
+    width, splay, apart : float
+        Between the feet [m]; of each foot outwards; of the hips, which lets the swinging leg pass the other [degrees].
     height, tilt : float
         Of the pelvis: mean [m], forwards [degrees].
     turn, list : float
@@ -86,6 +86,7 @@ class Gait:
     toe: tuple[float, float]
     width: float
     splay: float
+    apart: float
     height: float
     tilt: float
     turn: float
@@ -104,7 +105,7 @@ WALK = Gait(
     hip=(22, 21.5, 20, 17, 12.5, 8, 3.5, -1, -5, -8.5, -11, -10.5, -6, 1.5, 9.5, 16.5, 21.5, 24, 24.5, 23.5),
     knee=(5, 10.5, 16.5, 18.5, 17.5, 15, 11.5, 8.5, 6.5, 7, 11, 20, 34, 48.5, 58.5, 61, 55.5, 43, 26.5, 11.5),
     ankle=(0, -5, -4, -0.5, 2.5, 4.5, 6, 7.5, 9, 9.8, 7.5, -2, -14.5, -18.5, -12.5, -5.5, -1, 1.5, 1.5, 0.5),
-    heel=(0.0, 0.40), toe=(0.08, 0.62), width=0.11, splay=6.0,
+    heel=(0.0, 0.40), toe=(0.08, 0.62), width=0.11, splay=6.0, apart=0.0,
     height=0.905, tilt=3.0, turn=5.0, list=4.0, lean=0.0, swing=(-3.0, 17.0), elbow=(24.0, 8.0), inward=6.0,
     lead=0.28, lift=0.015, intervals=12,
 )  # fmt: skip
@@ -114,8 +115,8 @@ RUN = Gait(
     hip=(30, 30, 29, 26, 20, 13, 5, -2, -6, -6, -1, 8, 18, 28, 36, 41, 42, 40, 36, 32),
     knee=(14, 28, 38, 41, 37, 29, 21, 17, 20, 33, 52, 72, 88, 94, 88, 72, 50, 28, 13, 9),
     ankle=(5, 10, 17, 21, 21, 15, 3, -12, -20, -18, -11, -5, -1, 2, 4, 5, 6, 6, 6, 5),
-    heel=(0.0, 0.19), toe=(0.03, 0.355), width=0.06, splay=5.0,
-    height=0.89, tilt=8.0, turn=6.0, list=4.0, lean=3.0, swing=(-12.0, 30.0), elbow=(96.0, 10.0), inward=8.0,
+    heel=(0.0, 0.19), toe=(0.03, 0.355), width=0.11, splay=5.0, apart=6.0,
+    height=0.89, tilt=8.0, turn=6.0, list=4.0, lean=3.0, swing=(-12.0, 30.0), elbow=(96.0, 10.0), inward=3.0,
     lead=0.27, lift=0.03, intervals=14,
 )  # fmt: skip
 
@@ -140,10 +141,11 @@ def _sketch(gait: Gait, phase: Array) -> Array:
         for joint, curve, way in (("hip", gait.hip, -1), ("knee", gait.knee, 1), ("ankle", gait.ankle, -1)):
             spline = CubicSpline(np.linspace(0, 1, 21), np.deg2rad([*curve, curve[0]]), bc_type="periodic")
             u[:, coordinate(f"{side}_{joint}", "y")] = way * spline(p)
+        u[:, coordinate(f"{side}_hip", "x")] = sign * np.deg2rad(gait.apart)
         u[:, coordinate(f"{side}_hip", "z")] = sign * np.deg2rad(gait.splay)
         swing = -np.cos(2 * np.pi * (p - 0.03))
         flexion = np.deg2rad(gait.swing[0] + gait.swing[1] * swing)
-        hanging = Rotation.from_euler("XY", (-79.0, gait.inward), degrees=True)
+        hanging = Rotation.from_euler("XY", (-78.0, gait.inward), degrees=True)
         arm = Rotation.from_rotvec(np.outer(-flexion, (0, 1, 0))) * hanging
         first = coordinate(f"{side}_shoulder", "x")
         u[:, first : first + 3] = arm.as_rotvec() * (sign, 1.0, sign)

@@ -106,3 +106,26 @@ def steps(clip: Clip, order: int) -> np.ndarray:
     """Differences of the given order of every tangent component, per second to that order."""
     velocity = pose_difference(clip.poses[:-1], clip.poses[1:]) * clip.fps
     return np.diff(velocity, n=order - 1, axis=0) * clip.fps ** (order - 1)
+
+
+def overlap(clip: Clip) -> float:
+    """Deepest that arms, legs and trunk run into one another, at every fourth frame [m]."""
+    model = figure_model()
+    data = mujoco.MjData(model)
+    drawn: dict[str, list[int]] = {}
+    for geom in np.flatnonzero(model.geom_group != 3):
+        drawn.setdefault(model.body(model.geom_bodyid[geom]).name, []).append(int(geom))
+    ends = [f"{side}_{part}" for side in ("left", "right") for part in ("forearm", "hand", "shank", "foot")]
+    core = ["pelvis", "abdomen", "chest", "head", "left_thigh", "right_thigh"]
+    joined = [("left_shank", "left_thigh"), ("right_shank", "right_thigh")]
+    pairs = [(a, b) for a in ends for b in core if (a, b) not in joined]
+    pairs += [(a, b) for a in ends[:4] for b in ends[4:]] + [("left_thigh", "right_thigh")]
+    deepest = 0.0
+    for pose in clip.poses[::4]:
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        for a, b in pairs:
+            if np.linalg.norm(data.body(a).xpos - data.body(b).xpos) < 0.5:
+                near = (mujoco.mj_geomDistance(model, data, i, j, 0.05, None) for i in drawn[a] for j in drawn[b])
+                deepest = max(deepest, -min(near))
+    return deepest

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from clip_measures import G, acceleration, limit_excess, measure, residuals, rms, slide, steps
+from clip_measures import G, acceleration, limit_excess, measure, overlap, residuals, rms, slide, steps
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
 from models.mocap import gait
@@ -57,6 +57,10 @@ def test_feet_do_not_slide_nor_sink(name, measured):
 
 def test_joints_stay_inside_their_ranges(name):
     assert limit_excess(embedded(name)) < 0
+
+
+def test_limbs_do_not_run_through_one_another(name):
+    assert overlap(embedded(name)) < 0.008
 
 
 def test_floor_contact_alone_can_drive_it(name, measured):
