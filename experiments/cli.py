@@ -29,12 +29,14 @@ class Run:
     """Folder to write."""
     overwrite: bool = False
     """Replace the run that the folder holds."""
+    view: bool = False
+    """Show the run in a browser while it goes on."""
 
     def __call__(self) -> int:
         """Run."""
         from experiments.run import run
 
-        run(self.config, self.out, self.overwrite, _STARTED)
+        run(self.config, self.out, self.overwrite, _STARTED, self.view)
         return 0
 
 

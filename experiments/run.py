@@ -17,14 +17,17 @@ from experiments.summary import RunSummary, SpeedSummary, summarise
 from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
 from models.mocap.bvh import write_bvh
 from models.mocap.clip import Clip
-from models.scene import SceneConfig, world_model
+from models.scene import P_WH, SceneConfig, world_model
+from sim.clock import RealTime
 from sim.compiled import is_cached
 from sim.errors import SimError
 from sim.loop import Loop, groups, record_into
 from sim.recorder import Recorder
 from sim.recording import Recording
 from sim.reference import poses_along
+from sim.servo import FrameLog, TickLog
 from sim.users.intent import Push
+from sim.viewer.page import LivePage, NullPage, Page
 
 Array = npt.NDArray[np.float64]
 
@@ -37,9 +40,10 @@ RECORDING, SUMMARY, REPORT, EDITED, DEFAULT, FIGURES = (
     "figures",
 )
 BVH_FPS = 50.0
+VIEW_BLOCK_SECONDS = 0.032  # a new picture for every block
 
 
-def run(config: RunConfig, out: Path, overwrite: bool, started: float) -> RunSummary:
+def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: bool = False) -> RunSummary:
     """Run and write everything into a folder.
 
     Parameters
@@ -52,6 +56,8 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float) -> RunSum
         Whether a run that it holds may be replaced.
     started : float
         `time.perf_counter` when the program began.
+    view : bool
+        Show the run in a browser while it goes on, at the pace of the wall clock.
 
     Raises
     ------
@@ -70,7 +76,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float) -> RunSum
     with Recorder(
         out / RECORDING, config_dict(config), config.seed, groups(session.servo), session.static()
     ) as recorder:
-        speed = _simulate(session, recorder, console, started)
+        speed = _simulate(session, recorder, console, started, view)
         recorder.flush()
         default, summary = _measure(out, session, speed)
         told = asdict(summary) | {"lines": summary.lines()}
@@ -130,10 +136,18 @@ def clips_of(recording: Recording) -> tuple[Clip, ...]:
     return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
 
 
-def _simulate(session: Session, recorder: Recorder, console: Console, started: float) -> SpeedSummary:
-    loop = Loop(session.servo, session.world, record_into(recorder, session.servo, session.world))
-    seconds = session.config.seconds
-    first = session.servo.plant.period * session.servo.figure_ticks
+def _simulate(session: Session, recorder: Recorder, console: Console, started: float, view: bool) -> SpeedSummary:
+    servo, seconds = session.servo, session.config.seconds
+    record = record_into(recorder, servo, session.world)
+    page = _live_page(session) if view else NullPage()
+    clock = RealTime()
+
+    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        record(ticks, frames, n)
+        page.show(servo.plant.qpos, ticks.hand[n - 1, 1:4], ticks.force[n - 1])
+
+    loop = Loop(servo, session.world, observe, *([VIEW_BLOCK_SECONDS] if view else []))
+    first = servo.plant.period * servo.figure_ticks
     loop.run(first)
     first_tick = time.perf_counter() - started
     with Progress(
@@ -141,8 +155,20 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
         TimeRemainingColumn(), console=console,
     ) as bar:  # fmt: skip
         task = bar.add_task("simulating", total=seconds)
-        times = loop.run(seconds - first, lambda t: bar.update(task, completed=t))
+
+        def progress(t: float) -> None:
+            bar.update(task, completed=t)
+            if view:
+                clock.wait_until(t)
+
+        times = loop.run(seconds - first, progress)
+    page.close()
     return SpeedSummary(times.real_time_factor, first_tick, _peak_memory_mb())
+
+
+def _live_page(session: Session) -> Page:
+    static = session.static()
+    return LivePage(session.world.model, np.asarray(static["curve"]), session.config.reach, P_WH)
 
 
 def _peak_memory_mb() -> float:

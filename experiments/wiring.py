@@ -161,8 +161,13 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     """
     if not 1 <= len(clips) <= 4:
         raise ParameterError(f"the cylindrical map blends 1 to 4 clips, got {len(clips)}")
-    if not (np.isfinite(config.seconds) and config.seconds > 0.0):
-        raise ParameterError(f"a run of {config.seconds} s; expected a positive, finite time")
+    if config.figure_ticks < 1:
+        raise ParameterError(
+            f"figure_ticks is {config.figure_ticks}; expected 1 or more servo ticks between two updates"
+        )
+    least = 2 * config.figure_ticks * config.scene.servo_period
+    if not least <= config.seconds < np.inf:
+        raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     for name in ("lap", "radius", "reach"):
         value = getattr(config, name)
         if not (np.isfinite(value) and value > 0.0):

@@ -92,12 +92,20 @@ class Loop:
         Whose addresses the servo holds; kept alive here.
     observe : Observer, optional
         What is done with each block, such as `record_into`.
+    block_seconds : float
+        Simulated time of a block [s], rounded to whole figure updates.
     """
 
-    def __init__(self, servo: Servo, world: World, observe: Observer = lambda ticks, frames, n: None):
+    def __init__(
+        self,
+        servo: Servo,
+        world: World,
+        observe: Observer = lambda ticks, frames, n: None,
+        block_seconds: float = BLOCK_SECONDS,
+    ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
-        self._block = every * max(1, round(BLOCK_SECONDS / servo.plant.period / every))
+        self._block = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
 
     @property
