@@ -1,9 +1,14 @@
 """Speed, as ratios measured within one run: ``make bench``."""
 
+import json
 import statistics
+import subprocess
+import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +17,7 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from experiments.run import SUMMARY
 from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
 from sim.compiled import entry_point
 from sim.loop import make_logs
@@ -33,6 +39,7 @@ def bench() -> None:
     print(f"two threads / twice one thread: {thread_scaling(lambda: wire(config, clips)):.2f} (≥ 0.90)")
     small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
     print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
+    print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
 
 
@@ -74,6 +81,15 @@ def thread_scaling(make: Callable[[], Session]) -> float:
             thread.join()
         ratios.append(alone / (time.perf_counter() - begin))
     return statistics.median(ratios)
+
+
+def second_start_seconds() -> float:
+    """Seconds from the start of a new process to its first tick, with the code already compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "experiments.cli", "run", "--seconds", "0.1", "--overwrite", "--out", folder]
+        subprocess.run(command, check=True, capture_output=True)
+        summary = json.loads((Path(folder) / SUMMARY).read_text(encoding="utf-8"))
+    return float(summary["speed"]["first_tick_seconds"])
 
 
 def _prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
