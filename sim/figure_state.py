@@ -24,6 +24,8 @@ class FigureGains(NamedTuple):
         Largest residual force as a share of body weight, and moment as a share of body weight × stature.
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
+    stance_height : float
+        Height from which the reference lifts a contact point that stood [m].
     flight_height : float
         The reference flies, and no residual is applied, while all its contact points are higher than this [m].
     lift_time : float
@@ -31,7 +33,7 @@ class FigureGains(NamedTuple):
     """
 
     joint_rate: float = 40.0
-    root_rate: float = 25.0
+    root_rate: float = 40.0
     root_pull: float = 30.0
     root_turn: float = 300.0
     linear_limit: float = 40.0
@@ -40,6 +42,7 @@ class FigureGains(NamedTuple):
     moment_bound: float = 0.2
     reference_reach: float = 0.03
     contact_reach: float = 0.001
+    stance_height: float = 0.008
     flight_height: float = 0.02
     lift_time: float = 0.02
 
@@ -70,7 +73,7 @@ class FigureState(NamedTuple):
     acceleration, wanted_root : Array
         Planned acceleration (57), and the root's as the feedback asks for it (6).
     share, near : Array
-        How much each contact point may bear, and how near the floor it is in the reference, 0 to 1, shape (10,).
+        How much each contact point may bear, and whether it stands in the reference, 0 to 1, shape (10,).
     force, given : Array
         Planned contact forces [N] in the world (10, 3) and the generalised forces they make (57).
     wrench : Array

@@ -17,7 +17,7 @@ from numba import njit
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-_ADHERENCE = 100.0  # κ
+_ADHERENCE = 300.0  # κ
 _SETTLING = 40.0  # η, rate at which a foot is asked to come to rest on the floor [1/s]
 N_LEG = 9
 
@@ -115,7 +115,7 @@ def stance_response(
         wanted[2] -= (0.5 * _SETTLING) ** 2 * max(0.0, points[p, 2])
         for k in range(N_LEG):
             for i in range(3):
-                weight = _ADHERENCE * (share[p] if i < 2 else near[p] * loaded)
+                weight = _ADHERENCE * near[p] * (min(1.0, share[p]) if i < 2 else loaded)
                 offset[k] += weight * J[i, k] * wanted[i]
                 for m in range(6):
                     response[k, m] -= weight * J[i, k] * J_root[i, m]

@@ -79,8 +79,8 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         s.points[c, 2] -= s.radius
         height = max(s.near[c], s.twin_contact_pos[s.twin_contact[c], 2]) - s.radius
         touch = _nearness(s.points[c, 2], s.gains.contact_reach)
-        s.near[c] = _nearness(height, s.gains.reference_reach)
-        s.share[c] = touch * s.near[c]
+        s.near[c] = _nearness(height, s.gains.stance_height)
+        s.share[c] = touch * _nearness(height, s.gains.reference_reach)
         support = max(support, touch * _nearness(height, s.gains.flight_height))
     return support
 
