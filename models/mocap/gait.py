@@ -57,7 +57,7 @@ class Gait:
         Between the feet [m]; of each foot outwards; of the hips, which lets the swinging leg pass the other [degrees].
     height, tilt : float
         Of the pelvis: mean [m], forwards [degrees].
-    turn, list : float
+    turn, obliquity : float
         Amplitudes of the pelvis about the vertical and about the line of travel [degrees].
     lean : float
         Of the trunk forwards, on top of the pelvis's tilt [degrees].
@@ -90,7 +90,7 @@ class Gait:
     height: float
     tilt: float
     turn: float
-    list: float
+    obliquity: float
     lean: float
     swing: tuple[float, float]
     elbow: tuple[float, float]
@@ -106,7 +106,7 @@ WALK = Gait(
     knee=(5, 10.5, 16.5, 18.5, 17.5, 15, 11.5, 8.5, 6.5, 7, 11, 20, 34, 48.5, 58.5, 61, 55.5, 43, 26.5, 11.5),
     ankle=(0, -5, -4, -0.5, 2.5, 4.5, 6, 7.5, 9, 9.8, 7.5, -2, -14.5, -18.5, -12.5, -5.5, -1, 1.5, 1.5, 0.5),
     heel=(0.0, 0.40), toe=(0.08, 0.62), width=0.11, splay=6.0, apart=0.0,
-    height=0.905, tilt=3.0, turn=5.0, list=4.0, lean=0.0, swing=(-3.0, 17.0), elbow=(24.0, 8.0), inward=6.0,
+    height=0.905, tilt=3.0, turn=5.0, obliquity=4.0, lean=0.0, swing=(-3.0, 17.0), elbow=(24.0, 8.0), inward=6.0,
     lead=0.28, lift=0.015, intervals=12,
 )  # fmt: skip
 
@@ -116,7 +116,7 @@ RUN = Gait(
     knee=(14, 28, 38, 41, 37, 29, 21, 17, 20, 33, 52, 72, 88, 94, 88, 72, 50, 28, 13, 9),
     ankle=(5, 10, 17, 21, 21, 15, 3, -12, -20, -18, -11, -5, -1, 2, 4, 5, 6, 6, 6, 5),
     heel=(0.0, 0.19), toe=(0.03, 0.355), width=0.11, splay=5.0, apart=6.0,
-    height=0.89, tilt=8.0, turn=6.0, list=4.0, lean=3.0, swing=(-12.0, 30.0), elbow=(96.0, 10.0), inward=3.0,
+    height=0.89, tilt=8.0, turn=6.0, obliquity=4.0, lean=3.0, swing=(-12.0, 30.0), elbow=(96.0, 10.0), inward=3.0,
     lead=0.27, lift=0.03, intervals=14,
 )  # fmt: skip
 
@@ -126,12 +126,12 @@ def _sketch(gait: Gait, phase: Array) -> Array:
     u = np.zeros((len(phase), N_TANGENT))
     wave = np.cos(2 * np.pi * phase)
     u[:, coordinate("position", "z")] = gait.height
-    list_, turn = np.deg2rad(gait.list) * np.cos(2 * np.pi * (phase - 0.14)), -np.deg2rad(gait.turn) * wave
-    u[:, 3:6] = np.stack([list_, np.full(len(phase), np.deg2rad(gait.tilt)), turn], axis=1)
-    # Abdomen and chest undo the pelvis's list and turn it back beyond straight; the head looks ahead.
+    obliquity, turn = np.deg2rad(gait.obliquity) * np.cos(2 * np.pi * (phase - 0.14)), -np.deg2rad(gait.turn) * wave
+    u[:, 3:6] = np.stack([obliquity, np.full(len(phase), np.deg2rad(gait.tilt)), turn], axis=1)
+    # Abdomen and chest undo the pelvis's obliquity and turn it back beyond straight; the head looks ahead.
     for joint, share in (("abdomen", 0.5), ("chest", 0.5), ("head", 0.0)):
         first = coordinate(joint, "x")
-        u[:, first] = -0.9 * share * list_
+        u[:, first] = -0.9 * share * obliquity
         u[:, first + 1] = share * np.deg2rad(gait.lean)
         u[:, first + 2] = -1.8 * share * turn
     u[:, coordinate("head", "y")] = -np.deg2rad(gait.tilt + gait.lean)
