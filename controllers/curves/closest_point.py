@@ -194,7 +194,13 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
     # From the warm leaf upwards, each sibling of an ancestor is searched if it is in reach; without one, the root.
     below = 1
     if np.isfinite(guess):
-        below = first_leaf + find_piece(blob, at, wrap_phase(blob, at, guess))
+        guess = wrap_phase(blob, at, guess)
+        # The hand may have moved over some pieces since: a Newton step follows it over them.
+        piece = find_piece(blob, at, guess)
+        f, slope = _slope(blob, rows + piece * PIECE, guess - blob[breaks + piece], px, py, pz)
+        if slope > 0.0:
+            guess = wrap_phase(blob, at, guess - f / slope)
+        below = first_leaf + find_piece(blob, at, guess)
     nodes[0], squares[0] = below, 0.0
     top = 1
     while True:

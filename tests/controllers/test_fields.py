@@ -95,6 +95,9 @@ def test_a_hand_that_is_not_finite_gives_a_force_that_is_not_finite_so_that_safe
     program = LAWS[0].program()
     memory = program.fresh_memory()
     assert np.isnan(_run(program, HandState.at([np.nan, 0, 0]), memory)[:3]).all()
+    for bunny in LAWS[1:]:
+        assert not np.isfinite(bunny.wrench(HandState.at([0.05, np.inf, 0])).force).all()
+    assert np.isnan(LAWS[1].wrench(HandState.at([0.05, 0, 0], t=np.nan)).force).all()
     assert np.isfinite(_run(program, HandState.at([0.05, 0, 0]), memory)).all()
 
 
