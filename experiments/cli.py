@@ -114,6 +114,23 @@ class Report:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """Render the Phantom and the figure of a run into a PNG file (headless: MUJOCO_GL=egl or osmesa)."""
+
+    folder: Positional[Path]
+    """Folder of a run."""
+    target: Positional[Path]
+    """PNG file to write."""
+
+    def __call__(self) -> int:
+        """Render."""
+        from experiments.picture import draw_picture
+
+        draw_picture(self.folder, self.target)
+        return 0
+
+
+@dataclass(frozen=True)
 class Reproduce:
     """Run a recording's configuration again and compare, bit for bit."""
 
@@ -145,6 +162,7 @@ Command = (
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
