@@ -50,6 +50,14 @@ def _names(node: h5py.Group) -> list[str]:
     return [str(name) for name in node]
 
 
+def _opened(path: Path) -> h5py.File:
+    """The file as it is, or, if its writer did not close it (yet), as a reader beside the writer."""
+    try:
+        return h5py.File(path, "r")
+    except OSError:
+        return h5py.File(path, "r", libver="latest", swmr=True)
+
+
 class Channel:
     """Rows of a channel, read from the file when they are sliced.
 
@@ -107,7 +115,7 @@ class Recording:
     def __init__(self, path: Path):
         self._path = path
         try:
-            self._file = h5py.File(path, "r", libver="latest", swmr=True)
+            self._file = _opened(path)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be opened ({error}); expected the run.h5 of a run") from None
         try:
