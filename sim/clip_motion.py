@@ -5,7 +5,7 @@ Poses are splined component by component, s(t) a C² cubic spline through the fr
 .. math:: \omega = \frac{2\,\mathrm{vec}(\bar s \dot s)}{\|s\|^2}, \qquad
           \dot\omega = \frac{2\,\mathrm{vec}(\bar s \ddot s)}{\|s\|^2} - \frac{2\,(s \cdot \dot s)}{\|s\|^2}\,\omega
 
-in its own frame, as in MuJoCo's qvel. Between frames at 30 a second or more the spline's norm leaves 1 by less than 1e-4.
+in its own frame, as in MuJoCo's qvel.
 """
 
 from typing import NamedTuple

@@ -5,13 +5,13 @@ to come from the ground asks for
 
 .. math:: \min_{x \ge 0}\ \tfrac12\|b - A x\|^2 + \tfrac12 \sum_j x_j^2 / s_j ,
 
-with a column of A for each edge and its *share* s_j ≥ 0: points high above the floor get a small one and lose their load
-gradually, not at once. The optimality conditions are x_j = s_j max(0, a_jᵀ y) with the residual y = b − A x, which leaves
+with a column of A for each edge and its *share* s_j ≥ 0: points above the floor get a small one and lose their load
+gradually, not at once. The optimality conditions are x_j = s_j max(0, a_jᵀ y) with the residual y = b − A x, and leave
 
 .. math:: y + \sum_j s_j \max(0, a_j^T y)\, a_j = b ,
 
-the stationarity of a strictly convex, piecewise quadratic function of y ∈ R⁶. Newton's method with exact Hessians ends in
-a handful of steps however many edges there are, and y itself is what the ground could not give.
+the stationarity of a strictly convex, piecewise quadratic function of y ∈ R⁶. Newton's method with exact Hessians ends
+in a handful of steps however many edges there are, and y itself is what the ground could not give.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The accelerations that bring the figure to its reference: feedforward and critically damped feedback on the manifold."""
+"""The accelerations that bring the figure to its reference: feedforward, and critically damped feedback."""
 
 import numpy as np
 from numba import njit

@@ -5,16 +5,16 @@ Whole-body inverse dynamics at each control tick (`sim.whole_body`). With the re
 
 .. math:: a^* = a_r + 2\omega\,(v_r - v) + \omega^2\,(q_r \ominus q) ,
 
-amended in the legs so that loaded feet rest (`sim.stance`). Nothing but the ground may push the root, so its six rows of
-M a + c = S^T τ + J^T f + w are a demand on the contact forces,
+amended in the legs so that loaded feet rest (`sim.stance`). Nothing but the ground may push the root, so its six rows
+of M a + c = S^T τ + J^T f + w are a demand on the contact forces,
 
 .. math:: (M a^* + c)_r = J_r^T f + w ,
 
-met by f within the friction cones of the points that touch (`sim.contact_forces`). The residual wrench w is what is left,
-bounded, in proportion to the support and zero while the reference flies or nothing touches: then the root falls as it must.
-The torques are the other 51 rows. A motor that would need more than its limit gives way: its joint's acceleration becomes the
-one that the limit allows, and the plan is made again; what the saturated joints of a standing leg cannot give is residual too.
-No spring holds the root.
+met by f within the friction cones of the points that touch (`sim.contact_forces`). The residual wrench w is what is
+left, bounded, in proportion to the support, and zero while the reference flies or nothing touches: then the root falls
+as it must. The torques are the other 51 rows. A motor that would need more than its limit gives way: its joint's
+acceleration becomes the one that the limit allows, and the plan is made again; what the saturated joints of a standing
+leg cannot give is residual too. No spring holds the root.
 """
 
 from dataclasses import dataclass, field
@@ -33,9 +33,10 @@ from models.humanoid.skeleton import (
     N_TANGENT,
     SEGMENTS,
 )
+from sim.compiled import entry_point
 from sim.contact_forces import N_EDGES
 from sim.errors import SimError
-from sim.figure_state import FigureGains, FigureState
+from sim.figure_state import Array, FigureGains, FigureState
 from sim.whole_body import figure_torque
 
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
@@ -43,6 +44,11 @@ __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
 _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
+
+
+@entry_point
+def _update(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    figure_torque(s, q_r, v_r, a_r)
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ class Figure:
     data: mujoco.MjData
     twin: mujoco.MjModel
     prefix: str = ""
-    gains: FigureGains = FigureGains()
+    gains: FigureGains = FigureGains()  # noqa: RUF009 - immutable
     twin_data: mujoco.MjData = field(init=False, repr=False)
     state: FigureState = field(init=False, repr=False)
 
@@ -80,6 +86,16 @@ class Figure:
                 raise SimError(f"FigureGains.{name} is {value}; expected a finite number > 0 (a bound may be 0)")
         object.__setattr__(self, "twin_data", mujoco.MjData(self.twin))
         object.__setattr__(self, "state", self._state())
+
+    def update(self, q_r: Array, v_r: Array, a_r: Array) -> None:
+        """Set torques and residual for a reference, once; loops call the kernel `figure_torque` instead.
+
+        Parameters
+        ----------
+        q_r, v_r, a_r : Array
+            Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
+        """
+        _update(self.state, q_r, v_r, a_r)
 
     def _state(self) -> FigureState:
         m, d, twin = self.model, self.data, self.twin

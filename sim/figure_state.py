@@ -17,9 +17,9 @@ class FigureGains(NamedTuple):
     joint_rate, root_rate : float
         ω of the critically damped feedback on joints and root [1/s].
     root_pull, root_turn : float
-        Largest acceleration that feedback may ask of the root [m/s²], [rad/s²]: a late landing is absorbed, not reversed.
+        Largest acceleration that feedback may ask of the root [m/s²], [rad/s²]: a late landing is absorbed.
     linear_limit, angular_limit : float
-        Largest acceleration of root and joints that is taken from the reference [m/s²], [rad/s²]: captured motion is rough.
+        Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is rough.
     force_bound, moment_bound : float
         Largest residual force as a share of body weight, and moment as a share of body weight × stature.
     reference_reach, contact_reach : float

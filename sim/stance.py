@@ -1,13 +1,14 @@
 r"""How the legs move while their feet stand: the floor, not the reference, says where a loaded foot is.
 
-A foot that landed a centimetre from where the reference has it would be torn along the floor by the feedback, and the friction
-that this meets is a force nobody planned. So the wanted accelerations a_ℓ of a leg's nine degrees of freedom are amended, by as
-little as possible, towards contact points at rest:
+A foot that landed a centimetre from where the reference has it would be torn along the floor by the feedback, and the
+friction that this meets is a force nobody planned. So the wanted accelerations of a leg's nine degrees of freedom are
+amended, by as little as possible, towards contact points at rest on the floor:
 
-.. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p s_p\,\|J_p^\ell(a_\ell^* + \delta) + J_p^r a_r + \dot J_p v
-          + \eta\,\dot p\|^2 ,
+.. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p
+          + \tfrac14 \eta^2 h_p e_z\|^2_{W_p} ,
 
-with each point's share s_p of the load, in the form δ = δ_0 + K a_r, since the root's acceleration is not known yet.
+over the points p that stand in the reference; the weights W_p hold a point along the floor as far as it bears load, and
+bring it down (h_p is its height) as far as any point of its foot does: a foot that lands tilted is set flat.
 """
 
 import numpy as np
@@ -44,13 +45,13 @@ def stance_response(
     points, share : Array
         Positions (n, 3) of the foot's contact points in the world, floor at z = 0, and their shares (n,).
     near : Array
-        1 where the reference has the point on the floor, 0 where it has it off the floor, shape (n,).
+        1 where the point stands in the reference, 0 where it does not, shape (n,).
     xpos, xmat : Array
         Positions (18, 3) and rotation matrices (18, 9) of the figure's bodies.
     v, a : Array
         Velocity and wanted acceleration of the figure (57).
     offset, response : Array
-        Results δ_0 (9,) and K (9, 6).
+        Results: δ (9,), and its derivative K by the root's acceleration (9, 6), how the leg follows the root.
     """
     offset[:] = 0.0
     response[:] = 0.0

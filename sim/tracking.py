@@ -1,4 +1,4 @@
-"""A clip through the physical figure alone: what joint torques and the ground can do of it, and how much help it took."""
+"""A clip through the physical figure alone: what torques and ground can do of it, and how much help it took."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from sim.figure import CONTACTS, Figure, FigureGains, FigureState, figure_torque
 from sim.native import mj_step
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 _PREFIX = "figure/"
 _TOUCH = 1e-3  # a contact point this near the floor stands on it [m]
@@ -136,8 +137,8 @@ class TrackingReport:
         """One line for people."""
         return (
             f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
-            f"(largest {100 * self.root_error_max:.1f}), residual {100 * self.residual_force:.1f} % of body weight RMS in "
-            f"stance (largest {100 * self.residual_force_max:.0f} %), {self.flight_seconds:.2f} s of flight, "
+            f"(largest {100 * self.root_error_max:.1f}), residual {100 * self.residual_force:.1f} % of body weight RMS "
+            f"in stance (largest {100 * self.residual_force_max:.0f} %), {self.flight_seconds:.2f} s of flight, "
             f"feet on the ground {100 * self.grounded:.0f} % of stance"
         )
 
@@ -190,7 +191,7 @@ def tracked_motion(clip: Clip, seconds: float, config: TrackingConfig) -> Tracke
     figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains)
     period = config.physics_step * config.control_steps
     n = max(1, round(seconds / period))
-    reference = clip_motion(clip, period * np.arange(n))
+    reference = clip_motion(clip, period * np.arange(n, dtype=np.float64))
     data.qpos[:], data.qvel[:] = reference.poses[0], reference.velocities[0]
     mujoco.mj_forward(model, data)
     poses, reports, flying = np.empty((n, model.nq)), np.empty((n, 8)), np.empty(n)
@@ -219,7 +220,8 @@ def report(motion: TrackedMotion) -> TrackingReport:
     root = np.linalg.norm(difference[:, :3], axis=1)
     force = np.linalg.norm(wrench[:, :3], axis=1) / motion.weight
     moment = np.linalg.norm(wrench[:, 3:], axis=1) / (motion.weight * motion.stature)
-    stands, touches = motion.flying == 0.0, motion.contacts[:, :, 2] < _TOUCH
+    stands: Flags = np.equal(motion.flying, 0.0)
+    touches: Flags = np.less(motion.contacts[:, :, 2], _TOUCH)
     return TrackingReport(
         seconds=period * len(times),
         flight_seconds=period * float(np.sum(~stands)),
@@ -242,7 +244,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def _slide(contacts: Array, touches: npt.NDArray[np.bool_]) -> float:
+def _slide(contacts: Array, touches: Flags) -> float:
     """Largest distance of a touching point from where it began to touch."""
     largest = 0.0
     for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):

@@ -1,5 +1,6 @@
 """The control of the physical figure, compiled: see `sim.figure` for its equations."""
 
+import numpy as np
 from numba import njit
 
 from sim.contact_forces import N_EDGES, cone_edges, shared_forces
@@ -42,13 +43,12 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
         s.acceleration[:6] = s.wanted_root
         _plan_contacts(s, support)
         _let_root_fall(s, support)
-        saturated = _plan_torques(s)
-        if saturated == 0 or plan == _PLANS - 1 or not _give_way(s):
+        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
             break
     _make_up_for_legs(s, support)
     s.applied[:] = s.wrench
     s.report[0] = support
-    s.report[1] = saturated
+    s.report[1] = np.sum(np.abs(s.ctrl) >= 0.999 * s.torque_limit)
     s.report[2:] = s.wrench
 
 
@@ -63,8 +63,8 @@ def _nearness(height: float, reach: float) -> float:
 def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     """Share of each contact point: it touches, and the reference has it near the floor now and a moment ahead.
 
-    A point that the reference is about to lift is unloaded before, so that its leg need not catch up. Returns the largest
-    share by the narrower measure of what counts as flight.
+    A point that the reference is about to lift is unloaded before, so that its leg need not catch up. Returns the
+    largest share by the narrower measure of what counts as flight.
     """
     s.twin_qpos[:] = q_r
     mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.gains.lift_time)
@@ -161,9 +161,9 @@ def _let_root_fall(s: FigureState, support: float) -> None:
 
 
 @njit
-def _plan_torques(s: FigureState) -> int:
-    """Torques of the planned motion within the motors' limits; returns how many are saturated."""
-    a, saturated = s.acceleration, 0
+def _plan_torques(s: FigureState) -> bool:
+    """Torques of the planned motion, within the motors' limits; returns whether any needed more."""
+    a, saturated = s.acceleration, False
     for motor in range(s.ctrl.shape[0]):
         i = motor + 6
         torque = s.bias[i] - s.passive[i] - s.given[i]
@@ -173,7 +173,7 @@ def _plan_torques(s: FigureState) -> int:
         s.ctrl[motor] = min(max(torque, -limit), limit)
         s.lost[motor] = torque - s.ctrl[motor]
         if s.lost[motor] != 0.0:
-            saturated += 1
+            saturated = True
     return saturated
 
 
@@ -212,7 +212,7 @@ def _give_way(s: FigureState) -> bool:
 
 @njit
 def _make_up_for_legs(s: FigureState, support: float) -> None:
-    """What standing legs cannot give within their limits is residual: by virtual work of a leg that follows, Kᵀ lost."""
+    """What standing legs cannot give within their limits is residual, by virtual work: Kᵀ lost."""
     for leg in range(2):
         for k in range(N_LEG):
             lost = s.lost[3 * s.legs[leg, k // 3] + k % 3 - 3]

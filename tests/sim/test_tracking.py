@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from models.humanoid.skeleton import JOINTS, rest_pose
+from models.mocap.clip import Clip
+from models.mocap.library import embedded, embedded_names
+from sim.errors import SimError
+from sim.figure import FigureGains
+from sim.tracking import TrackingConfig, report, track, tracked_motion
+
+
+def _squats() -> Clip:
+    """Knee bends once in two seconds, feet flat, arms down."""
+    time = np.arange(121) / 60
+    bend = 0.3 * (1 - np.cos(np.pi * time))
+    poses = np.tile(rest_pose(), (len(time), 1))
+    poses[:, 2] -= 0.8606 * (1 - np.cos(bend))
+    for side, sign in (("left", 1), ("right", -1)):
+        for joint, axis, angle in (
+            ("hip", 2, -bend), ("knee", 2, 2 * bend), ("ankle", 2, -bend), ("shoulder", 1, -1.3 * sign * np.ones(121)),
+        ):  # fmt: skip
+            first = 7 + 4 * JOINTS.index(f"{side}_{joint}")
+            poses[:, first], poses[:, first + axis] = np.cos(angle / 2), np.sin(angle / 2)
+    return Clip(poses, 60.0, "squats")
+
+
+def test_a_feasible_motion_needs_no_help():
+    result = track(_squats(), 2.5)
+    assert result.joint_error < 1.0
+    assert result.root_error_max < 0.005
+    assert result.residual_force_max < 0.01
+    assert result.grounded == 1.0
+    assert result.flight_seconds == 0.0
+    assert result.warnings == 0
+
+
+def test_light_and_tall_figures_squat_too():
+    result = track(_squats(), 1.0, TrackingConfig(mass=50.0))
+    assert result.joint_error < 1.0
+    assert result.residual_force_max < 0.01
+
+
+def test_the_walk_stays_within_its_figures():
+    result = track(embedded("walk"), 4.0)
+    assert result.joint_error <= 5.0
+    assert result.root_error_max <= 0.05
+    assert result.residual_force <= 0.15
+    assert result.grounded >= 0.99
+    assert result.slide <= 0.03
+    assert result.warnings == 0
+
+
+def test_the_run_flies_without_help():
+    motion = tracked_motion(embedded("run"), 3.0, TrackingConfig())
+    result = report(motion)
+    assert result.flight_seconds > 0.2
+    assert result.residual_in_flight == 0.0
+    assert np.all(motion.reports[motion.flying == 1.0, 2:] == 0.0)
+    assert result.joint_error <= 5.0
+    assert result.root_error_max <= 0.05
+
+
+@pytest.mark.parametrize("name", embedded_names())
+def test_every_embedded_clip_goes_through_the_physics(name):
+    result = track(embedded(name), 2.0)
+    assert result.warnings == 0
+    assert result.residual_in_flight == 0.0
+    assert result.residual_force_max <= FigureGains().force_bound * (1 + 1e-9)
+    assert np.isfinite(result.joint_error)
+    assert result.joint_error < 10.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", embedded_names())
+def test_ten_seconds_of_every_embedded_clip(name):
+    result = track(embedded(name), 10.0)
+    assert result.warnings == 0
+    assert result.residual_in_flight == 0.0
+    assert result.joint_error < 10.0
+
+
+def test_an_infeasible_motion_shows_in_the_residual():
+    glide = _squats()
+    poses = np.tile(glide.poses[0], (121, 1))
+    poses[:, 0] = 0.3 * np.sin(np.arange(121) / 60 * 2 * np.pi * 1.5)  # the whole body slides to and fro, feet and all
+    result = track(Clip(poses, 60.0, "glide"), 1.5)
+    assert result.residual_force > 0.05 or result.root_error > 0.05
+
+
+def test_the_same_motion_tracks_the_same_every_time():
+    first, second = (tracked_motion(_squats(), 0.5, TrackingConfig()) for _ in range(2))
+    np.testing.assert_array_equal(first.poses, second.poses)
+    np.testing.assert_array_equal(first.reports, second.reports)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"), [({"physics_step": 0.0}, "physics step"), ({"control_steps": 0}, "control every 0")]
+)
+def test_steps_that_make_no_sense_are_refused(arguments, message):
+    with pytest.raises(SimError, match=message):
+        TrackingConfig(**arguments)
+
+
+def test_no_time_is_refused():
+    with pytest.raises(SimError, match=r"-1\.0 s of tracking"):
+        track(_squats(), -1.0)
