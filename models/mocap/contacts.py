@@ -1,0 +1,78 @@
+"""When a clip touches the floor: robust to the few centimetres by which retargeted captures miss it.
+
+A part of the body that bears load is near the floor *and* at rest. Height alone does not tell: runners' soles clear
+the floor by less than a capture's feet hover over it. Hands bear on fingers that the figure lacks, so their reach is
+longer.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
+from models.mocap.clip import Clip
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+_CERTAIN = 0.005  # what is lower than this touches, however fast [m]
+_REACH, _HAND_REACH = 0.06, 0.12  # what is higher than this does not, however slow [m]
+_SLOW = 0.6  # m/s: soles that stand slip and roll slower, soles that fly pass faster
+
+
+class Contacts(NamedTuple):
+    """Parts of the body against the floor, of n frames.
+
+    Attributes
+    ----------
+    heights : array, shape (n, m)
+        Of the lowest points over the floor [m]: the feet's 8 contact spheres, the hands' 2, then all other shapes of
+        the body.
+    touching : array of bool, shape (n, m)
+        Which of them are taken to bear load.
+    """
+
+    heights: Array
+    touching: Mask
+
+    @property
+    def clearance(self) -> Array:
+        """Height of the lowest point of the body [m], shape (n,)."""
+        return self.heights.min(axis=1)
+
+    @property
+    def supported(self) -> Mask:
+        """Whether anything bears load, shape (n,)."""
+        return np.any(self.touching, axis=1)
+
+    @property
+    def standing(self) -> Mask:
+        """Whether each foot bears load, left and right, shape (n, 2)."""
+        return np.stack([self.touching[:, :4].any(axis=1), self.touching[:, 4:8].any(axis=1)], axis=1)
+
+
+def contacts(clip: Clip) -> Contacts:
+    """What of the figure touches the floor z = 0 in each frame of a clip."""
+    model = figure_model()
+    data = mujoco.MjData(model)
+    spheres = [int(model.geom(name).id) for name in FOOT_CONTACTS + HAND_CONTACTS]
+    ends = {int(model.geom_bodyid[geom]) for geom in spheres}
+    others = [geom for geom in range(model.ngeom) if int(model.geom_bodyid[geom]) not in ends]
+    middle, half = model.geom_aabb[others, :3], model.geom_aabb[others, 3:]
+    places = np.empty((clip.n_frames, len(spheres) + len(others), 3))
+    for k, pose in enumerate(clip.poses):
+        data.qpos = pose
+        mujoco.mj_kinematics(model, data)
+        R = data.geom_xmat[others].reshape(-1, 3, 3)
+        places[k, : len(spheres)] = data.geom_xpos[spheres] - (0.0, 0.0, CONTACT_RADIUS)
+        places[k, len(spheres) :] = data.geom_xpos[others] + np.einsum("gij,gj->gi", R, middle)
+        places[k, len(spheres) :, 2] -= np.einsum("gj,gj->g", np.abs(R[:, 2]), half)
+    speeds = np.zeros(places.shape[:2])
+    if clip.n_frames > 1:
+        speeds = np.linalg.norm(np.gradient(places, 1.0 / clip.fps, axis=0), axis=2)
+    heights = places[:, :, 2]
+    reach = np.full(heights.shape[1], _REACH)
+    reach[len(FOOT_CONTACTS) : len(spheres)] = _HAND_REACH
+    return Contacts(heights, (heights < _CERTAIN) | ((heights < reach) & (speeds < _SLOW)))

@@ -1,0 +1,51 @@
+"""Centre of mass of a clip, and what turns about it: angular momentum and inertia, frame by frame."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+
+Array = npt.NDArray[np.float64]
+
+
+class Momentum(NamedTuple):
+    """Motion of the whole body, of n frames, in the world.
+
+    Attributes
+    ----------
+    com : array, shape (n, 3)
+        Centre of mass [m].
+    angular : array, shape (n, 3)
+        Angular momentum about the centre of mass [kg m²/s].
+    inertia : array, shape (n, 3, 3)
+        Inertia about the centre of mass, of the pose as if it were rigid [kg m²].
+    """
+
+    com: Array
+    angular: Array
+    inertia: Array
+
+
+def momentum(clip: Clip) -> Momentum:
+    """Centre of mass, angular momentum and inertia of a clip on the default figure, velocities by differences."""
+    model = figure_model()
+    data = mujoco.MjData(model)
+    pelvis, bodies = model.body("pelvis").id, slice(1, model.nbody)
+    com, angular, inertia = (np.empty((clip.n_frames, *shape)) for shape in ((3,), (3,), (3, 3)))
+    for k, (pose, velocity) in enumerate(zip(clip.poses, clip.velocities(), strict=True)):
+        data.qpos, data.qvel = pose, velocity
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        com[k], angular[k] = data.subtree_com[pelvis], data.subtree_angmom[pelvis]
+        R = data.ximat[bodies].reshape(-1, 3, 3)
+        arm = data.xipos[bodies] - com[k]
+        own = np.einsum("bij,bj,bkj->ik", R, model.body_inertia[bodies], R)
+        steiner = np.einsum("b,bi,bj->ij", model.body_mass[bodies], arm, arm)
+        inertia[k] = own + np.trace(steiner) * np.eye(3) - steiner
+    return Momentum(com, angular, inertia)

@@ -1,0 +1,103 @@
+"""Legs that follow a moved body: feet that stand stay where they are, knees bend about their own axes."""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
+from models.mocap import quaternions
+
+Array = npt.NDArray[np.float64]
+
+_REACH = 0.9995  # share of a leg's length that a knee can straighten to
+_CHAINS = tuple(
+    tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
+)
+
+
+def leg_lines(poses: Array) -> tuple[Array, float]:
+    """From hips to ankles in the world [m], left and right, shape (n, 2, 3), and the length of a straight leg [m]."""
+    thigh, shank = _bones()
+    segments = _segment_rotations(poses)
+    lines = [
+        quaternions.rotated(segments[:, first], thigh) + quaternions.rotated(segments[:, second], shank)
+        for first, second, _ in _CHAINS
+    ]
+    return np.stack(lines, axis=1), float(np.linalg.norm(thigh) + np.linalg.norm(shank))
+
+
+def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
+    """Poses moved as a whole, but for the feet that stand.
+
+    Parameters
+    ----------
+    poses : array, shape (n, 75)
+        MuJoCo's qpos.
+    shift : array, shape (n, 3)
+        How far the body is moved [m].
+    planted : array, shape (n, 2)
+        How far each foot stays behind, left and right: 1 keeps its place, 0 moves it with the body. Its orientation in
+        the world stays in any case.
+
+    Returns
+    -------
+    array, shape (n, 75)
+        An ankle that would be out of reach is drawn in along the line from the hip.
+    """
+    thigh, shank = _bones()
+    a, b = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
+    segments = _segment_rotations(poses)
+    moved = poses.copy()
+    moved[:, :3] += shift
+    for leg, (first, second, third) in enumerate(_CHAINS):
+        upper = quaternions.rotated(segments[:, first], thigh)
+        lower = quaternions.rotated(segments[:, second], shank)
+        wanted = upper + lower - planted[:, leg, None] * shift
+        distance = np.minimum(np.linalg.norm(wanted, axis=1), _REACH * (a + b))
+        axis = np.cross(upper, lower)
+        sine = np.linalg.norm(axis, axis=1)
+        side = quaternions.rotated(segments[:, first], np.array([0.0, 1.0, 0.0]))
+        # A straight knee has no plane of its own; it bends about the thigh's sideways axis.
+        axis = np.where((sine > 0.03 * a * b)[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
+        now = np.arctan2(np.sum(np.cross(upper, lower) * axis, axis=1), np.sum(upper * lower, axis=1))
+        then = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
+        changed = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
+        bend = _turn(axis, np.where(changed, then - np.abs(now), 0.0))
+        swing = _arc(upper + quaternions.rotated(bend, lower), np.where(changed[:, None], wanted, upper + lower))
+        new_thigh = quaternions.product(swing, segments[:, first])
+        new_shank = quaternions.product(swing, quaternions.product(bend, segments[:, second]))
+        for body, parent, child in (
+            (first, segments[:, 0], new_thigh),
+            (second, new_thigh, new_shank),
+            (third, new_shank, segments[:, third]),
+        ):
+            moved[:, 3 + 4 * body : 7 + 4 * body] = quaternions.product(quaternions.conjugate(parent), child)
+    return moved
+
+
+def _bones() -> tuple[Array, Array]:
+    """Thigh and shank in their own frames [m]."""
+    model = figure_model()
+    return model.body("left_shank").pos, model.body("left_foot").pos
+
+
+def _segment_rotations(poses: Array) -> Array:
+    """R_WS of the 18 segments, shape (n, 18, 4)."""
+    local = poses[:, 3:].reshape(len(poses), -1, 4)
+    world = local.copy()
+    for index, segment in enumerate(SEGMENTS):
+        if segment.parent >= 0:
+            world[:, index] = quaternions.product(world[:, segment.parent], local[:, index])
+    return world
+
+
+def _turn(axis: Array, angle: Array) -> Array:
+    """Rotations about unit axes (n, 3) by angles (n,), shape (n, 4)."""
+    half = angle[:, None] / 2.0
+    return np.concatenate([np.cos(half), np.sin(half) * axis], axis=1)
+
+
+def _arc(u: Array, v: Array) -> Array:
+    """The smallest rotations that turn directions u into directions v, less than half a turn apart, (n, 3) → (n, 4)."""
+    u, v = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (u, v))
+    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
