@@ -233,7 +233,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
         residual_moment=_rms(moment[stands]),
         residual_moment_max=float(moment.max()),
         residual_in_flight=float(np.abs(wrench[~stands]).max(initial=0.0)),
-        grounded=float(np.mean(touches.any(axis=1)[stands])) if stands.any() else 1.0,
+        grounded=float(np.mean(np.any(touches[stands], axis=1))) if stands.any() else 1.0,
         slide=_slide(motion.contacts, touches),
         saturation=float(motion.reports[:, 1].mean()) / 51.0,
         warnings=motion.warnings,
