@@ -7,6 +7,7 @@ import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -197,15 +198,19 @@ def _write_animations(out: Path, default: Array) -> None:
 
 
 def write_report_of(folder: Path) -> None:
-    """Draw the figures and the page of a run from its recording."""
+    """Draw the figures and the page of a run from its recording, also of a run that was cut short."""
     from experiments.figures import draw_figures
     from experiments.report import write_report
 
     with Recording(folder / RECORDING) as recording:
-        if recording.summary is None:
-            raise SimError(f"{folder}: the run did not come to its end; there is no summary to report")
         config = config_of(recording)
         figures = draw_figures(recording, folder / FIGURES)
-        lines = recording.summary["lines"]
-        title = f"{config.mode.upper()} over {', '.join(config.clips)}"
-        write_report(folder / REPORT, recording, world_model(config.scene), title, lines, figures)  # pyright: ignore
+        title = f"{config.mode.upper()} over {', '.join(Path(clip).stem for clip in config.clips)}"
+        write_report(folder / REPORT, recording, world_model(config.scene), title, _lines(recording), figures)
+
+
+def _lines(recording: Recording) -> list[str]:
+    if recording.summary is None:
+        t = recording.channel("ticks", "t")
+        return [f"The run was cut short: {t[-1]:.1f} s of it are recorded, and there is no summary."]
+    return [str(line) for line in cast(list[object], recording.summary["lines"])]

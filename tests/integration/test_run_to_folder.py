@@ -1,0 +1,119 @@
+"""A run from the command line to its folder: what it writes, what it measures, and that it happens again."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from models.mocap.library import load_clip
+from sim.recording import Recording
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("runs") / "pushed"
+    assert main(["run", "--clips", "cheer", "angry", "--user", "push", "--seconds", "9", "--out", str(out)]) == 0
+    return out
+
+
+def test_everything_is_written(folder: Path) -> None:
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    figures = {f"figures/{name}.png" for name in ("path", "deviation", "forces", "torques", "figure")}
+    assert names == {"run.h5", "summary.json", "report.html", "edited.bvh", "default.bvh"} | figures
+
+
+def test_a_relaxed_hand_stays_within_a_millimetre_of_the_curve(folder: Path) -> None:
+    path = json.loads((folder / "summary.json").read_text())["path"]
+    assert path["deviation_rms_mm"] <= 1.0
+
+
+def test_the_deviation_follows_the_push(folder: Path) -> None:
+    pushes = json.loads((folder / "summary.json").read_text())["path"]["pushes"]
+    assert len(pushes) == 2
+    for push in pushes:
+        assert push["deviation_mm"] > 5.0
+        assert push["along_push"] > 0.95
+
+
+def test_the_animation_differs_where_and_only_where_it_was_pushed(folder: Path) -> None:
+    """Frame by frame: the two files are in step, so a difference is the hand's doing."""
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["animation"]["pushed_deg"] > 5.0
+    assert summary["animation"]["unpushed_deg"] < 1.0
+    edited, default = load_clip(folder / "edited.bvh"), load_clip(folder / "default.bvh")
+    assert edited.n_frames == default.n_frames
+    assert edited.fps == default.fps == 50.0
+    t = np.arange(edited.n_frames) / edited.fps
+    apart = np.linalg.norm(edited.poses[:, 7:] - default.poses[:, 7:], axis=1)
+    pushes = summary["path"]["pushes"]
+    pushed = np.any([(t > p["start"]) & (t < p["start"] + p["seconds"]) for p in pushes], axis=0)
+    near = np.any([(t > p["start"] - 0.05) & (t < p["start"] + p["seconds"] + 1.0) for p in pushes], axis=0)
+    assert apart[pushed].max() > 10.0 * apart[~near & (t > 1.0)].max()
+
+
+def test_the_physical_figure_follows_without_warnings(folder: Path) -> None:
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["warnings"] == {}
+    assert summary["figure"]["residual_in_flight_max"] == 0.0
+    assert summary["figure"]["root_error_max_cm"] < 5.0
+
+
+def test_memory_stays_below_a_gigabyte(folder: Path) -> None:
+    assert json.loads((folder / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0
+
+
+def test_a_run_is_reproduced_bit_for_bit_from_its_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", str(folder)]) == 0
+    assert "bit for bit, over 9000 ticks" in capsys.readouterr().out
+
+
+def test_another_gain_is_told_apart(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The comparison can fail: a recording whose configuration is altered is not the same."""
+    import shutil
+
+    import h5py
+
+    altered = tmp_path / "altered"
+    shutil.copytree(folder, altered)
+    with h5py.File(altered / "run.h5", "r+") as file:
+        config = json.loads(file["config"][()])
+        del file["config"]
+        file["config"] = json.dumps(config | {"stiffness": 301.0})
+    assert main(["reproduce", str(altered)]) == 1
+    assert "differs first at tick" in capsys.readouterr().out
+
+
+def test_a_run_that_is_killed_keeps_what_it_recorded_and_can_be_reported(tmp_path: Path) -> None:
+    out = tmp_path / "killed"
+    command = [
+        sys.executable,
+        "-m",
+        "experiments.cli",
+        "run",
+        "--clips",
+        "cheer",
+        "--seconds",
+        "600",
+        "--out",
+        str(out),
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(600):
+        time.sleep(0.5)
+        if (out / "run.h5").exists() and (out / "run.h5").stat().st_size > 3e6:
+            break
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    with Recording(out / "run.h5") as recording:
+        assert not recording.complete
+        assert len(recording.channel("ticks", "t")) > 1000
+    assert main(["report", str(out)]) == 0
+    assert "cut short" in (out / "report.html").read_text(encoding="utf-8")
