@@ -64,6 +64,21 @@ class ClipBallistics:
     bounds: RateBounds
     certificate: Certificate
 
+    def lines(self) -> tuple[str, ...]:
+        """The verdicts and the admissible rates in words, a line each."""
+        verdicts = [f"{name}: {found.verdict}; {found.reason}" for name, found in self.certificate.verdicts.items()]
+        rates = [
+            f"flight at {flight.fit.time:.2f} s: seen as natural {_in_words(flight.seen)} of its speed, can be done "
+            f"{_in_words(flight.done)}; true gravity asks for a take-off at {flight.fit.take_off_speed:.2f} m/s, "
+            f"recorded {flight.fit.take_off[2]:.2f}"
+            for flight in self.flights
+        ]
+        return (*verdicts, *rates)
+
+
+def _in_words(rates: tuple[float, float] | None) -> str:
+    return "at no rate" if rates is None else f"at {rates[0]:.2f} to {rates[1]:.2f}"
+
 
 class FlightTrial(NamedTuple):
     """A flight of the physical figure, with no force but gravity.
