@@ -1,0 +1,43 @@
+"""The physical figure on its own, following clips: how well, and with how much help."""
+
+import json
+from dataclasses import asdict
+
+from rich.console import Console
+
+from experiments.wiring import load_clips
+from models.mocap.library import embedded_names
+from sim.compiled import is_cached
+from sim.tracking import track
+
+
+def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
+    """Track clips and print a report of each.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Embedded clips or files; all embedded clips if there is none.
+    seconds : float
+        Simulated time for each [s].
+    as_json : bool
+        Print one JSON object, clip by clip, instead of a line each.
+
+    Raises
+    ------
+    ModelError, SimError
+        If a clip cannot be read or the time is not positive.
+    """
+    console = Console(stderr=True)
+    names = names or embedded_names()
+    clips, remarks = load_clips(names)
+    for remark in remarks:
+        console.print(remark, highlight=False)
+    if not is_cached():
+        console.print("Compiling the figure's control; this happens once for each version of the code.")
+    reports = {name: track(clip, seconds) for name, clip in zip(names, clips, strict=True)}
+    if as_json:
+        print(json.dumps({name: asdict(report) for name, report in reports.items()}, indent=2))
+        return
+    for name, report in reports.items():
+        print(f"{name}: {report}")
