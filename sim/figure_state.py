@@ -41,7 +41,7 @@ class FigureGains(NamedTuple):
     force_bound: float = 1.0
     moment_bound: float = 0.2
     reference_reach: float = 0.03
-    contact_reach: float = 0.001
+    contact_reach: float = 0.002
     stance_height: float = 0.008
     flight_height: float = 0.02
     lift_time: float = 0.02

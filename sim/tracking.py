@@ -19,7 +19,6 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 _PREFIX = "figure/"
-_TOUCH = 1e-3  # a contact point this near the floor stands on it [m]
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
     force = np.linalg.norm(wrench[:, :3], axis=1) / motion.weight
     moment = np.linalg.norm(wrench[:, 3:], axis=1) / (motion.weight * motion.stature)
     stands: Flags = np.equal(motion.flying, 0.0)
-    touches: Flags = np.less(motion.contacts[:, :, 2], _TOUCH)
+    touches: Flags = np.less(motion.contacts[:, :, 2], 0.0)
     return TrackingReport(
         seconds=period * len(times),
         flight_seconds=period * float(np.sum(~stands)),
