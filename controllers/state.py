@@ -60,6 +60,13 @@ class HandState:
         upright = np.array([1.0, 0.0, 0.0, 0.0])
         return HandState(t, np.asarray(p, dtype=float), upright, np.asarray(v, dtype=float), np.zeros(3))
 
+    @staticmethod
+    def of(vector: Array) -> "HandState":
+        """Hand of a vector of `HAND_SIZE` numbers."""
+        p, q, v = vector[HAND_POSITION:HAND_QUATERNION], vector[HAND_QUATERNION:HAND_VELOCITY], vector[HAND_VELOCITY:]
+        w = vector[HAND_ANGULAR_VELOCITY:HAND_SWITCH].copy()
+        return HandState(float(vector[HAND_TIME]), p.copy(), q.copy(), v[:3].copy(), w, vector[HAND_SWITCH] > 0.0)
+
     def vector(self) -> Array:
         """Array of the `HAND_SIZE` numbers that compiled laws read."""
         return np.concatenate(([self.t], self.p, self.q, self.v, self.w, [float(self.switch)]))

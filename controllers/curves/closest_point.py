@@ -91,9 +91,7 @@ def _variations(b: Array) -> int:
 
 
 @njit
-def _nearest_on_piece(
-    blob: Array, row: int, h: float, px: float, py: float, pz: float, b: Array
-) -> tuple[float, float]:
+def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: float, b: Array) -> tuple[float, float]:
     """(d², u) of the point of one piece nearest to p; `b` is scratch of shape (48, 8)."""
     best, best_u = _square(blob, row, 0.0, px, py, pz), 0.0
     end = _square(blob, row, h, px, py, pz)
@@ -148,7 +146,7 @@ def _nearest_on_piece(
 
 
 @njit
-def _chord_square(blob: Array, node: int, px: float, py: float, pz: float) -> float:
+def chord_square(blob: Array, node: int, px: float, py: float, pz: float) -> float:
     """Squared distance from p to the chord of the capsule at ``blob[node]``."""
     x, y, z = px - blob[node], py - blob[node + 1], pz - blob[node + 2]
     dx, dy, dz = blob[node + 3], blob[node + 4], blob[node + 5]
@@ -211,8 +209,8 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
                 continue
             if node < first_leaf:
                 near, far = 2 * node, 2 * node + 1
-                near_square = _chord_square(blob, tree + NODE * near, px, py, pz)
-                far_square = _chord_square(blob, tree + NODE * far, px, py, pz)
+                near_square = chord_square(blob, tree + NODE * near, px, py, pz)
+                far_square = chord_square(blob, tree + NODE * far, px, py, pz)
                 if far_square < near_square:
                     near, far, near_square, far_square = far, near, far_square, near_square
                 nodes[top], squares[top] = far, far_square
@@ -222,14 +220,14 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
                 piece = node - first_leaf
                 start = blob[breaks + piece]
                 h = blob[breaks + piece + 1] - start
-                square, u = _nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
+                square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
                 distance = math.sqrt(square)
                 if distance < best - _TIE:
                     best, best_t = distance, start + u
         if below == 1:
             break
         sibling = below ^ 1
-        squares[0] = _chord_square(blob, tree + NODE * sibling, px, py, pz)
+        squares[0] = chord_square(blob, tree + NODE * sibling, px, py, pz)
         below //= 2
         if _out_of_reach(blob, tree + NODE * sibling, squares[0], best):
             continue

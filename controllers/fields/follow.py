@@ -9,7 +9,7 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.fields.instructions import FOLLOW, Program, checked, leave_trace, wrench_of
-from controllers.fields.river import window
+from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
 
 
@@ -20,16 +20,25 @@ def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float,
 
 
 @njit
-def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction FOLLOW: parameters [k_r, b_d, 1/ε²], memory [t*]."""
-    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
-    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
-    memory[slot] = phase
+def follow_at(
+    params: Array, at: int, curve: int, guess: float, p: Array, v: Array, wrench: Array
+) -> tuple[float, float]:
+    """Write the wrench at position p [m] and velocity v [m/s]; returns t* [s] and the distance [m]."""
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], guess)
     p_curve, v_curve = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     w = window(distance * distance * params[at + 2])
     for i in range(3):
         wrench[i] = w * follow_force(p[i], v[i], p_curve[i], v_curve[i], params[at], params[at + 1])
         wrench[i + 3] = 0.0
+    return phase, distance
+
+
+@njit
+def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction FOLLOW: parameters [k_r, b_d, 1/ε²], memory [t*]."""
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    phase, distance = follow_at(params, at, curve, memory[slot], p, v, wrench)
+    memory[slot] = phase
     leave_trace(params, curve, memory, phase, distance, phase)
 
 

@@ -3,9 +3,26 @@
 import numpy as np
 from numba import njit
 
+from controllers.fields.algebra import blend, gate, limit
 from controllers.fields.bunny import bunny_wrench
+from controllers.fields.edited import recorded_wrench
 from controllers.fields.follow import follow_wrench
-from controllers.fields.instructions import ADD, BUNNY, EXTERNAL, FOLLOW, STACK, TRACE_DISTANCE, TRACE_ROW, Program
+from controllers.fields.higher_order import higher_order_wrench
+from controllers.fields.instructions import (
+    ADD,
+    BLEND,
+    BUNNY,
+    EXTERNAL,
+    FOLLOW,
+    GATE,
+    HIGHER_ORDER,
+    LIMIT,
+    RECORDED,
+    STACK,
+    TRACE_DISTANCE,
+    TRACE_ROW,
+    Program,
+)
 from controllers.state import Array, IntArray
 
 __all__ = ["Program", "evaluate"]
@@ -38,6 +55,12 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
         elif opcode == BUNNY:
             bunny_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
+        elif opcode == HIGHER_ORDER:
+            higher_order_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == RECORDED:
+            recorded_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
         elif opcode == EXTERNAL:
             for i in range(6):
                 stack[top, i] = memory[slot + i]
@@ -46,6 +69,13 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top -= 1
             for i in range(6):
                 stack[top - 1, i] += stack[top, i]
+        elif opcode == GATE:
+            gate(params, at, hand, stack[top - 1])
+        elif opcode == BLEND:
+            top -= 1
+            blend(params, at, hand, stack[top - 1], stack[top])
+        elif opcode == LIMIT:
+            limit(params, at, stack[top - 1])
         if memory[TRACE_DISTANCE] < before:
             memory[TRACE_ROW] = row
     for i in range(6):

@@ -1,15 +1,184 @@
-"""The window that ends a river at its tube's edge (Donald & Henle 2000, section 2.3)."""
+"""Rivers: a tube around a curve with a current towards it and along it (Donald & Henle 2000, section 2.3)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
+from scipy.integrate import solve_ivp
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.follow import Follow
+from controllers.fields.instructions import Program, checked
+from controllers.fields.window import window
+from controllers.state import Array, HandState, Wrench
+
+__all__ = ["Course", "River", "integrate", "settling_time", "window"]
+
+Flow = Callable[[float, Array], Array]
+"""A flow V(t, p): time [s] and p_H [m], shape (3,), to a velocity [m/s], shape (3,)."""
 
 
 @njit
-def window(s2: float) -> float:
-    r"""Window w = (1 − s²)³ inside the tube and 0 outside, as a function of s² = (d/ε)².
+def river_flow(curve: Array, inverse_tau: float, inverse_square: float, p: Array, guess: float, flow: Array) -> float:
+    """Write V(p) = w(d/ε) (φ̇(t*) + (φ(t*) − p)/τ) [m/s] and return t*; the curve is packed at ``curve[0:]``."""
+    phase, distance = closest_phase(curve, 0, p[0], p[1], p[2], guess)
+    p_curve, v_curve = curve_point(curve, 0, phase), curve_velocity(curve, 0, phase)
+    w = window(distance * distance * inverse_square)
+    for i in range(3):
+        flow[i] = w * (v_curve[i] + inverse_tau * (p_curve[i] - p[i]))
+    return phase
 
-    C² everywhere: flat at the centre, and value, slope and curvature vanish at the edge. Taking s² spares the root,
-    so w is smooth at d = 0 too; ε = ∞ gives s² = 0, a river that fills the space.
+
+@dataclass(frozen=True, eq=False)
+class River:
+    r"""Tube of radius ε around a curve, with a current that runs along the curve and draws onto it.
+
+    .. math:: V(p) = w(d/\varepsilon)\,\bigl(\dot\varphi(t^*) + (\varphi(t^*) - p)/\tau\bigr)
+
+    As a *flow*, V is a velocity: `flow`, integrated by `integrate`. As a *force* it is what a viscous current does to
+    a hand in it, F = b (V − w v), which is FOLLOW with k_r = b/τ and b_d = b.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    epsilon : float
+        ε [m], may be infinite. V is continuous if ε is below `Trajectory.reach`.
+    tau : float
+        τ, time in which the current draws onto the curve [s].
+    drag : float
+        b, force per velocity between current and hand [N s/m].
+    speeds : array_like, shape (m, 2), optional
+        Least and greatest speed of a hand that the river takes [m/s], at m phases equally spaced from the curve's
+        start to its end, linear between them; without them, the curve's own speed. Only fields of higher order
+        (`HigherOrder`) look at it.
+
+    Raises
+    ------
+    ParameterError
+        If τ is below 1e-4 s, ε below 1e-4 m, b negative, one of them not finite (but ε), or the speeds are not
+        pairs 0 ≤ least ≤ greatest.
     """
-    inside = np.maximum(0.0, 1.0 - s2)
-    return inside * inside * inside
+
+    curve: Trajectory
+    epsilon: float = 0.02
+    tau: float = 0.02
+    drag: float = 4.0
+    speeds: npt.ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
+        checked("tau", self.tau, "s", least=1e-4)
+        checked("drag", self.drag, "N s/m")
+        if self.speeds is not None:
+            speeds = np.array(self.speeds, dtype=np.float64)
+            if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
+                raise ParameterError(
+                    f"speeds of a river must be finite and of shape (m, 2), m ≥ 2; their shape is {speeds.shape}"
+                )
+            if (speeds[:, 0] < 0.0).any() or (speeds[:, 1] < speeds[:, 0]).any():
+                at = int(np.argmax((speeds[:, 0] < 0.0) | (speeds[:, 1] < speeds[:, 0])))
+                raise ParameterError(f"speeds of a river must be 0 ≤ least ≤ greatest; row {at} is {speeds[at]} m/s")
+            object.__setattr__(self, "speeds", speeds)
+
+    @cached_property
+    def _blob(self) -> Array:
+        return self.curve.packed()
+
+    @cached_property
+    def force(self) -> Follow:
+        """The river as a force: FOLLOW with k_r = b/τ and b_d = b."""
+        return Follow(self.curve, self.drag / self.tau, self.drag, self.epsilon)
+
+    def program(self) -> Program:
+        """Compiled form of the force."""
+        return self.force.program()
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force at one hand state, by the compiled law."""
+        return self.force.wrench(hand)
+
+    def flow(self, t: float, p: Array) -> Array:
+        """V(p) [m/s], shape (3,); it does not depend on the time t."""
+        flow = np.empty(3)
+        river_flow(self._blob, 1.0 / self.tau, self.epsilon**-2, p, np.nan, flow)
+        return flow
+
+
+class Course(NamedTuple):
+    """Integral curve of a flow.
+
+    Attributes
+    ----------
+    times : Array
+        [s], shape (n,).
+    points : Array
+        In the hand frame H [m], shape (n, 3).
+    """
+
+    times: Array
+    points: Array
+
+
+def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_step: float = 0.02) -> Course:
+    """Integral curve ṗ = V(t, p) of a flow, by scipy's DOP853 with tolerance 1e-10.
+
+    Parameters
+    ----------
+    flow : callable
+        ``River.flow``, ``RiverBundle.flow`` or ``Edited.flow``.
+    start : array_like, shape (3,)
+        p at the first time, in H [m].
+    times : array_like, shape (n,)
+        When the curve is wanted, increasing [s].
+    longest_step : float
+        Largest step [s]; a step much longer than a river is wide could leap over it.
+
+    Raises
+    ------
+    ControllerError
+        If the integration fails.
+    """
+    wanted = np.asarray(times, dtype=float)
+    solution = solve_ivp(
+        flow, (wanted[0], wanted[-1]), np.asarray(start, dtype=float), "DOP853", wanted,
+        rtol=1e-10, atol=1e-12, max_step=longest_step,
+    )  # fmt: skip
+    if not solution.success:
+        raise ControllerError(f"the flow could not be integrated from {start}: {solution.message}")
+    return Course(wanted, np.ascontiguousarray(solution.y.T))
+
+
+def settling_time(start: float, end: float, epsilon: float, tau: float) -> float:
+    r"""Time [s] in which a river draws a point from one distance of its curve to another.
+
+    Within the reach the gradient of d is normal to φ̇, so ḋ = −w(d/ε) d/τ whatever the curve, and with q = (d/ε)²
+
+    .. math:: T = \tfrac{\tau}{2}\,\bigl(G(q_0) - G(q_1)\bigr), \qquad
+              G(q) = \ln\frac{q}{1 - q} + \frac{1}{1 - q} + \frac{1}{2 (1 - q)^2}
+
+    Parameters
+    ----------
+    start, end : float
+        Distances d [m], 0 < end ≤ start < ε.
+    epsilon, tau : float
+        Of the river [m], [s].
+
+    Raises
+    ------
+    ParameterError
+        If the distances are not in order within the tube.
+    """
+    if not 0.0 < end <= start < epsilon:
+        raise ParameterError(
+            f"a river of radius {epsilon} m draws from {start} m to {end} m only if 0 < end ≤ start < ε"
+        )
+    q = np.array([start, end]) ** 2 / epsilon**2
+    primitive = np.log(q / (1.0 - q)) + 1.0 / (1.0 - q) + 0.5 / (1.0 - q) ** 2
+    return float(0.5 * tau * (primitive[0] - primitive[1]))

@@ -11,6 +11,7 @@ from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
 from controllers.fields.program import Program, evaluate
+from controllers.fields.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
 
@@ -151,7 +152,8 @@ def test_programs_add_and_python_may_fill_in_a_wrench():
     inner, outer = Trajectory.circle(0.03, 2.0), Trajectory.circle(0.07, 3.0)
     laws = [Follow(inner, 100.0, 1.0), Follow(outer, 50.0, 2.0), Bunny(outer, 30.0, 1.0, 0.05)]
     hand = HandState.at([0.045, 0.01, 0.0], [0.0, 0.1, 0.0], 0.3)
-    program = laws[0].program() + (Program.external() + laws[1].program()) + laws[2].program()
+    external = PythonLaw(lambda hand: hand.p).program()
+    program = laws[0].program() + (external + laws[1].program()) + laws[2].program()
     memory = program.fresh_memory()
     memory[program.external_slots[0] : program.external_slots[0] + 6] = [1, 2, 3, 4, 5, 6]
     wrench = _run(program, hand, memory)

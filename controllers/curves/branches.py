@@ -1,0 +1,107 @@
+"""Branches of a curve near a point: every part of it that passes through a ball, with its own closest point.
+
+A branch is a connected part of φ⁻¹(B(p, ε)). Where the radius of curvature exceeds ε, d² is convex along a branch, so
+each has exactly one closest point, and it moves continuously with p. So a curve that crosses itself gives two
+branches at the crossing, and neither can take the place of the other.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.bounds import NODE
+from controllers.curves.closest_point import chord_square, nearest_on_piece
+from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC, PIECE, PIECES, TREE
+from controllers.state import Array, IntArray
+
+BRANCHES = 8  # of one curve at most; further ones are not seen
+
+
+@njit
+def _runs(blob: Array, at: int, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array) -> int:
+    """Runs of pieces that come nearer than the radius, as rows [first, last, likely nearest]; returns their number."""
+    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
+    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
+    nodes = np.empty(64, np.int64)
+    nodes[0] = 1
+    top, count = 1, 0
+    likely = math.inf
+    while top > 0:
+        top -= 1
+        node = nodes[top]
+        chord = math.sqrt(chord_square(blob, tree + NODE * node, px, py, pz))
+        thickness = blob[tree + NODE * node + 7]
+        if chord - thickness >= radius:
+            continue
+        if node < first_leaf:
+            # The left child comes off the stack first, so pieces come in the order of their phases.
+            nodes[top], nodes[top + 1] = 2 * node + 1, 2 * node
+            top += 2
+            continue
+        piece = int(node) - first_leaf
+        if chord + thickness >= radius:
+            h = blob[breaks + piece + 1] - blob[breaks + piece]
+            square, _ = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
+            if square >= radius * radius:
+                continue
+        if count == 0 or runs[count - 1, 1] != piece - 1:
+            if count == BRANCHES:
+                break
+            runs[count, 0] = piece
+            likely = math.inf
+            count += 1
+        runs[count - 1, 1] = piece
+        if chord < likely:
+            likely, runs[count - 1, 2] = chord, piece
+    if count > 1 and blob[at + PERIODIC] > 0.0 and runs[0, 0] == 0 and runs[count - 1, 1] == pieces - 1:
+        # One branch across the seam; its last piece lies before its first.
+        count -= 1
+        runs[0, 0] = runs[count, 0] - pieces
+    return count
+
+
+@njit
+def branches(blob: Array, at: int, px: float, py: float, pz: float, radius: float, found: Array) -> int:
+    """Closest points of all branches of the curve packed at ``blob[at:]`` within a ball.
+
+    The cost is proportional to the number of pieces within the ball.
+
+    Parameters
+    ----------
+    blob, at
+        Array and offset of a packed `Trajectory`.
+    px, py, pz : float
+        p_H [m].
+    radius : float
+        ε [m], may be infinite: the whole curve is then one branch.
+    found : Array, shape (BRANCHES, 2)
+        Written: phase [s] and distance [m] of each branch.
+
+    Returns
+    -------
+    int
+        Number of branches; 0 if p is not finite.
+    """
+    if not np.isfinite(px + py + pz):
+        return 0
+    runs, scratch = np.empty((BRANCHES, 3), np.int64), np.empty((48, 8))
+    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
+    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
+    count = _runs(blob, at, px, py, pz, radius, runs, scratch)
+    for k in range(count):
+        best: float = math.inf
+        # The likely nearest piece first: its distance then rules out most others.
+        for turn in range(runs[k, 0] - 1, runs[k, 1] + 1):
+            piece = int(runs[k, 2] if turn < runs[k, 0] else turn % pieces)
+            leaf = tree + NODE * (first_leaf + piece)
+            bound = best + blob[leaf + 7]
+            if chord_square(blob, leaf, px, py, pz) >= bound * bound:
+                continue
+            h = blob[breaks + piece + 1] - blob[breaks + piece]
+            square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
+            distance = math.sqrt(square)
+            if distance < best:
+                best = distance
+                found[k, 0], found[k, 1] = blob[breaks + piece] + u, distance
+    return count

@@ -1,0 +1,117 @@
+"""Weights, and what they do to wrenches: gate, blend, limit. With the sum these are the algebra of fields."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.fields.window import window
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
+
+_CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
+WEIGHT_SIZE = 6  # kind, whether 1 − s is meant, four numbers
+
+
+@njit
+def smooth_step(x: float) -> float:
+    """C² step: 0 up to x = 0, 6x⁵ − 15x⁴ + 10x³, and 1 from x = 1."""
+    x = np.maximum(0.0, np.minimum(1.0, x))
+    return x * x * x * (x * (6.0 * x - 15.0) + 10.0)
+
+
+@njit
+def weight_of(params: Array, at: int, hand: Array) -> float:
+    """Weight s of the row at ``params[at:]`` for a hand (see `Weight`)."""
+    kind = params[at]
+    s = params[at + 2]
+    if kind == _BALL:
+        square = 0.0
+        for i in range(3):
+            square += (hand[HAND_POSITION + i] - params[at + 2 + i]) ** 2
+        s = window(square * params[at + 5])
+    elif kind == _SPEED:
+        square = 0.0
+        for i in range(3):
+            square += hand[HAND_VELOCITY + i] ** 2
+        s = smooth_step((np.sqrt(square) - params[at + 2]) * params[at + 3])
+    elif kind == _SWITCH:
+        s = hand[HAND_SWITCH]
+    return 1.0 - s if params[at + 1] != 0.0 else s
+
+
+@njit
+def gate(params: Array, at: int, hand: Array, wrench: Array) -> None:
+    """Instruction GATE: F ← s F."""
+    s = weight_of(params, at, hand)
+    for i in range(6):
+        wrench[i] *= s
+
+
+@njit
+def blend(params: Array, at: int, hand: Array, wrench: Array, other: Array) -> None:
+    """Instruction BLEND: F ← (1 − s) F + s F', F' the wrench above it on the stack."""
+    s = weight_of(params, at, hand)
+    for i in range(6):
+        wrench[i] = (1.0 - s) * wrench[i] + s * other[i]
+
+
+@njit
+def limit(params: Array, at: int, wrench: Array) -> None:
+    """Instruction LIMIT: F ← F min(1, L/|F|), and the moment likewise; parameters [L of the force, L of the moment]."""
+    for part in range(2):
+        x, y, z = wrench[3 * part], wrench[3 * part + 1], wrench[3 * part + 2]
+        # Scaled by its largest component, so that squares do not overflow.
+        largest = max(abs(x), abs(y), abs(z), 1e-300)
+        norm = largest * np.sqrt((x / largest) ** 2 + (y / largest) ** 2 + (z / largest) ** 2)
+        if norm > params[at + part]:
+            for i in range(3):
+                wrench[3 * part + i] *= params[at + part] / norm
+
+
+@dataclass(frozen=True)
+class Weight:
+    """Number s between 0 and 1 that depends on the hand, for `Program.gated` and `Program.blended`; ``~s`` is 1 − s.
+
+    Made by `constant`, `ball`, `speed` and `switch`. All but the switch are C² in the state of the hand; at the
+    switch a field jumps.
+    """
+
+    row: tuple[float, ...]
+
+    @staticmethod
+    def constant(s: float) -> "Weight":
+        """The same everywhere; any finite number, so that it also scales and turns round a field."""
+        return _weight(_CONSTANT, s)
+
+    @staticmethod
+    def ball(centre: npt.ArrayLike, radius: float) -> "Weight":
+        """1 at a point of H [m], 0 from a radius [m] on: the window w(|p − c|/r)."""
+        x, y, z = np.asarray(centre, dtype=float)
+        if not radius > 0.0:
+            raise ParameterError(f"the radius of a ball must be positive, got {radius} m")
+        return _weight(_BALL, float(x), float(y), float(z), radius**-2)
+
+    @staticmethod
+    def speed(low: float, high: float) -> "Weight":
+        """0 up to one speed of the hand, 1 from another on [m/s]."""
+        if not 0.0 <= low < high:
+            raise ParameterError(f"speeds of a weight must be 0 ≤ low < high, got {low} and {high} m/s")
+        return _weight(_SPEED, low, 1.0 / (high - low))
+
+    @staticmethod
+    def switch() -> "Weight":
+        """1 while the stylus switch is pressed, else 0."""
+        return _weight(_SWITCH)
+
+    def __invert__(self) -> "Weight":
+        return Weight((self.row[0], 1.0 - self.row[1], *self.row[2:]))
+
+
+def _weight(kind: int, *numbers: float) -> Weight:
+    if not np.isfinite(numbers).all():
+        raise ParameterError(f"numbers of a weight must be finite, got {numbers}")
+    padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - 2 - len(numbers))
+    return Weight((float(kind), 0.0, *numbers, *padding))

@@ -1,0 +1,208 @@
+"""V + U: a river, and what a user did to it, as one field (Donald & Henle 2000, section 2.3)."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.follow import follow_at
+from controllers.fields.instructions import RECORDED, Program, checked, one_of, wrench_of
+from controllers.fields.river import River, river_flow
+from controllers.fields.window import window
+from controllers.state import HAND_POSITION, HAND_TIME, Array, HandState, Wrench
+
+_SPACING = 0.01  # [s] between samples of a performance: finer than a hand moves, coarser than encoders count
+_LONGEST_TICK = 0.05  # [s] a recording that waits does not leap after a pause
+
+# Parameters: gains as FOLLOW's, then weight, 1/ε², whether it waits, and where the performed curve is.
+_WEIGHT, _INVERSE_SQUARE, _WAITS, _PERFORMED, _HEADER = 3, 4, 5, 6, 7
+
+
+@njit
+def _nearness(params: Array, performed: int, s: float, inverse_square: float, p: Array) -> float:
+    """Window w(|p − φ'(s)|/ε) about the place that the performance has come to."""
+    x, y, z = curve_point(params, performed, s)
+    return window(((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2) * inverse_square)
+
+
+@njit
+def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction RECORDED: parameters see `Edited`, memory [t* of φ', s, time of the last tick]."""
+    p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + int(params[at + _PERFORMED])
+    inverse_square, start, end = params[at + _INVERSE_SQUARE], params[performed + START], params[performed + END]
+    s, time = hand[HAND_TIME], hand[HAND_TIME]
+    if params[at + _WAITS] > 0.0:
+        s = start
+        if not math.isnan(memory[slot + 1]):
+            s = memory[slot + 1]
+            step = min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
+            s += _nearness(params, performed, s, inverse_square, p) * step
+        # At its end it waits at its beginning for the hand to come round.
+        s = start if s > end else s
+    memory[slot + 1], memory[slot + 2] = s, time
+    wrench[:] = 0.0
+    if not np.isfinite(time + p[0] + p[1] + p[2]):
+        wrench[:] = np.nan
+    elif start <= s <= end:
+        there, speed = np.empty(3), np.empty(3)
+        there[0], there[1], there[2] = curve_point(params, performed, s)
+        speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
+        memory[slot], _ = follow_at(params, at, curve, memory[slot], there, speed, wrench)
+        share = params[at + _WEIGHT] * _nearness(params, performed, s, inverse_square, p)
+        for i in range(3):
+            wrench[i] *= -share
+
+
+@njit
+def _recorded_flow(
+    river: Array, inverse_tau: float, inverse_edge: float, performed: Array, inverse_square: float, t: float, p: Array
+) -> Array:
+    """U(t, p) = w(|p − φ'|/ε) (φ̇' − V(φ')) [m/s]; both curves are packed."""
+    flow, there = np.zeros(3), np.empty(3)
+    if performed[START] <= t <= performed[END]:
+        there[0], there[1], there[2] = curve_point(performed, 0, t)
+        river_flow(river, inverse_tau, inverse_edge, there, np.nan, flow)
+        share, speed = _nearness(performed, 0, t, inverse_square, p), curve_velocity(performed, 0, t)
+        for i in range(3):
+            flow[i] = share * (speed[i] - flow[i])
+    return flow
+
+
+def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
+    """Performed curve φ' of a recording: a C² spline through samples of the hand every 10 ms.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        [s], increasing; the clock of the performance starts at the first.
+    points : array_like, shape (n, 3)
+        p_H of the hand [m].
+
+    Raises
+    ------
+    CurveError
+        If the hand did not move, or the samples are no curve.
+    """
+    t, p = np.asarray(times, dtype=float), np.asarray(points, dtype=float)
+    t = t - t[0]
+    stride = max(1, round(_SPACING / float(np.median(np.diff(t)))))
+    kept = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
+    return Trajectory(t[kept], p[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class Edited:
+    r"""River V, and performances of a user as fields U_j on top of it, weighted.
+
+    .. math:: V + \sum_j \alpha_j U_j, \qquad
+              U_j(s, p) = w(|p - \varphi'_j(s)|/\varepsilon)\,\bigl(\dot\varphi'_j(s) - V(\varphi'_j(s))\bigr)
+
+    U is what the user added to the river in moving along φ'. So φ' is an integral curve of V + U (α = 1). As a force
+    it is the user's push as the river felt it, U = −F(φ', φ̇'): a hand that moves along φ' feels nothing, and one
+    that is let go on it traces φ' by itself. It holds the push, inertia and friction of the hand together, and
+    needs no force sensor.
+
+    Parameters
+    ----------
+    river : River
+        V.
+    performed : tuple of Trajectory
+        φ'_j, from `performance`.
+    weights : tuple of float
+        α_j: 1 what was done, 0.5 half of it, −1 the opposite.
+    epsilon : float
+        ε [m], how far from the performance U is felt.
+    pace : {"clock", "wait"}
+        s is the hand's time, and U is over at the end; or it runs at the rate w(|p − φ'(s)|/ε), thus waits for the
+        hand to come by, and begins again after the end.
+
+    Raises
+    ------
+    ParameterError
+        If weights and performances are not as many, a number is not finite, or ε below 1e-4 m.
+    """
+
+    river: River
+    performed: tuple[Trajectory, ...]
+    weights: tuple[float, ...]
+    epsilon: float = 0.03
+    pace: Literal["clock", "wait"] = "clock"
+
+    def __post_init__(self) -> None:
+        if len(self.weights) != len(self.performed) or not np.isfinite(self.weights).all():
+            raise ParameterError(f"{len(self.performed)} performances need as many finite weights, got {self.weights}")
+        checked("epsilon", self.epsilon, "m", least=1e-4)
+        one_of("pace", self.pace, ("clock", "wait"))
+
+    @cached_property
+    def _blobs(self) -> tuple[Array, ...]:
+        return tuple(curve.packed() for curve in (self.river.curve, *self.performed))
+
+    @cached_property
+    def _recorded(self) -> tuple[Program, ...]:
+        """U_j as forces."""
+        laws: list[Program] = []
+        gains = [self.river.drag / self.river.tau, self.river.drag, self.river.epsilon**-2]
+        for weight, blob in zip(self.weights, self._blobs[1:], strict=True):
+            header = [*gains, weight, self.epsilon**-2, float(self.pace == "wait"), _HEADER]
+            laws.append(Program.law(RECORDED, np.concatenate([header, blob]), [np.nan] * 3, self.river.curve))
+        return tuple(laws)
+
+    def program(self) -> Program:
+        """Compiled form of the force of V + Σ α U."""
+        return sum(self._recorded, start=self.river.program())
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force at one hand state, by the compiled laws; a recording that waits has just started."""
+        force = self.river.wrench(hand).force
+        for law in self._recorded:
+            force = force + wrench_of(recorded_wrench, law, hand).force
+        return Wrench(force, np.zeros(3))
+
+    def flow(self, t: float, p: Array) -> Array:
+        """V + Σ α U at time t of the performance [m/s], shape (3,)."""
+        total, river = self.river.flow(t, p), self.river
+        for weight, blob in zip(self.weights, self._blobs[1:], strict=True):
+            part = _recorded_flow(
+                self._blobs[0], 1.0 / river.tau, river.epsilon**-2, blob, self.epsilon**-2, t, p
+            )  # fmt: skip
+            total = total + weight * part
+        return total
+
+    def arrays(self) -> dict[str, Array]:
+        """The field as arrays by key; `from_arrays` makes the same field of them, to the last bit."""
+        numbers = np.array([self.epsilon, float(self.pace == "wait"), *self.weights])
+        arrays = RiverBundle((self.river,), ("river",)).arrays() | {"edited": numbers}
+        for i, curve in enumerate(self.performed):
+            arrays[f"performed {i}"] = np.column_stack((np.asarray(curve.times), np.asarray(curve.positions)))
+        return arrays
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Array]) -> "Edited":
+        """Field of what `arrays` gave.
+
+        Raises
+        ------
+        ControllerError
+            If an array is missing, or its values make no field.
+        """
+        numbers = arrays.get("edited", np.zeros(0))
+        names = [f"performed {i}" for i in range(numbers.size - 2)]
+        missing = [name for name in ("edited", *names) if name not in arrays]
+        if missing or numbers.ndim != 1 or numbers.size < 2:
+            raise ParameterError(f"an edited field needs the arrays {', '.join(missing) or 'edited, with two numbers'}")
+        river = RiverBundle.from_arrays({k: v for k, v in arrays.items() if k.startswith("river/")})["river"]
+        for name in names:
+            if arrays[name].ndim != 2 or arrays[name].shape[1] != 4:
+                raise ParameterError(f"{name} of an edited field has shape {arrays[name].shape}, expected (n, 4)")
+        performed = tuple(Trajectory(arrays[name][:, 0], arrays[name][:, 1:]) for name in names)
+        epsilon, waits = float(numbers[0]), bool(numbers[1])
+        return Edited(river, performed, tuple(numbers[2:].tolist()), epsilon, "wait" if waits else "clock")

@@ -1,0 +1,262 @@
+"""Higher-order fields: which river takes a hand depends on how it moves (Donald & Henle 2000, sections 7.1, 7.2)."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.branches import BRANCHES, branches
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.follow import follow_force
+from controllers.fields.instructions import (
+    HIGHER_ORDER,
+    TRACE_DISTANCE,
+    TRACE_RIVER,
+    Program,
+    checked,
+    leave_trace,
+    one_of,
+    wrench_of,
+)
+from controllers.fields.window import window
+from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+
+# Parameters: a header, offsets of the rivers' blocks, and the blocks; offsets count from the header.
+_DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _HEADER = range(6)
+# A block: gains, tube, number of admissible speeds, then the speeds and the packed curve.
+_K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _SPEEDS, _BLOCK = range(6)
+# What is known of a branch.
+_RIVER, _PHASE, _DISTANCE, _MISMATCH, _WINDOW, _CANDIDATE = range(6)
+
+_NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
+
+
+@njit
+def mismatch(speed: float, along: float, square: float, least: float, greatest: float) -> float:
+    """Distance m [m/s] of a velocity from the admissible ones, the multiples s φ̇/|φ̇| with least ≤ s ≤ greatest.
+
+    Parameters
+    ----------
+    speed : float
+        |φ̇| [m/s], positive.
+    along, square : float
+        v·φ̇ and |v|².
+    least, greatest : float
+        Of the interval [m/s].
+    """
+    along = along / speed
+    s = np.minimum(np.maximum(along, least), greatest)
+    return np.sqrt(np.maximum(0.0, square - along * along + (along - s) ** 2))
+
+
+@njit
+def _branch_mismatch(params: Array, block: int, curve: int, phase: float, v: Array) -> float:
+    x, y, z = curve_velocity(params, curve, phase)
+    speed = max(math.sqrt(x * x + y * y + z * z), 1e-12)
+    least, greatest = speed, speed
+    rows = int(params[block + _SPEEDS])
+    if rows > 0:
+        share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START]) * (rows - 1)
+        i = min(int(share), rows - 2)
+        low, high = block + _BLOCK + 2 * i, block + _BLOCK + 2 * (i + 1)
+        least = params[low] + (share - i) * (params[high] - params[low])
+        greatest = params[low + 1] + (share - i) * (params[high + 1] - params[low + 1])
+    along = v[0] * x + v[1] * y + v[2] * z
+    return mismatch(speed, along, v[0] * v[0] + v[1] * v[1] + v[2] * v[2], least, greatest)
+
+
+@njit
+def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int:
+    """Branches of all rivers in whose tubes p is, as rows of the table; returns their number."""
+    count = 0
+    found = np.empty((BRANCHES, 2))
+    for river in range(int(params[at + _RIVERS])):
+        block = at + int(params[at + _HEADER + river])
+        curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+        for k in range(branches(params, curve, p[0], p[1], p[2], params[block + _EPSILON], found)):
+            row = table[count]
+            row[_RIVER], row[_PHASE], row[_DISTANCE] = river, found[k, 0], found[k, 1]
+            row[_MISMATCH] = _branch_mismatch(params, block, curve, found[k, 0], v)
+            row[_WINDOW] = window(found[k, 1] * found[k, 1] * params[block + _INVERSE_SQUARE])
+            count += row[_WINDOW] > 0.0
+    return count
+
+
+@njit
+def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Array, wrench: Array) -> None:
+    block = at + int(params[at + _HEADER + int(row[_RIVER])])
+    curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+    p_curve, v_curve = curve_point(params, curve, row[_PHASE]), curve_velocity(params, curve, row[_PHASE])
+    for i in range(3):
+        force = follow_force(p[i], v[i], p_curve[i], v_curve[i], params[block + _K_R], params[block + _B_D])
+        wrench[i] += share * row[_WINDOW] * force
+
+
+@njit
+def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array, wrench: Array) -> int:
+    """Add the weighted forces; returns the row with the greatest weight, −1 if that is the null weight."""
+    sharpness, null = params[at + _SHARPNESS], params[at + _ADMISSION] ** 2
+    least = null
+    for k in range(count):
+        least = min(least, table[k, _MISMATCH] ** 2)
+    total = math.exp(-sharpness * (null - least))
+    strongest, winner = total, -1
+    for k in range(count):
+        a = table[k, _WINDOW] * math.exp(-sharpness * (table[k, _MISMATCH] ** 2 - least))
+        total += a
+        if a > strongest:
+            strongest, winner = a, k
+    # A weight may underflow only where its river is hardly felt.
+    total = max(total, 1e-300)
+    for k in range(count):
+        a = table[k, _WINDOW] * math.exp(-sharpness * (table[k, _MISMATCH] ** 2 - least))
+        _add_force(params, at, table[k], a / total, p, v, wrench)
+    return winner
+
+
+@njit
+def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, slot: int) -> int:
+    """Row of the river that has the hand, −1 for none; memory [river, phase] keeps it."""
+    admission, release = params[at + _ADMISSION], params[at + _RELEASE]
+    current, nearest = -1, math.inf
+    best = -1
+    for k in range(count):
+        if table[k, _RIVER] == memory[slot]:
+            block = at + int(params[at + _HEADER + int(table[k, _RIVER])])
+            curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+            lap = params[curve + END] - params[curve + START]
+            away = abs(table[k, _PHASE] - memory[slot + 1])
+            if params[curve + PERIODIC] > 0.0:
+                away = min(away, lap - away)
+            if away < min(nearest, _NEIGHBOUR * lap):
+                current, nearest = k, away
+        if table[k, _MISMATCH] < admission and (best < 0 or table[k, _MISMATCH] < table[best, _MISMATCH]):
+            best = k
+    if current >= 0 and table[current, _MISMATCH] >= release:
+        current = -1
+    if current < 0 or (best >= 0 and table[best, _MISMATCH] + (release - admission) < table[current, _MISMATCH]):
+        current = best
+    memory[slot] = -1.0 if current < 0 else table[current, _RIVER]
+    memory[slot + 1] = 0.0 if current < 0 else table[current, _PHASE]
+    return current
+
+
+@njit
+def higher_order_wrench(
+    params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
+) -> None:
+    """Instruction HIGHER_ORDER: parameters see `HigherOrder`, memory [river, phase]; `curve` is not used."""
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    if not np.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2]):
+        wrench[:] = np.nan
+        return
+    wrench[:] = 0.0
+    rivers = int(params[at + _RIVERS])
+    table = np.empty((rivers * BRANCHES + 1, _CANDIDATE))
+    count = _candidates(params, at, p, v, table)
+    if params[at + _DISCRETE] > 0.0:
+        winner = _discrete(params, at, table, count, memory, slot)
+        if winner >= 0:
+            _add_force(params, at, table[winner], 1.0, p, v, wrench)
+    else:
+        winner = _smooth(params, at, table, count, p, v, wrench)
+    _trace(params, at, table, count, winner, memory, p)
+
+
+@njit
+def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory: Array, p: Array) -> None:
+    """Note the river that has the hand, or the nearest one when none has it."""
+    shown = winner
+    if winner < 0 and count > 0:
+        shown = 0
+        for k in range(1, count):
+            if table[k, _DISTANCE] < table[shown, _DISTANCE]:
+                shown = k
+    first, last = 0, int(params[at + _RIVERS])
+    if shown >= 0:
+        first, last = int(table[shown, _RIVER]), int(table[shown, _RIVER]) + 1
+    before = memory[TRACE_DISTANCE]
+    for river in range(first, last):
+        block = at + int(params[at + _HEADER + river])
+        curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+        if shown >= 0:
+            phase, distance = table[shown, _PHASE], table[shown, _DISTANCE]
+        else:
+            phase, distance = closest_phase(params, curve, p[0], p[1], p[2], np.nan)
+        leave_trace(params, curve, memory, phase, distance, phase)
+    if memory[TRACE_DISTANCE] < before:
+        memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
+
+
+@dataclass(frozen=True, eq=False)
+class HigherOrder:
+    r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
+
+    With m_i the distance of the hand's velocity from the admissible velocities of river i at t*_i (`mismatch`), r
+    the admission, and a null weight for a hand that moves with none,
+
+    .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{w_i\,e^{-m_i^2/2\sigma^2}}
+              {e^{-r^2/2\sigma^2} + \sum_j w_j\,e^{-m_j^2/2\sigma^2}} \quad\text{(smooth)}
+
+    As σ → 0 the smooth field tends to the discrete one without hysteresis: λ_i = 1 for the least m_i if it is below
+    r. The discrete field keeps the river that has the hand while m_i < r + h, unless m_j + h < m_i for another one
+    with m_j < r; it jumps where it changes.
+
+    A river takes part with each of its branches (`controllers.curves.branches`), so that one that crosses itself is
+    treated like two that cross.
+
+    Parameters
+    ----------
+    bundle : RiverBundle
+        The rivers; continuity asks ε_i below the radius of curvature of φ_i.
+    admission : float
+        r [m/s].
+    sigma : float
+        σ [m/s], of the smooth field.
+    hysteresis : float
+        h [m/s], of the discrete field.
+    form : {"smooth", "discrete"}
+        How rivers share the hand.
+
+    Raises
+    ------
+    ParameterError
+        If r or σ is below 1e-6 m/s, h negative, one of them not finite, or the form unknown.
+    """
+
+    bundle: RiverBundle
+    admission: float
+    sigma: float
+    hysteresis: float = 0.0
+    form: Literal["smooth", "discrete"] = "smooth"
+
+    def __post_init__(self) -> None:
+        checked("admission", self.admission, "m/s", least=1e-6)
+        checked("sigma", self.sigma, "m/s", least=1e-6)
+        checked("hysteresis", self.hysteresis, "m/s")
+        one_of("form", self.form, ("smooth", "discrete"))
+
+    @cached_property
+    def _program(self) -> Program:
+        blocks: list[Array] = []
+        for river in self.bundle.rivers:
+            speeds = np.zeros(0) if river.speeds is None else np.ravel(river.speeds)
+            gains = [river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, len(speeds) / 2]
+            blocks.append(np.concatenate([gains, speeds, river.curve.packed()]))
+        release = self.admission + self.hysteresis
+        header = [float(self.form == "discrete"), 0.5 * self.sigma**-2, self.admission, release, len(blocks)]
+        offsets = np.cumsum([_HEADER + len(blocks), *(len(block) for block in blocks[:-1])])
+        return Program.law(HIGHER_ORDER, np.concatenate([header, offsets, *blocks]), [-1.0, 0.0])
+
+    def program(self) -> Program:
+        """Compiled form of the field."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """F at one hand state, by the compiled law; in the discrete form no river has the hand yet."""
+        return wrench_of(higher_order_wrench, self._program, hand)

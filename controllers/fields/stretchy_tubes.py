@@ -1,0 +1,258 @@
+"""STRETCHY TUBES: a curve that is sought, taken hold of and bent like rubber (Donald & Henle 2000, section 4)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.deformation import (
+    ANCHOR,
+    COUNT,
+    PHASE,
+    carry_to,
+    commit,
+    let_go,
+    redo,
+    take_hold,
+    undo,
+    work_curve,
+)
+from controllers.curves.editing import curve_of, record_of
+from controllers.curves.trajectory import Trajectory, curve_point
+from controllers.errors import ParameterError
+from controllers.fields.follow import Follow, follow_wrench
+from controllers.fields.instructions import STRETCHY, TRACE_SIZE, Program, checked, leave_trace
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+
+CLICK_DISTANCE = 1e-3  # [m] a press that carries the stylus less far is a click and no edit
+CLICK_TIME = 0.4  # [s] a shorter click takes the last edit back, a longer one makes it again
+
+NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
+# Memory: phase t*, mode, when and where the switch was pressed, how far the stylus was carried since, the normal of a
+# push, FOLLOW's gains, then the record of the curve.
+_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13
+_SEEK, _STRETCH, _DAMPING, _RADIUS, _UNTIL = range(5)
+
+
+@njit
+def stretch_force(p: float, v: float, target: float, stiffness: float, damping: float) -> float:
+    """F = k (target − p) − b v, one component of each in H, or whole vectors."""
+    return stiffness * (target - p) - damping * v
+
+
+@njit
+def _press(params: Array, at: int, memory: Array, slot: int, hand: Array, distance: float) -> None:
+    """The switch goes down: hold the tube that the stylus is in, or become a probe that pushes tubes."""
+    memory[slot + _SINCE], memory[slot + _CARRIED] = hand[HAND_TIME], 0.0
+    for i in range(3):
+        memory[slot + _PRESSED + i] = hand[HAND_POSITION + i]
+    if distance > params[at + _RADIUS]:
+        memory[slot + _MODE] = PROBING
+    elif take_hold(memory, slot + _RECORD, memory[slot + _PHASE]):
+        memory[slot + _MODE] = HOLDING
+    else:
+        memory[slot + _MODE] = IDLE
+
+
+@njit
+def _release(memory: Array, slot: int, time: float) -> None:
+    """The switch goes up: keep the edit, or, after a click on the curve, take one back or make it again."""
+    record, mode = slot + _RECORD, memory[slot + _MODE]
+    if mode == PUSHING or (mode == HOLDING and memory[slot + _CARRIED] >= CLICK_DISTANCE):
+        commit(memory, record)
+    elif mode != PROBING:
+        let_go(memory, record)
+        if memory[slot + _CARRIED] < CLICK_DISTANCE:
+            if time - memory[slot + _SINCE] < CLICK_TIME:
+                undo(memory, record)
+            else:
+                redo(memory, record)
+    memory[slot + _MODE] = SEEKING
+
+
+@njit
+def _touch(params: Array, at: int, memory: Array, slot: int, p: Array, distance: float) -> None:
+    """A probe that gets into a tube begins to push it, along the normal at which they met."""
+    record = slot + _RECORD
+    if distance < params[at + _RADIUS] and take_hold(memory, record, memory[slot + _PHASE]):
+        memory[slot + _MODE] = PUSHING
+        for i in range(3):
+            memory[slot + _NORMAL + i] = (p[i] - memory[record + ANCHOR + i]) / max(distance, 1e-9)
+
+
+@njit
+def _push(params: Array, at: int, memory: Array, slot: int, p: Array) -> float:
+    """Carry the curve ahead of a probe, such that it stays at the tube's surface: how far [m]; at 0 it lets go."""
+    record = slot + _RECORD
+    depth = params[at + _RADIUS]
+    for i in range(3):
+        depth -= (p[i] - memory[record + ANCHOR + i]) * memory[slot + _NORMAL + i]
+    if depth > 0.0:
+        x, y, z = (
+            memory[record + ANCHOR] - depth * memory[slot + _NORMAL],
+            memory[record + ANCHOR + 1] - depth * memory[slot + _NORMAL + 1],
+            memory[record + ANCHOR + 2] - depth * memory[slot + _NORMAL + 2],
+        )
+        carry_to(memory, record, x, y, z)
+        return depth
+    let_go(memory, record)
+    memory[slot + _MODE] = PROBING
+    return 0.0
+
+
+@njit
+def stretchy_wrench(params: Array, at: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction STRETCHY: parameters [k_f, k_s, b, ε, until]; the memory holds the curve, see the module."""
+    p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
+    wrench[:] = 0.0
+    if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
+        # What is not finite must reach the limiter, and must not reach the curve.
+        wrench[:3] = np.nan
+        return
+    if memory[slot + _MODE] == NEW:
+        let_go(memory, record)
+        memory[slot + _MODE] = SEEKING
+    curve, performing = work_curve(memory, record), hand[HAND_TIME] >= params[at + _UNTIL]
+    pressed = hand[HAND_SWITCH] > 0.5 and not performing
+    if not pressed and memory[slot + _MODE] != SEEKING:
+        _release(memory, slot, hand[HAND_TIME])
+    if performing:
+        follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
+        return
+    phase, distance = closest_phase(memory, curve, p[0], p[1], p[2], memory[slot + _PHASE])
+    memory[slot + _PHASE] = phase
+    if pressed and memory[slot + _MODE] == SEEKING:
+        _press(params, at, memory, slot, hand, distance)
+    elif memory[slot + _MODE] == PROBING:
+        _touch(params, at, memory, slot, p, distance)
+    carried = 0.0
+    for i in range(3):
+        carried += (p[i] - memory[slot + _PRESSED + i]) ** 2
+    memory[slot + _CARRIED] = max(memory[slot + _CARRIED], np.sqrt(carried))
+    mode, stiffness = memory[slot + _MODE], 0.0
+    target = (p[0], p[1], p[2])
+    if mode == HOLDING:
+        carry_to(memory, record, p[0], p[1], p[2])
+        stiffness = params[at + _STRETCH]
+        target = (memory[record + ANCHOR], memory[record + ANCHOR + 1], memory[record + ANCHOR + 2])
+        phase = memory[record + PHASE]
+    elif mode == PUSHING:
+        depth, n = _push(params, at, memory, slot, p), slot + _NORMAL
+        stiffness = params[at + _STRETCH]
+        target = (p[0] + depth * memory[n], p[1] + depth * memory[n + 1], p[2] + depth * memory[n + 2])
+        phase = memory[record + PHASE]
+    elif mode != PROBING:
+        stiffness = params[at + _SEEK]
+        target = curve_point(memory, curve, phase)
+    for i in range(3):
+        wrench[i] = stretch_force(p[i], v[i], target[i], stiffness, params[at + _DAMPING])
+    if mode in (HOLDING, PUSHING):
+        x, y, z = curve_point(memory, curve, phase)
+        distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
+    leave_trace(memory, curve, memory, phase, distance, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class StretchyTubes:
+    r"""Field in which a curve is found, taken hold of, and bent: the tube about it yields and resists like rubber.
+
+    .. math::
+        \text{switch open:}\quad & F = k_f\,(c(p) - p) - b\,v \\
+        \text{held:}\quad        & F = k_s\,(p_0 - p) - b\,v, \qquad \varphi'(t_j) = p \\
+        \text{pushed:}\quad      & F = k_s\,s\,n - b\,v, \qquad \varphi'(t_j) = p_0 - s\,n,\;
+                                   s = \langle\varepsilon - n \cdot (p - p_0)\rangle
+
+    c(p) = φ(t*) is the nearest point of the curve. A press of the switch within ε of it takes hold of p_0 = φ(t_j),
+    t_j = t*, which from then on is at the stylus, and the curve is bent with it (see
+    `controllers.curves.deformation`). A press farther off makes the stylus a probe: it feels nothing until it meets
+    the tube of radius ε, then pushes it along the normal n of the contact, without friction. Letting go of the switch
+    commits. A press on the curve that carries the stylus less than 1 mm is a click: a short one (under 0.4 s) undoes
+    the last edit, a longer one makes it again.
+
+    F leaps at the switch (unless k_f = k_s) and nowhere else within the curve's reach.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ before it is bent, in the hand frame H.
+    k_f : float
+        Stiffness of the search [N/m].
+    k_s : float
+        Stiffness of the rubber [N/m].
+    b : float
+        Damping [N s/m]; the paper has none.
+    epsilon : float
+        ε, radius of the tube [m].
+    width : float
+        h, half the width of a bump [s]; see `controllers.curves.editing.record_of`.
+    until : float
+        When stretching ends [s]; may be infinite. An edit that is under way then is committed.
+    then : Follow, optional
+        Gains with which the bent curve is performed from then on; needed if there is an end. Its curve is not used.
+    depth : int
+        How many edits can be undone.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is negative or not finite, ε below 1e-4 m or infinite, or `until` without `then`.
+    CurveError
+        If the width or the depth is out of its interval.
+    """
+
+    curve: Trajectory
+    k_f: float
+    k_s: float
+    b: float = 2.0
+    epsilon: float = 0.008
+    width: float = 0.5
+    until: float = np.inf
+    then: Follow | None = None
+    depth: int = 64
+
+    def __post_init__(self) -> None:
+        checked("k_f", self.k_f, "N/m")
+        checked("k_s", self.k_s, "N/m")
+        checked("b", self.b, "N s/m")
+        checked("epsilon", self.epsilon, "m", least=1e-4)
+        checked("until", self.until, "s", infinite=True)
+        if np.isfinite(self.until) and self.then is None:
+            raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
+
+    @cached_property
+    def _program(self) -> Program:
+        follow = self.then
+        gains = [0.0, 0.0, 0.0] if follow is None else [follow.k_r, follow.b_d, follow.epsilon**-2]
+        state = np.zeros(_RECORD)
+        state[_PHASE], state[_GAINS:_RECORD] = np.nan, gains
+        memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
+        params = [self.k_f, self.k_s, self.b, self.epsilon, self.until]
+        return Program.law(STRETCHY, params, memory.tolist())
+
+    def program(self) -> Program:
+        """Compiled form of the field; the curve lies in its memory, where it is bent."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """F at one hand state, by the compiled law, on the curve before all edits."""
+        wrench = np.zeros(6)
+        stretchy_wrench(self._program.params, 0, self._program.fresh_memory(), TRACE_SIZE, hand.vector(), wrench)
+        return Wrench(wrench[:3], wrench[3:])
+
+    def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:
+        """The curve as it is bent in the memory of a run.
+
+        Parameters
+        ----------
+        memory : Array
+            Of the field's program, or of one that this field is a part of.
+        slot : int
+            Where the field's part begins: the third number of its row of instructions.
+        """
+        return curve_of(memory, slot + _RECORD, self.curve)
+
+    def edits(self, memory: Array, slot: int = TRACE_SIZE) -> int:
+        """How many edits are in force in the memory of a run, up to `depth`."""
+        return int(memory[slot + _RECORD + COUNT])
