@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import mujoco
 import numpy as np
 import numpy.typing as npt
 
@@ -13,8 +14,10 @@ from controllers.errors import ParameterError
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.limbs import Limb
 from controllers.safety import ForceLimiter
 from models.errors import ModelError
+from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names, load
 from models.phantom.parameters import PREMIUM_1_5
@@ -181,6 +184,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         [(clip.poses, clip.fps) for clip in corners],
         (config.radius - config.reach, config.radius + config.reach),
         (-config.reach, config.reach),
+        figure_legs(world.figure),
     )
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
@@ -205,6 +209,18 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
     return Session(config, clips, remarks, curve, haptic_map, world, figure, servo)
+
+
+def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
+    """The figure's legs as limbs of a blend: soles are placed where they are in the clips on average."""
+    legs: list[Limb] = []
+    for side in ("left", "right"):
+        bodies = [f"{side}_{part}" for part in ("thigh", "shank", "foot")]
+        first, second, third = (BODIES.index(body) for body in bodies)
+        offsets = np.array([figure.body(body).pos for body in bodies])
+        sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
+        legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole))
+    return tuple(legs)
 
 
 def stylus_path(points: Array) -> Array:

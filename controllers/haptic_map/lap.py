@@ -42,7 +42,7 @@ def update_lap(memory: Array, angle: float, drift: Array) -> None:
 
 
 @njit
-def drift_motion(drift: Array, s: float, local: Array, turn: Array) -> tuple[float, float]:
+def drift_motion(drift: Array, s: float, pace: float, local: Array, turn: Array) -> tuple[float, float]:
     """Translation of exp(s ξ), and the rates of it and of its angle.
 
     Parameters
@@ -50,18 +50,20 @@ def drift_motion(drift: Array, s: float, local: Array, turn: Array) -> tuple[flo
     drift : Array, shape (3, 3)
         ξ = (v_x, v_y, ω), and its derivatives by two parameters.
     s : float
-        θ/2π.
-    local : Array, shape (3, 3)
-        Written: rows 0 and 1 are the derivatives of the translation by θ and the two parameters.
+        Share of the lap.
+    pace : float
+        2π ds/dθ.
+    local : Array, shape (2, 3)
+        Written: derivatives of the translation by θ and the two parameters.
     turn : Array, shape (3,)
         Written: derivatives of the angle s ω by the same.
     """
     angle = s * drift[0, 2]
     q_s, q_c, d_s, d_c = sine_quotients(angle)
-    cosine, sine, lap = np.cos(angle), np.sin(angle), 2.0 * np.pi
-    turn[0] = drift[0, 2] / lap
-    local[0, 0] = (cosine * drift[0, 0] - sine * drift[0, 1]) / lap
-    local[1, 0] = (sine * drift[0, 0] + cosine * drift[0, 1]) / lap
+    cosine, sine, rate = np.cos(angle), np.sin(angle), pace / (2.0 * np.pi)
+    turn[0] = rate * drift[0, 2]
+    local[0, 0] = rate * (cosine * drift[0, 0] - sine * drift[0, 1])
+    local[1, 0] = rate * (sine * drift[0, 0] + cosine * drift[0, 1])
     for k in range(1, 3):
         turn[k] = s * drift[k, 2]
         e_s, e_c = d_s * turn[k], d_c * turn[k]

@@ -3,7 +3,16 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from controllers.haptic_map.limbs import Limb
+
 JOINTS = 3
+# The three joints as a leg: hip, knee that flexes about y, ankle.
+LEG = Limb(
+    (1, 2, 3),
+    np.array([[0.0, 0.1, 0.0], [0.0, 0.0, -0.45], [0.0, 0.0, -0.45]]),
+    np.array([0.0, 1.0, 0.0]),
+    np.array([[-0.05, 0.0, -0.05], [0.15, 0.03, -0.05], [0.15, -0.03, -0.05]]),
+)
 
 
 def wxyz(rotation):

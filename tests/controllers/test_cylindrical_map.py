@@ -4,14 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from clips_for_maps import JOINTS, difference, matrices, stylus, swinging
+from clips_for_maps import JOINTS, LEG, difference, matrices, stylus, swinging
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical, eased
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.ground import blended
 from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAPS
 from controllers.haptic_map.mean import mean_rotation
 
@@ -28,7 +27,7 @@ MOVING = Cylindrical(
     ],
     R,
     Z,
-    heights=lambda poses: poses[:, 2:3] - 0.9 + 0.1 * poses[:, 7:10] ** 2,
+    [LEG],
 )
 
 
@@ -142,32 +141,12 @@ def test_a_walk_goes_on_by_its_stride_a_lap():
 def test_the_kernels_means_are_those_of_the_eigenvectors():
     stacked = np.stack([clip[:60] for clip, _ in CLIPS], axis=1)
     weights = np.array([0.1, 0.2, 0.3, 0.4])
-    means = blended(stacked, weights)
     for frame in range(0, 60, 11):
         for first in range(3, 19, 4):
-            q = np.empty(4)
-            mean_rotation(np.ascontiguousarray(stacked[frame, :, first : first + 4]), weights, q)
-            assert abs(q @ means[frame, first : first + 4]) == pytest.approx(1.0, abs=1e-12)
-
-
-def test_blends_keep_the_height_that_their_clips_have_above_the_ground():
-    # A leg as one joint: bent by ±1 rad about x it is shorter by 1 − cos 1, so the plain blend would hang in the air.
-    frames, legs = 120, []
-    for bend in (0.8, -0.8, 0.8, -0.8):
-        poses = swinging(9, frames, amplitude=0.0)
-        poses[:, 7:11] = [np.cos(0.5 * bend), np.sin(0.5 * bend), 0.0, 0.0]
-        poses[:, 2] = np.cos(bend)
-        legs.append((poses, 30.0))
-
-    def heights(poses):
-        return poses[:, 2:3] - matrices(poses[:, 7:11])[:, 2:3, 2]
-
-    plain, standing = (Cylindrical(legs, R, Z, heights=h) for h in (None, heights))
-    x = stylus(0.05, 1.0, 0.0)
-    assert heights(plain.pose(x)[None])[0, 0] < -0.25
-    assert abs(heights(standing.pose(x)[None])[0, 0]) < 1e-6
-    for r in np.linspace(*R, 9):
-        assert abs(heights(standing.pose(stylus(r, 2.0, 0.01))[None])[0, 0]) < 0.01  # of a correction of 0.3 m
+            unit, q = np.ascontiguousarray(stacked[frame, :, first : first + 4]), np.empty(4)
+            mean_rotation(unit, weights, q)
+            moment = np.einsum("m,mx,my->xy", weights, unit, unit)
+            assert abs(q @ np.linalg.eigh(moment).eigenvectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
 
 
 @settings(max_examples=60, deadline=None)

@@ -1,0 +1,301 @@
+r"""Limbs whose ends stay where they are put: feet of a blend stand where the feet of its clips stand on average.
+
+A mean of joint angles leaves the feet anywhere. So the pose of the end of a limb (a foot) is blended too, as root
+and joints are, and the limb's three joints are corrected in closed form so that its end is exactly there:
+
+- the middle joint turns by δ about its flexion axis, the law of cosines in the form A + B cos δ + C sin δ = D²;
+- the first joint turns the shortest way, until the last joint lies in the direction where it should;
+- the last joint gives the end its blended orientation.
+
+With c = (D² − A)/√(B² + C²), the cosine of the flexion asked for, and c₀ that of the blended joints, δ = f(c) − f(c₀);
+f is the arc cosine, levelled off near ±1 with two continuous derivatives. A limb asked to be longer than it is stays
+short, by a millimetre for a human leg, and moves smoothly; and δ is zero where nothing is to be corrected, however
+straight: a clip alone is left as it is.
+
+A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
+drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while
+it moves; λ is common to all clips, and of no consequence unless some clip turns.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.loops import plane_exponential, turned, yawed
+from controllers.rotations import multiply, rotate
+from controllers.state import Array, Vec3
+
+LIMB = 18  # numbers of a packed limb
+END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
+
+_STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
+_SOFTNESS = 0.003  # [m] of the minimum of heights
+_SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
+_SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
+
+_Vector = tuple[float, float, float]
+_Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """Three joints in a row, the first on the root.
+
+    Parameters
+    ----------
+    joints : tuple of three int
+        Their places in a pose: joint k has the numbers 3 + 4k to 6 + 4k, the root is 0.
+    offsets : Array, shape (3, 3)
+        Origin of each in the segment before it, in the rest pose [m].
+    axis : Vec3
+        Flexion axis of the middle joint, in the frame of its own segment.
+    points : Array, shape (k, 3)
+        Of the last segment, those that may touch the ground; their centre is to be where it should [m].
+
+    Raises
+    ------
+    ParameterError
+        If numbers are not finite, or flexion cannot change the limb's length.
+    """
+
+    joints: tuple[int, int, int]
+    offsets: Array
+    axis: Vec3
+    points: Array
+
+    def __post_init__(self) -> None:
+        numbers = self.packed()
+        if numbers.shape != (LIMB,) or not np.isfinite(numbers).all():
+            raise ParameterError(f"a limb has {LIMB} finite numbers (offsets 3 × 3, axis 3, centre 3), got {numbers}")
+        if min(self.joints) < 1 or len(set(self.joints)) != 3:
+            raise ParameterError(f"a limb has three joints, counted from 1; got {self.joints}")
+        for offset in self.offsets[1:]:
+            if np.linalg.norm(np.cross(self.axis, offset)) < 1e-6:
+                raise ParameterError(f"flexion about {self.axis} does not move a limb with offsets {self.offsets}")
+
+    def packed(self) -> Array:
+        """What the kernel reads: joints, offsets, unit axis, centre of the points; shape (18,)."""
+        axis = np.asarray(self.axis, dtype=np.float64)
+        unit = axis / max(float(np.linalg.norm(axis)), 1e-300)
+        return np.concatenate([self.joints, np.ravel(self.offsets), unit, np.mean(self.points, axis=0)])
+
+
+def _end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
+    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq), and height (n, m)."""
+    n, m, _ = channels.shape
+    place, turn = channels[..., :3].reshape(-1, 3), _rotations(channels, 0)
+    for joint, offset in zip(limb.joints, limb.offsets, strict=True):
+        place = place + turn.apply(offset)
+        turn = turn * _rotations(channels, joint)
+    points = np.stack([place + turn.apply(point) for point in limb.points])
+    quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
+    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
+    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
+    # A soft minimum: heel and toe take turns without a kink.
+    height = -_SOFTNESS * np.log(np.exp(-points[..., 2] / _SOFTNESS).sum(axis=0))
+    return points.mean(axis=0).reshape(n, m, 3), quaternions, height.reshape(n, m)
+
+
+def _rotations(channels: Array, joint: int) -> Rotation:
+    return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
+
+
+def _lag(places: Array, drifts: Array) -> Array:
+    """λ at each sample (n,): the share of the lap's movement that an end has done, less the share of the lap."""
+    n = len(places)
+    weights = np.abs(drifts[:, 2])
+    if not weights.any():
+        return np.zeros(n)
+    rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]
+    across = np.stack([-places[..., 1], places[..., 0]], axis=-1)
+    # Over the ground an end moves with the drift of its clip, and in its frame.
+    square = ((rate + drifts[:, :2] + drifts[:, 2:] * across) ** 2).sum(axis=2)
+    pace = square / np.maximum(square.mean(axis=0), 1e-12)
+    pace = pace @ weights / weights.sum()
+    lag = (np.cumsum(pace) - 0.5 * pace - np.arange(n) - 0.5) / n
+    return lag - lag.mean()
+
+
+def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
+    """Channels in which limbs are given by their ends.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq)
+        Remainders of m aligned loops at equal steps of the lap (see `alignment`).
+    drifts : Array, shape (m, 3)
+        Their drifts ξ.
+    limbs : sequence of Limb
+
+    Returns
+    -------
+    Array, shape (n, m, nq + 5 limbs)
+        Each limb's last joint has the end's orientation instead of its own; appended are, limb by limb, the end's
+        position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
+
+    Raises
+    ------
+    ParameterError
+        If a limb has a joint that the poses do not have.
+    """
+    result, places, heights, lags = channels.copy(), [], [], []
+    joints = (channels.shape[2] - 7) // 4
+    for limb in limbs:
+        if max(limb.joints) > joints:
+            raise ParameterError(f"the poses have {joints} joints, a limb wants {limb.joints}")
+        place, quaternions, height = _end_poses(channels, limb)
+        lag = _lag(place, drifts)
+        shift, angle = plane_exponential(lag[:, None, None] * drifts)
+        place[..., :2] = turned(-angle, place[..., :2] - shift)
+        column = 3 + 4 * limb.joints[2]
+        result[..., column : column + 4] = yawed(-angle, quaternions)
+        places.append(place)
+        heights.append(height)
+        lags.append(np.broadcast_to(lag[:, None], height.shape))
+    ground = min((float(height.min()) for height in heights), default=0.0)
+    ends = [
+        np.concatenate([place, lag[..., None], height[..., None] - ground], axis=2)
+        for place, lag, height in zip(places, lags, heights, strict=True)
+    ]
+    return np.concatenate([result, *ends], axis=2)
+
+
+@njit
+def flexion(c: float) -> tuple[float, float]:
+    """Angle f(c) [rad] of a cosine, and f': the arc cosine, but levelled off beyond ±cos 0.2; C² for every number."""
+    over = (abs(c) - _SOFT) / (_HARD - _SOFT)
+    soft, slope = c, 1.0
+    if over > 0.0:
+        # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
+        root = np.cbrt(1.0 + over**3)
+        soft, slope = np.copysign(_SOFT + (_HARD - _SOFT) * over / root, c), root**-4
+    return np.arccos(soft), -slope / np.sqrt(1.0 - soft * soft)
+
+
+@njit
+def _dot(a: _Vector, b: _Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def _plus(a: _Vector, b: _Vector) -> _Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit
+def _minus(a: _Vector, b: _Vector) -> _Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit
+def _turn(q: _Quaternion, v: _Vector) -> _Vector:
+    return rotate(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
+
+
+@njit
+def _back(q: _Quaternion, v: _Vector) -> _Vector:
+    return rotate(q[0], -q[1], -q[2], -q[3], v[0], v[1], v[2])
+
+
+@njit
+def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    return multiply(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+
+
+@njit
+def _vector(array: Array, at: int) -> _Vector:
+    return array[at], array[at + 1], array[at + 2]
+
+
+@njit
+def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
+    """Correct the joints of a limb so that its end is where it should be.
+
+    Parameters
+    ----------
+    limb : Array, shape (18,)
+        `Limb.packed`.
+    rotations : Array, shape (joints, 4)
+        Root orientation, then joint rotations; the limb's last holds the orientation of the end and becomes its
+        joint's rotation, the others are corrected.
+    rates : Array, shape (joints, 3, k)
+        Their local angular velocities with respect to k parameters; updated likewise.
+    root, end : Array, shape (1 + k, 3)
+        Position of root and end, and the derivatives by each parameter.
+    tangents : int
+        k, or 0 to leave the rates alone.
+    """
+    first, second, last = int(limb[0]), int(limb[1]), int(limb[2])
+    a, b, axis, point = _vector(limb, 6), _vector(limb, 9), _vector(limb, 12), _vector(limb, 15)
+    q_root = rotations[0, 0], rotations[0, 1], rotations[0, 2], rotations[0, 3]
+    q_first = rotations[first, 0], rotations[first, 1], rotations[first, 2], rotations[first, 3]
+    q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
+    q_end = rotations[last, 0], rotations[last, 1], rotations[last, 2], rotations[last, 3]
+
+    # The last joint as the root sees it, from its own origin and from the first joint's.
+    from_root = _back(q_root, _minus(_minus(_vector(end[0], 0), _turn(q_end, point)), _vector(root[0], 0)))
+    line = _minus(from_root, _vector(limb, 3))
+    m, normal = _back(q_second, a), _cross(axis, b)
+    b_axis, m_axis = _dot(b, axis), _dot(m, axis)
+    k_cos, k_sin = 2.0 * (_dot(m, b) - m_axis * b_axis), 2.0 * _dot(m, normal)
+    size = max(np.sqrt(k_cos * k_cos + k_sin * k_sin), 1e-12)
+    c = (_dot(line, line) - _dot(a, a) - _dot(b, b) - 2.0 * m_axis * b_axis) / size
+    wanted, wanted_slope = flexion(c)
+    blended, blended_slope = flexion(k_cos / size)
+    half = 0.5 * (wanted - blended)
+    sine = np.sin(half)
+    bend = np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
+    n_second = _product(q_second, bend)
+
+    to_last = _plus(a, _turn(n_second, b))
+    u = _turn(q_first, to_last)
+    length, distance = max(np.sqrt(_dot(u, u)), 1e-9), max(np.sqrt(_dot(line, line)), 1e-9)
+    # Half-angle form of the shortest rotation from u to the line; not defined half a turn apart.
+    scalar, vector = length * distance + _dot(u, line), _cross(u, line)
+    norm = max(np.sqrt(scalar * scalar + _dot(vector, vector)), 1e-12)
+    swing = scalar / norm, vector[0] / norm, vector[1] / norm, vector[2] / norm
+    n_first = _product(swing, q_first)
+    shank = _product(_product(q_root, n_first), n_second)
+    n_last = _product((shank[0], -shank[1], -shank[2], -shank[3]), q_end)
+
+    for k in range(tangents):
+        w_root = rates[0, 0, k], rates[0, 1, k], rates[0, 2, k]
+        w_first = rates[first, 0, k], rates[first, 1, k], rates[first, 2, k]
+        w_second = rates[second, 0, k], rates[second, 1, k], rates[second, 2, k]
+        w_end = rates[last, 0, k], rates[last, 1, k], rates[last, 2, k]
+        v = _minus(_minus(_vector(end[1 + k], 0), _turn(q_end, _cross(w_end, point))), _vector(root[1 + k], 0))
+        d_line = _minus(_back(q_root, v), _cross(w_root, from_root))
+        d_m = _cross(m, w_second)
+        d_axis = _dot(d_m, axis)
+        d_cos, d_sin = 2.0 * (_dot(d_m, b) - d_axis * b_axis), 2.0 * _dot(d_m, normal)
+        d_size = (k_cos * d_cos + k_sin * d_sin) / size
+        d_c = (2.0 * _dot(line, d_line) - 2.0 * d_axis * b_axis - c * d_size) / size
+        turn = wanted_slope * d_c - blended_slope * (d_cos - k_cos / size * d_size) / size
+        w_second = _plus(_back(bend, w_second), (turn * axis[0], turn * axis[1], turn * axis[2]))
+        d_u = _turn(q_first, _plus(_cross(w_first, to_last), _turn(n_second, _cross(w_second, b))))
+        d_scalar = _dot(u, d_u) * distance / length + _dot(line, d_line) * length / distance
+        d_scalar += _dot(d_u, line) + _dot(u, d_line)
+        d_vector = _plus(_cross(d_u, line), _cross(u, d_line))
+        # 2 Im(Q⁻¹ ⊗ Q̇), whatever the length of Q.
+        across, share = _cross(vector, d_vector), 2.0 / (norm * norm)
+        w_swing = (
+            share * (scalar * d_vector[0] - d_scalar * vector[0] - across[0]),
+            share * (scalar * d_vector[1] - d_scalar * vector[1] - across[1]),
+            share * (scalar * d_vector[2] - d_scalar * vector[2] - across[2]),
+        )
+        w_first = _plus(_back(q_first, w_swing), w_first)
+        w_shank = _plus(_back(n_second, _plus(_back(n_first, w_root), w_first)), w_second)
+        w_last = _minus(w_end, _back(n_last, w_shank))
+        for i in range(3):
+            rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
+    for i in range(4):
+        rotations[first, i], rotations[second, i], rotations[last, i] = n_first[i], n_second[i], n_last[i]

@@ -1,0 +1,70 @@
+r"""Blends of standing clips stand: not lifted off the ground because one clip lifts one foot and another the other.
+
+With the clearances h̄_j of the ends of the limbs in the blend and h_ij in clip i, all ends are lowered by
+
+.. math:: c = S(m(\bar h)) - \textstyle\sum_i w_i\, S(m(h_i))
+
+m is a soft minimum over the limbs, S(x) = y³/(y² + s²) with y = x − x₀, 0 where y < 0: c takes back what the blend's
+lowest end rises above the clips' own, smoothly, and not the heights at which all clips fly. A clip alone is left as
+it is, and an end on the ground is not pushed into it. x₀ leaves a step that has to be made room to be made: an end
+that moves is not dragged over the ground.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.state import Array
+
+_SOFTNESS = 0.003  # [m] of the minimum, and s
+_ROOM = 0.006  # [m] x₀
+
+
+@njit
+def _raised(clearance: Array, rates: Array, change: Array) -> float:
+    """S(m(h)) of clearances (limbs,); `change` (k,) becomes its derivatives, `rates` (limbs, k) being theirs."""
+    least = clearance.min()
+    total = 0.0
+    for h in clearance:
+        total += np.exp((least - h) / _SOFTNESS)
+    m = least - _SOFTNESS * np.log(total) - _ROOM
+    change[:] = 0.0
+    if m <= 0.0:
+        return 0.0
+    square, s2 = m * m, _SOFTNESS * _SOFTNESS
+    slope = square * (square + 3.0 * s2) / (square + s2) ** 2
+    for j in range(len(clearance)):
+        share = slope * np.exp((least - clearance[j]) / _SOFTNESS) / total
+        for k in range(len(change)):
+            change[k] += share * rates[j, k]
+    return m * square / (square + s2)
+
+
+@njit
+def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: Array) -> None:
+    """Lowering c of the ends, and its derivatives.
+
+    Parameters
+    ----------
+    value, slope : Array, shape (clips, limbs)
+        Clearances [m] and their derivatives by θ.
+    weights, changes : Array, shapes (clips,), (2, clips)
+        Of the clips, and their derivatives by two parameters.
+    lower : Array, shape (4,)
+        Written: c [m] and its derivatives by θ and the two.
+    """
+    clips, limbs = value.shape
+    mean, rates, own, change = np.zeros(limbs), np.zeros((limbs, 3)), np.empty((limbs, 1)), np.empty(1)
+    for i in range(clips):
+        for j in range(limbs):
+            mean[j] += weights[i] * value[i, j]
+            rates[j, 0] += weights[i] * slope[i, j]
+            rates[j, 1] += changes[0, i] * value[i, j]
+            rates[j, 2] += changes[1, i] * value[i, j]
+    lower[0] = _raised(mean, rates, lower[1:])
+    for i in range(clips):
+        own[:, 0] = slope[i]
+        height = _raised(value[i], own, change)
+        lower[0] -= weights[i] * height
+        lower[1] -= weights[i] * change[0]
+        lower[2] -= changes[0, i] * height
+        lower[3] -= changes[1, i] * height
