@@ -23,7 +23,7 @@ from controllers.state import Array, HandState, IntArray, Wrench
 if TYPE_CHECKING:
     from controllers.fields.python_law import PythonLaw
 
-FOLLOW, BUNNY, EXTERNAL, ADD, HIGHER_ORDER, RECORDED, GATE, BLEND, LIMIT = range(9)
+FOLLOW, BUNNY, EXTERNAL, ADD, HIGHER_ORDER, RECORDED, GATE, BLEND, LIMIT, STRETCHY = range(10)
 STACK = 16
 
 # What an instruction adds to the stack; a law adds its wrench.

@@ -19,10 +19,12 @@ from controllers.fields.instructions import (
     LIMIT,
     RECORDED,
     STACK,
+    STRETCHY,
     TRACE_DISTANCE,
     TRACE_ROW,
     Program,
 )
+from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.state import Array, IntArray
 
 __all__ = ["Program", "evaluate"]
@@ -60,6 +62,9 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top += 1
         elif opcode == RECORDED:
             recorded_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == STRETCHY:
+            stretchy_wrench(params, at, memory, slot, hand, stack[top])
             top += 1
         elif opcode == EXTERNAL:
             for i in range(6):

@@ -1,0 +1,273 @@
+r"""Curves that are bent by hand: compact C² bumps on a spline, in place, with undo and redo.
+
+.. math:: \varphi'(t) = \varphi(t) + \sum_j w\bigl((t - \hat t_j)/h_j\bigr)\,\hat\delta_j, \qquad
+          \hat\delta_j = \delta_j / w\bigl((t_j - \hat t_j)/h_j\bigr)
+
+w is the cubic B-spline, so φ′ is a cubic spline on the *same* pieces as φ, provided that the breaks of w are breaks of
+φ. So the curve is refined once, exactly, by a grid of phases; a bump is centred at the point t̂_j of the grid next to
+the grabbed phase t_j, and δ̂_j is such that φ′(t_j) = φ(t_j) + δ_j all the same. A bump then changes coefficients of the
+pieces under it and nothing else, and laws and searches run on the bent curve as on any other.
+
+A *record* is all of that in one array: a header, the table of edits [t̂, h, δ̂ (3)], coefficients of the curve before
+all of them and after those that are committed, and the packed curve itself, on which the pending edit lies as well.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.bounds import NODE
+from controllers.curves.trajectory import (
+    BREAKS,
+    COEFFICIENTS,
+    END,
+    LEVELS,
+    PERIODIC,
+    PIECE,
+    PIECES,
+    START,
+    TREE,
+    curve_point,
+    find_piece,
+    wrap_phase,
+)
+from controllers.state import Array
+
+# The record's header; TABLE to WORK are offsets from its start.
+STEP, HALF, COUNT, TOTAL, DEPTH, TABLE, BASE, COMMITTED, WORK, PHASE, ANCHOR, PENDING = *range(10), 10, 13
+RECORD_HEADER = 18
+EDIT = 5  # numbers an edit
+
+
+@njit
+def bump(s: float) -> float:
+    """Cubic B-spline w = 2⟨1 − |s|⟩³ − 8⟨½ − |s|⟩³: C², w(0) = 1, and 0 from |s| = 1 on."""
+    outer, inner = np.maximum(0.0, 1.0 - np.abs(s)), np.maximum(0.0, 0.5 - np.abs(s))
+    return 2.0 * outer * outer * outer - 8.0 * inner * inner * inner
+
+
+@njit
+def work_curve(record: Array, at: int) -> int:
+    """Where the bent curve is packed in the array that holds a record at ``record[at:]``."""
+    return at + int(record[at + WORK])
+
+
+@njit
+def _lay_bump(record: Array, at: int, edit: int, source: int, target: int) -> tuple[int, int]:
+    """Write source + bump into target on the pieces under the edit at ``record[edit:]``: the first, and how many."""
+    curve = work_curve(record, at)
+    breaks, n = curve + int(record[curve + BREAKS]), int(record[curve + PIECES])
+    centre, width = record[edit], record[edit + 1]
+    period = record[curve + END] - record[curve + START] if record[curve + PERIODIC] > 0.0 else 0.0
+    first = find_piece(record, curve, wrap_phase(record, curve, centre - width + 1e-6 * record[at + STEP]))
+    piece, count = first, 0
+    while count < n and piece < n:
+        half = 0.5 * (record[breaks + piece + 1] - record[breaks + piece])
+        middle = record[breaks + piece] + half - centre
+        if period > 0.0:
+            middle -= period * np.floor(middle / period + 0.5)
+        if middle >= width:
+            break
+        side = 1.0 if middle > 0.0 else -1.0
+        inner = 4.0 if abs(middle) < 0.5 * width else 0.0
+        outside = 1.0 - side * (middle - half) / width
+        inside = outside - 0.5
+        # Taylor's coefficients of w at the break: the pieces of w end at breaks of the curve, so each is one cubic.
+        taylor = (
+            2.0 * outside**3 - 2.0 * inner * inside**3,
+            -side * 6.0 * (outside**2 - inner * inside**2) / width,
+            6.0 * (outside - inner * inside) / width**2,
+            -side * 2.0 * (1.0 - inner) / width**3,
+        )
+        row = PIECE * piece
+        for power in range(4):
+            for axis in range(3):
+                i = row + 7 * power + axis
+                record[target + i] = record[source + i] + taylor[power] * record[edit + 2 + axis]
+        count += 1
+        piece += 1
+        if piece == n and period > 0.0:
+            piece = 0
+    return first, count
+
+
+@njit
+def _distance_to_chord(record: Array, node: int, x: float, y: float, z: float) -> float:
+    x, y, z = x - record[node], y - record[node + 1], z - record[node + 2]
+    dx, dy, dz = record[node + 3], record[node + 4], record[node + 5]
+    share = min(max((x * dx + y * dy + z * dz) * record[node + 6], 0.0), 1.0)
+    return np.sqrt((x - share * dx) ** 2 + (y - share * dy) ** 2 + (z - share * dz) ** 2)
+
+
+@njit
+def _set_chord(record: Array, node: int, x: float, y: float, z: float) -> None:
+    record[node + 3], record[node + 4], record[node + 5] = x, y, z
+    record[node + 6] = 1.0 / max(x * x + y * y + z * z, 1e-300)
+
+
+@njit
+def _bound_piece(record: Array, node: int, row: int, h: float) -> None:
+    """Capsule of one piece: its chord, thickened by the inner two Bézier control points (the outer two lie on it)."""
+    for i in range(3):
+        record[node + i] = record[row + i]
+    a, b = h / 3.0, h * h / 3.0
+    dx = h * (record[row + 7] + h * (record[row + 14] + h * record[row + 21]))
+    dy = h * (record[row + 8] + h * (record[row + 15] + h * record[row + 22]))
+    dz = h * (record[row + 9] + h * (record[row + 16] + h * record[row + 23]))
+    _set_chord(record, node, dx, dy, dz)
+    x, y, z = record[row], record[row + 1], record[row + 2]
+    x, y, z = x + a * record[row + 7], y + a * record[row + 8], z + a * record[row + 9]
+    radius = _distance_to_chord(record, node, x, y, z)
+    x, y, z = x + a * record[row + 7], y + a * record[row + 8], z + a * record[row + 9]
+    x, y, z = x + b * record[row + 14], y + b * record[row + 15], z + b * record[row + 16]
+    record[node + 7] = max(radius, _distance_to_chord(record, node, x, y, z)) + 1e-14
+
+
+@njit
+def _join(record: Array, node: int, left: int, right: int) -> None:
+    """Capsule that holds those of two runs, the second of which begins where the first ends."""
+    for i in range(3):
+        record[node + i] = record[left + i]
+    x, y, z = record[right], record[right + 1], record[right + 2]
+    _set_chord(
+        record, node, x + record[right + 3] - record[left], y + record[right + 4] - record[left + 1],
+        z + record[right + 5] - record[left + 2],
+    )  # fmt: skip
+    thicker = max(record[left + 7], record[right + 7])
+    record[node + 7] = _distance_to_chord(record, node, x, y, z) + thicker + 1e-14
+
+
+@njit
+def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
+    """Renew the capsules (see `controllers.curves.bounds`) of some pieces, and of all runs that hold one of them.
+
+    A run's capsule is thickened by how far the joint of its halves lies off its chord, and by the thicker half: at
+    most a third thicker than need be on a smooth curve, for an effort proportional to the number of pieces.
+    """
+    tree, rows = curve + int(record[curve + TREE]), curve + int(record[curve + COEFFICIENTS])
+    breaks, leaf = curve + int(record[curve + BREAKS]), 1 << int(record[curve + LEVELS])
+    for piece in range(first, first + count):
+        h = record[breaks + piece + 1] - record[breaks + piece]
+        _bound_piece(record, tree + NODE * (leaf + piece), rows + PIECE * piece, h)
+    low, high, last = leaf + first, leaf + first + count - 1, leaf + int(record[curve + PIECES]) - 1
+    while low > 1:
+        low, high = low // 2, high // 2
+        for number in range(low, high + 1):
+            node, left = tree + NODE * number, tree + NODE * 2 * number
+            if 2 * number < last:
+                _join(record, node, left, left + NODE)
+            else:
+                record[node : node + NODE] = record[left : left + NODE]
+        last //= 2
+
+
+@njit
+def _bound_run(record: Array, curve: int, first: int, count: int) -> None:
+    """`bound_pieces` of a run that may go on beyond the seam."""
+    before = min(count, int(record[curve + PIECES]) - first)
+    bound_pieces(record, curve, first, before)
+    if count > before:
+        bound_pieces(record, curve, 0, count - before)
+
+
+@njit
+def _copy_pieces(record: Array, at: int, source: int, target: int) -> None:
+    length = PIECE * int(record[work_curve(record, at) + PIECES])
+    record[target : target + length] = record[source : source + length]
+
+
+@njit
+def let_go(record: Array, at: int) -> None:
+    """Forget the pending edit: the curve is again as the committed edits left it, to the last bit."""
+    curve = work_curve(record, at)
+    rows = curve + int(record[curve + COEFFICIENTS])
+    _copy_pieces(record, at, at + int(record[at + COMMITTED]), rows)
+    bound_pieces(record, curve, 0, int(record[curve + PIECES]))
+
+
+@njit
+def take_hold(record: Array, at: int, phase: float) -> bool:
+    """Begin an edit at a phase t_j; False if an open curve's end, which stays put, is too near.
+
+    The half width is h, or, near an open end, the distance to it, but not below h/4.
+    """
+    curve, step = work_curve(record, at), record[at + STEP]
+    phase = wrap_phase(record, curve, phase)
+    cell = int(np.floor((phase - record[curve + START]) / step + 0.5))
+    half = int(record[at + HALF])
+    if record[curve + PERIODIC] == 0.0:
+        to_end = int(np.floor((record[curve + END] - record[curve + START]) / step + 0.5)) - cell
+        half = min(half, min(cell, to_end) // 2)
+        if 4 * half < record[at + HALF]:
+            return False
+    record[at + PHASE] = phase
+    record[at + ANCHOR], record[at + ANCHOR + 1], record[at + ANCHOR + 2] = curve_point(record, curve, phase)
+    record[at + PENDING] = record[curve + START] + cell * step
+    record[at + PENDING + 1] = 2 * half * step
+    for i in range(3):
+        record[at + PENDING + 2 + i] = 0.0
+    return True
+
+
+@njit
+def carry_to(record: Array, at: int, x: float, y: float, z: float) -> None:
+    """Bend the curve such that φ′(t_j) is at a place [m], and nowhere but under the bump."""
+    edit, curve = at + PENDING, work_curve(record, at)
+    weight = bump((record[at + PHASE] - record[edit]) / record[edit + 1])
+    record[edit + 2] = (x - record[at + ANCHOR]) / weight
+    record[edit + 3] = (y - record[at + ANCHOR + 1]) / weight
+    record[edit + 4] = (z - record[at + ANCHOR + 2]) / weight
+    rows = curve + int(record[curve + COEFFICIENTS])
+    first, count = _lay_bump(record, at, edit, at + int(record[at + COMMITTED]), rows)
+    _bound_run(record, curve, first, count)
+
+
+@njit
+def commit(record: Array, at: int) -> None:
+    """Make the pending edit one of the curve; what was undone can no longer be redone.
+
+    With a full table the oldest edit becomes part of the curve before all edits: it can no longer be undone.
+    """
+    table, committed, base = (
+        at + int(record[at + TABLE]),
+        at + int(record[at + COMMITTED]),
+        at + int(record[at + BASE]),
+    )
+    _lay_bump(record, at, at + PENDING, committed, committed)
+    count = int(record[at + COUNT])
+    if count == int(record[at + DEPTH]):
+        _lay_bump(record, at, table, base, base)
+        for i in range(table, table + EDIT * (count - 1)):
+            record[i] = record[i + EDIT]
+        count -= 1
+    for i in range(EDIT):
+        record[table + EDIT * count + i] = record[at + PENDING + i]
+    record[at + COUNT] = record[at + TOTAL] = count + 1
+
+
+@njit
+def _replay(record: Array, at: int, count: int) -> None:
+    """Lay the first edits of the table on the curve before them all, in the order in which they were made."""
+    committed = at + int(record[at + COMMITTED])
+    _copy_pieces(record, at, at + int(record[at + BASE]), committed)
+    for edit in range(count):
+        _lay_bump(record, at, at + int(record[at + TABLE]) + EDIT * edit, committed, committed)
+    record[at + COUNT] = count
+    let_go(record, at)
+
+
+@njit
+def undo(record: Array, at: int) -> bool:
+    """Take the last edit back, to the last bit; False if there is none."""
+    count = int(record[at + COUNT])
+    if count > 0:
+        _replay(record, at, count - 1)
+    return count > 0
+
+
+@njit
+def redo(record: Array, at: int) -> bool:
+    """Make again the edit that was undone last; False if there is none."""
+    count, again = int(record[at + COUNT]), record[at + TOTAL] > record[at + COUNT]
+    if again:
+        _replay(record, at, count + 1)
+    return again

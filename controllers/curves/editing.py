@@ -1,0 +1,182 @@
+"""A curve that is bent from Python: the record of `controllers.curves.deformation` made, used, and read back."""
+
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves import deformation
+from controllers.curves.deformation import DEPTH, EDIT, HALF, RECORD_HEADER, STEP, TABLE, work_curve
+from controllers.curves.trajectory import BREAKS, CHANNELS, COEFFICIENTS, PIECE, PIECES, Trajectory
+from controllers.errors import CurveError
+from controllers.state import Array
+
+_GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grabbed phase
+_SAME = 1e-9  # of a step of the grid: breaks nearer than that are one
+
+
+def _of_pieces(times: Array, coefficients: Array, like: Trajectory) -> Trajectory:
+    """Curve of given pieces: of *these* coefficients, not of a spline laid through its samples again."""
+    u = (times[-1] - times[-2]) ** np.arange(4)
+    samples = np.vstack([coefficients[:, 0], u @ coefficients[-1]])
+    if like.periodic:
+        samples[-1, :3] = samples[0, :3]
+    quaternions = samples[:, 3:] / np.linalg.norm(samples[:, 3:], axis=1, keepdims=True)
+    curve = Trajectory(times, samples[:, :3], quaternions, like.periodic, like.ends)
+    vars(curve)["coefficients"] = coefficients
+    return curve
+
+
+def refined(curve: Trajectory, cells: int) -> Trajectory:
+    """The same curve on more pieces: its own breaks, and those of a grid of equal steps over its duration.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        Unchanged.
+    cells : int
+        Steps of the grid.
+    """
+    breaks, step = np.asarray(curve.times, dtype=float), curve.duration / cells
+    grid = curve.start + step * np.arange(cells + 1, dtype=np.float64)
+    nearest = np.clip(np.round((breaks - curve.start) / step).astype(int), 0, cells)
+    on_grid = np.abs(breaks - grid[nearest]) <= _SAME * step
+    grid[nearest[on_grid]] = breaks[on_grid]
+    times = np.sort(np.concatenate([grid, breaks[~on_grid]]))
+    piece = np.clip(np.searchsorted(breaks, times[:-1], side="right") - 1, 0, len(breaks) - 2)
+    c0, c1, c2, c3 = (curve.coefficients[piece, power] for power in range(4))
+    u = (times[:-1] - breaks[piece])[:, None]
+    shifted = [c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3), c2 + 3.0 * u * c3, c3]
+    return _of_pieces(times, np.ascontiguousarray(np.stack(shifted, axis=1)), curve)
+
+
+def record_of(curve: Trajectory, width: float, depth: int) -> Array:
+    """Record of a curve without edits, for the kernels of `controllers.curves.deformation`.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ.
+    width : float
+        h, half the width of a bump [s]; it becomes an even number of steps of a grid, which changes it by up to h/16.
+    depth : int
+        How many edits can be undone.
+
+    Raises
+    ------
+    CurveError
+        If h is not positive, or a bump would be longer than the curve, or nothing could be undone.
+    """
+    if not 0.0 < width <= 0.5 * curve.duration:
+        raise CurveError(
+            f"a bump's half width must be above 0 s and at most half of the curve's {curve.duration:g} s, got {width}"
+        )
+    if depth < 1:
+        raise CurveError(f"at least 1 edit must be undoable, got {depth}")
+    steps = np.diff(np.asarray(curve.times, dtype=float))
+    # A grid that holds the breaks of a curve of equal steps keeps its steps equal.
+    multiple = len(steps) if np.ptp(steps) <= _SAME * steps[0] else 1
+    cells = multiple * int(np.ceil(_GRID * curve.duration / (width * multiple)))
+    step = curve.duration / cells
+    fine = refined(curve, cells)
+    packed, rows = fine.packed(), fine.coefficients.ravel()
+    offsets = np.cumsum([RECORD_HEADER, EDIT * depth, len(rows), len(rows)])
+    header = np.zeros(RECORD_HEADER)
+    header[[STEP, DEPTH]] = step, depth
+    header[HALF] = min(max(round(0.5 * width / step), 1), cells // 4)
+    header[TABLE : TABLE + 4] = offsets  # also BASE, COMMITTED and WORK
+    return np.concatenate([header, np.zeros(EDIT * depth), rows, rows, packed])
+
+
+def curve_of(record: Array, at: int, like: Trajectory) -> Trajectory:
+    """The bent curve of a record at ``record[at:]``, with the coefficients that the servo uses.
+
+    Parameters
+    ----------
+    record, at
+        Array and offset of the record.
+    like : Trajectory
+        The curve it was made of.
+    """
+    blob = record[work_curve.py_func(record, at) :]  # pyright: ignore[reportFunctionMemberAccess]
+    pieces, breaks, rows = (int(blob[i]) for i in (PIECES, BREAKS, COEFFICIENTS))
+    coefficients = blob[rows : rows + PIECE * pieces].reshape(pieces, 4, CHANNELS)
+    return _of_pieces(blob[breaks : breaks + pieces + 1].copy(), coefficients.copy(), like)
+
+
+class EditableCurve:
+    """Curve to be bent: take hold, carry, let go; undo and redo.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, before all edits.
+    width : float
+        h, half the width of a bump [s]; see `record_of`.
+    depth : int
+        How many edits can be undone; older ones stay.
+
+    Raises
+    ------
+    CurveError
+        If the width or the depth is out of its interval.
+    """
+
+    def __init__(self, curve: Trajectory, width: float, depth: int = 64):
+        self._like = curve
+        self.record = record_of(curve, width, depth)
+        self._held = False
+        deformation.let_go(self.record, 0)
+
+    @property
+    def curve(self) -> Trajectory:
+        """φ′ as it is now, a pending edit included."""
+        return curve_of(self.record, 0, self._like)
+
+    def take_hold(self, phase: float) -> None:
+        """Begin an edit at a phase [s].
+
+        Raises
+        ------
+        CurveError
+            If an open end is too near, which stays put.
+        """
+        self.let_go()
+        if not deformation.take_hold(self.record, 0, phase):
+            least = 0.5 * float(self.record[STEP] * self.record[HALF])
+            raise CurveError(f"phase {phase:g} s is too near an open end, which stays put; keep {least:.3g} s off")
+        self._held = True
+
+    def carry_to(self, p: npt.ArrayLike) -> None:
+        """Bend the curve such that the held point is at p_H [m], shape (3,).
+
+        Raises
+        ------
+        CurveError
+            If nothing is held or p is not three finite numbers.
+        """
+        point = np.asarray(p, dtype=float)
+        if not self._held or point.shape != (3,) or not np.isfinite(point).all():
+            raise CurveError(f"a held point is carried to three finite numbers [m], got {p!r}, held: {self._held}")
+        deformation.carry_to(self.record, 0, *cast("list[float]", point.tolist()))
+
+    def commit(self) -> None:
+        """Make the pending edit one of the curve, and let go."""
+        if self._held:
+            deformation.commit(self.record, 0)
+        self._held = False
+
+    def let_go(self) -> None:
+        """Forget the pending edit."""
+        deformation.let_go(self.record, 0)
+        self._held = False
+
+    def undo(self) -> bool:
+        """Take the last edit back; False if there is none."""
+        self.let_go()
+        return bool(deformation.undo(self.record, 0))
+
+    def redo(self) -> bool:
+        """Make the edit again that was undone last; False if there is none."""
+        self.let_go()
+        return bool(deformation.redo(self.record, 0))
