@@ -22,8 +22,9 @@ from numba import njit
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.program import evaluate
 from controllers.safety import limit_force
+from controllers.state import HAND_TIME
 from sim.compiled import entry_point
-from sim.devices.phantom_port import PhantomPort, actuate, sense
+from sim.devices.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.figure import FigureState, figure_torque
 from sim.plant import Hand, Plant, advance
 from sim.reference import CompiledReference, update_reference
@@ -138,7 +139,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     servo : Servo
         Everything in it is updated.
     first, n : int
-        Number of the first tick, a multiple of the figure's ticks, and how many to run.
+        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
     replay : bool
         Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
     ticks, frames : TickLog, FrameLog
@@ -152,7 +153,9 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             plant.ctrl[:] = ticks.ctrl[k]
             servo.figure.applied[:] = ticks.residual[k]
         else:
-            sense(port, t, 0.0)
+            # A tick whose hand Python has already been told of is not sensed twice.
+            if port.hand[HAND_TIME] != t or not has_sensed(port):
+                sense(port, t, servo.hand.arm.switch[0])
             field_force(servo)
             if update_figure:
                 move_figure(servo)

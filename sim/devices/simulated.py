@@ -17,9 +17,9 @@ Array = npt.NDArray[np.float64]
 
 
 @entry_point
-def read_phantom(port: PhantomPort, t: float) -> None:
-    """Read the encoders at time t into `port.hand`."""
-    sense(port, t, 0.0)
+def read_phantom(port: PhantomPort, hand: Hand, t: float) -> None:
+    """Read the encoders and the switch at time t into `port.hand`."""
+    sense(port, t, hand.arm.switch[0])
 
 
 @entry_point
@@ -62,7 +62,7 @@ class SimulatedPhantom:
         """See `sim.devices.base.Device`."""
         self._check_open()
         if self._state is None:
-            read_phantom(self._port, self._tick * self.period)
+            read_phantom(self._port, self._hand, self._tick * self.period)
             hand = self._port.hand.copy()
             self._state = HandState(float(hand[0]), hand[1:4], hand[4:8], hand[8:11], hand[11:14], bool(hand[14]))
         return self._state

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numba import njit
 
 from sim.errors import SimError
-from sim.users.intent import Push, push_table
+from sim.users.intent import Grab, Push, grab_table, push_table
 
 Array = npt.NDArray[np.float64]
 
@@ -86,8 +86,56 @@ def arm_force(
         force[k] = stiffness * (wanted - p[k]) + damping * (speed - v[k])
 
 
+@njit
+def _least_jerk(s: float) -> tuple[float, float]:
+    """σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
+    s = min(max(s, 0.0), 1.0)
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * s * s * (1.0 - s) * (1.0 - s)
+
+
+@njit
+def grab_force(
+    stiffness: float, damping: float, grabs: Array, held: Array, t: float, p: Array, v: Array, force: Array
+) -> float:
+    """Add the force of an arm that is about a grab at time t, k (p_d − p) + b (ṗ_d − v), and tell of the switch.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N/m], b [N s/m].
+    grabs : Array
+        Rows of `sim.users.intent.grab_table`, shape (n, 10).
+    held : Array
+        Where the hand was when each grab began, NaN before it has; shape (n, 3), updated.
+    t, p, v, force
+        Time [s], hand position [m], velocity [m/s] and what is added to [N], in H.
+
+    Returns
+    -------
+    float
+        1 while the switch is pressed, else 0.
+    """
+    for i in range(grabs.shape[0]):
+        pressed_at = grabs[i, 0] + grabs[i, 1]
+        if not grabs[i, 0] <= t < pressed_at + grabs[i, 8] + grabs[i, 9]:
+            continue
+        if math.isnan(held[i, 0]):
+            held[i] = p
+        reached, reaching = (1.0, 0.0) if grabs[i, 1] == 0.0 else _least_jerk((t - grabs[i, 0]) / grabs[i, 1])
+        carried, carrying = _least_jerk((t - pressed_at) / grabs[i, 8])
+        for k in range(3):
+            way = 0.0 if math.isnan(grabs[i, 2]) else grabs[i, 2 + k] - held[i, k]
+            wanted = held[i, k] + reached * way + carried * grabs[i, 5 + k]
+            speed = carrying * grabs[i, 5 + k] / grabs[i, 8]
+            if reaching > 0.0:
+                speed += reaching * way / grabs[i, 1]
+            force[k] += stiffness * (wanted - p[k]) + damping * (speed - v[k])
+        return 1.0 if t >= pressed_at else 0.0
+    return 0.0
+
+
 class CompiledArm(NamedTuple):
-    """An `Arm` as plain numbers and arrays; `begun` is its only state."""
+    """An `Arm` as plain numbers and arrays; its state is when pushes begun, where grabs held, and the switch (1,)."""
 
     stiffness: float
     damping: float
@@ -95,34 +143,41 @@ class CompiledArm(NamedTuple):
     period: float
     pushes: Array
     begun: Array
+    grabs: Array
+    held: Array
+    switch: Array
 
 
 @njit
 def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
-    """Set the force of the hand on the stylus, in H: arm impedance plus pushes."""
+    """Set the force of the hand on the stylus, in H: arm impedance plus pushes and grabs; and the switch."""
     arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
     push_force(arm.pushes, arm.begun, t, p, force)
+    arm.switch[0] = grab_force(arm.stiffness, arm.damping, arm.grabs, arm.held, t, p, v, force)
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A user: an arm that is relaxed or traces a path of its own, and pushes at given places and times.
+    """A user: an arm that is relaxed or traces a path of its own, pushes at given places and times, and grabs.
 
     Parameters
     ----------
     stiffness, damping : float
-        Of the arm about its intended path [N/m], [N s/m]; unused without a path.
+        Of the arm about its intended path, and about that of a grab [N/m], [N s/m]; unused without either.
     path : Array
         Intended positions in H [m], shape (n, 3), `period` seconds apart; none for a relaxed hand.
     period : float
         [s]
     pushes : sequence of Push
         What the hand does beside it.
+    grabs : sequence of Grab
+        When and where the hand takes hold, one after the other; for an arm without a path.
 
     Raises
     ------
     SimError
-        If an impedance is negative or not finite, or the path is not an (n, 3) array of finite numbers.
+        If an impedance is negative or not finite, the path is not an (n, 3) array of finite numbers, there are a path
+        and grabs, or grabs overlap.
     """
 
     stiffness: float = 300.0
@@ -130,6 +185,7 @@ class Arm:
     path: Array = field(default_factory=lambda: np.zeros((0, 3)))
     period: float = 1e-3
     pushes: Sequence[Push] = ()
+    grabs: Sequence[Grab] = ()
 
     def __post_init__(self) -> None:
         for name, value in (("stiffness", self.stiffness), ("damping", self.damping)):
@@ -139,8 +195,12 @@ class Arm:
             raise SimError(f"the period of the arm's path is {self.period} s; it must be positive")
         if self.path.ndim != 2 or self.path.shape[1] != 3 or not np.all(np.isfinite(self.path)):
             raise SimError(f"the arm's path has shape {self.path.shape}; expected (n, 3), all finite")
+        if len(self.path) > 0 and len(self.grabs) > 0:
+            raise SimError(f"an arm that traces a path cannot grab as well; got {len(self.grabs)} grabs")
+        grab_table(self.grabs)
 
     def compiled(self) -> CompiledArm:
         """The arm as the servo loop holds it."""
         return CompiledArm(self.stiffness, self.damping, np.ascontiguousarray(self.path), self.period,
-                           push_table(self.pushes), np.full(len(self.pushes), np.nan))  # fmt: skip
+                           push_table(self.pushes), np.full(len(self.pushes), np.nan),
+                           grab_table(self.grabs), np.full((len(self.grabs), 3), np.nan), np.zeros(1))  # fmt: skip

@@ -1,5 +1,9 @@
-"""What a simulated user means to do with the stylus: nothing, trace a path of their own, push at a place and a time."""
+"""What a simulated user means to do with the stylus.
 
+Nothing, trace a path of their own, push at a place and a time, or go to a place, press the switch and carry the stylus.
+"""
+
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +16,9 @@ Array = npt.NDArray[np.float64]
 
 PUSH_COLUMNS = 11
 """A push as a row: start, duration, peak, direction (3), outward, place (3), radius. A radius of 0 means any place."""
+
+GRAB_COLUMNS = 10
+"""A grab as a row: start, reach, place (3) or NaN, carry (3), duration, hold."""
 
 
 @dataclass(frozen=True)
@@ -69,3 +76,74 @@ class Push:
 def push_table(pushes: Sequence[Push]) -> Array:
     """Rows of all pushes, shape (n, 11)."""
     return np.array([push.row() for push in pushes]).reshape(len(pushes), PUSH_COLUMNS)
+
+
+@dataclass(frozen=True)
+class Grab:
+    r"""Go to a place, press the switch, carry the stylus along a vector, let go of both.
+
+    .. math:: p_d(t) = a + \sigma(t)\,(b - a), \qquad \sigma(s) = 10 s^3 - 15 s^4 + 6 s^5
+
+    The hand means to be at p_d, which moves with least jerk from where the hand is when the grab begins to the place
+    within `reach` seconds, and from there along `carry` within `duration` seconds, with the switch pressed, and stays
+    for `hold` seconds. An arm's impedance pulls the stylus along (see `sim.users.arm`), so what resists keeps it back.
+
+    Parameters
+    ----------
+    start : float
+        [s]
+    carry : tuple of float
+        In the hand frame [m]. A grab that carries nowhere is a click.
+    duration : float
+        Of the carrying [s].
+    hold : float
+        [s]
+    place : tuple of float, optional
+        In the hand frame [m]; by default where the hand is.
+    reach : float
+        Time to get there [s]; ignored without a place.
+
+    Raises
+    ------
+    SimError
+        If a number is out of its interval.
+    """
+
+    start: float
+    carry: tuple[float, float, float]
+    duration: float = 1.0
+    hold: float = 0.3
+    place: tuple[float, float, float] | None = None
+    reach: float = 1.0
+
+    def __post_init__(self) -> None:
+        numbers = [self.start, self.duration, self.hold, self.reach, *self.carry, *(self.place or ())]
+        if not np.all(np.isfinite(numbers)):
+            raise SimError(f"a grab has a number that is not finite: {self}")
+        if self.duration <= 0.0 or self.reach <= 0.0 or self.start < 0.0 or self.hold < 0.0:
+            raise SimError(f"a grab needs duration and reach > 0 s, start and hold ≥ 0 s, got {self}")
+
+    @property
+    def end(self) -> float:
+        """When the switch is let go of [s]."""
+        return self.start + (self.reach if self.place else 0.0) + self.duration + self.hold
+
+    def row(self) -> Array:
+        """The grab as numbers for the compiled hand, shape (10,)."""
+        place, reach = (np.full(3, np.nan), 0.0) if self.place is None else (np.array(self.place), self.reach)
+        return np.array([self.start, reach, *place, *self.carry, self.duration, self.hold])
+
+
+def grab_table(grabs: Sequence[Grab]) -> Array:
+    """Rows of all grabs in the order of their beginnings, shape (n, 10).
+
+    Raises
+    ------
+    SimError
+        If one begins before another is over; a hand has one stylus.
+    """
+    ordered = sorted(grabs, key=lambda grab: grab.start)
+    for before, after in itertools.pairwise(ordered):
+        if after.start < before.end:
+            raise SimError(f"a grab begins at {after.start:g} s, before another has ended at {before.end:g} s")
+    return np.array([grab.row() for grab in ordered]).reshape(len(ordered), GRAB_COLUMNS)
