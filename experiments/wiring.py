@@ -33,6 +33,7 @@ from sim.world import World, phantom_angles
 
 Array = npt.NDArray[np.float64]
 
+PUSH_FORCE = 4.0  # of the hand that pushes [N]; the motors can hold 1.5 N for ever, and this for a while
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
 
 
@@ -88,7 +89,7 @@ class RunConfig:
     seconds: float = 20.0
     seed: int = 1
     stiffness: float = 300.0
-    damping: float = 4.0
+    damping: float = 8.0
     tube: float = 0.25
     bunny_width: float = 0.02
     lap: float = 4.0
@@ -96,7 +97,7 @@ class RunConfig:
     reach: float = 0.025
     cutoff: float = 150.0
     smoothing: float = 6.0
-    figure_ticks: int = 4
+    figure_ticks: int = 10
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
 
@@ -248,6 +249,6 @@ def _user(config: RunConfig, curve: Trajectory) -> Arm:
 def lap_pushes(start: float, lap: float) -> tuple[Push, Push]:
     """A push outwards and one inwards in the lap that begins at a time [s]."""
     return (
-        Push(start + 0.125 * lap, 0.2 * lap, 5.0),
-        Push(start + 0.625 * lap, 0.2 * lap, -5.0),
+        Push(start + 0.1 * lap, 0.3 * lap, PUSH_FORCE),
+        Push(start + 0.6 * lap, 0.3 * lap, -PUSH_FORCE),
     )
