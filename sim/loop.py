@@ -1,16 +1,20 @@
 """A run: the servo's compiled blocks one after the other, streamed to a recorder, in memory that does not grow."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
+from controllers.fields.instructions import EXTERNAL, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
+from controllers.fields.python_law import PythonLaw
+from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
 from models.scene import FIGURE
+from sim.devices.simulated import read_phantom
+from sim.errors import SimError
 from sim.recorder import Group, Recorder
 from sim.servo import FrameLog, Servo, TickLog, run_block
 from sim.world import World
@@ -94,6 +98,14 @@ class Loop:
         What is done with each block, such as `record_into`.
     block_seconds : float
         Simulated time of a block [s], rounded to whole figure updates.
+    python_laws : sequence of PythonLaw
+        `Program.python_laws` of the servo's field. With any, blocks go tick by tick: the hand is sensed, the laws
+        are called, and the compiled loop does the rest of the tick.
+
+    Raises
+    ------
+    SimError
+        If the laws are not as many as the field has slots for them.
     """
 
     def __init__(
@@ -102,11 +114,20 @@ class Loop:
         world: World,
         observe: Observer = lambda ticks, frames, n: None,
         block_seconds: float = BLOCK_SECONDS,
+        python_laws: Sequence[PythonLaw] = (),
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
         self._block = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
+        field = servo.field
+        self._slots = [int(slot) for slot in field.ops[field.ops[:, 0] == EXTERNAL, 2]]
+        self._laws = tuple(python_laws)
+        if len(self._laws) != len(self._slots):
+            raise SimError(
+                f"the field has {len(self._slots)} slots for laws in Python, {len(self._laws)} are given; "
+                "expected the program's python_laws"
+            )
 
     @property
     def time(self) -> float:
@@ -129,11 +150,26 @@ class Loop:
         first, begin = self._tick, time.perf_counter()
         while self._tick < first + wanted:
             n = min(self._block, first + wanted - self._tick)
-            run_block(self.servo, self._tick, n, False, ticks, frames)
+            if self._laws:
+                self._run_with_laws(n, ticks, frames)
+            else:
+                run_block(self.servo, self._tick, n, False, ticks, frames)
             self._tick += n
             self._observe(ticks, frames, n)
             progress(self.time)
         return RunTimes(wanted * plant.period, time.perf_counter() - begin)
+
+    def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
+        servo, every = self.servo, self.servo.figure_ticks
+        for k in range(n):
+            tick, row = self._tick + k, k // every
+            read_phantom(servo.port, servo.hand, tick * servo.plant.period)
+            hand = HandState.of(servo.port.hand)
+            for slot, law in zip(self._slots, self._laws, strict=True):
+                servo.field.memory[slot : slot + 3] = law.function(hand)
+            tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
+            frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
+            run_block(servo, tick, 1, False, tick_rows, frame_rows)
 
 
 def record_into(recorder: Recorder, servo: Servo, world: World) -> Observer:

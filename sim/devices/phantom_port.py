@@ -147,6 +147,12 @@ def sense(port: PhantomPort, t: float, switch: float) -> None:
 
 
 @njit
+def has_sensed(port: PhantomPort) -> bool:
+    """Whether `sense` has been called before."""
+    return port.memory[12] != 0.0
+
+
+@njit
 def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
     """Filter the angular velocity in H: 2 vec(q q_last*) / T, for the small turn of one period."""
     w, x, y, z = hand[4], -hand[5], -hand[6], -hand[7]

@@ -1,0 +1,189 @@
+"""The modes of a run that are fields over a fixed curve: follow, bunny, rivers; and how fast the heaviest one is."""
+
+import time
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import Program
+from controllers.fields.program import evaluate
+from controllers.fields.river import River
+from controllers.safety import ForceLimiter, limit_force
+from controllers.state import HandState, Wrench
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
+# at a right angle is not: it is √2 from it.
+ADMISSION, SIGMA, HYSTERESIS = 1.2, 0.3, 0.15
+WAVE = 0.6  # height of the wave, of the map's half width
+
+
+class Field(Protocol):
+    """A law of force: evaluated from Python, or compiled into the servo."""
+
+    def program(self) -> Program:
+        """Compiled form."""
+        ...
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force at one hand state."""
+        ...
+
+
+class FieldFlags(Protocol):
+    """What of a run's configuration decides on its field; see `experiments.wiring.RunConfig`."""
+
+    @property
+    def mode(self) -> str:
+        """Name of the mode."""
+        ...
+
+    @property
+    def stiffness(self) -> float:
+        """k_r [N/m]."""
+        ...
+
+    @property
+    def damping(self) -> float:
+        """b_d [N s/m]."""
+        ...
+
+    @property
+    def tube(self) -> float:
+        """Radius ε of FOLLOW [m]."""
+        ...
+
+    @property
+    def bunny_width(self) -> float:
+        """δ [m]."""
+        ...
+
+    @property
+    def bunny_attraction(self) -> Literal["point", "along"]:
+        """Form of the bunny's attraction."""
+        ...
+
+    @property
+    def bunny_pace(self) -> Literal["clock", "wait"]:
+        """Pace of the bunny."""
+        ...
+
+    @property
+    def river_tube(self) -> float:
+        """Radius ε of rivers [m]."""
+        ...
+
+    @property
+    def crossing(self) -> Literal["smooth", "discrete", "sum"]:
+        """How crossing rivers share the hand."""
+        ...
+
+    @property
+    def reach(self) -> float:
+        """Half width of the map's domain [m]."""
+        ...
+
+
+def law(config: FieldFlags, curve: Trajectory) -> Field:
+    """Field of a mode over the default curve.
+
+    Raises
+    ------
+    ParameterError
+        If the mode is none of follow, bunny, rivers, or a number is out of its interval.
+    """
+    if config.mode == "follow":
+        return Follow(curve, config.stiffness, config.damping, config.tube)
+    if config.mode == "bunny":
+        return Bunny(
+            curve, config.stiffness, config.damping, config.bunny_width, config.bunny_attraction, config.bunny_pace
+        )
+    if config.mode == "rivers":
+        return _rivers(config, curve)
+    raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
+
+
+def _rivers(config: FieldFlags, curve: Trajectory) -> Field:
+    if config.damping <= 0.0 or config.stiffness <= 0.0:
+        raise ParameterError(
+            f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"
+        )
+    bundle = river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
+    if config.crossing == "sum":
+        return bundle
+    pace = curve.length / curve.duration
+    return HigherOrder(bundle, ADMISSION * pace, SIGMA * pace, HYSTERESIS * pace, config.crossing)
+
+
+def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:
+    """The default curve; a wave about it, up and down twice a lap; and the curve lifted to the wave's crests.
+
+    The wave crosses the first, and touches the last: there a hand can change over.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        A lap about the z axis.
+    reach : float
+        Half width of the map's domain [m]; the crests are at `WAVE` times it.
+    tau, drag, epsilon : float
+        Of the rivers: τ [s], b [N s/m], ε [m].
+    """
+    times = np.linspace(curve.start, curve.end, 129)
+    level = curve.point(times)
+    level[-1] = level[0]
+    height = WAVE * reach * np.stack((np.zeros(129), np.sin(4.0 * np.pi * np.linspace(0.0, 1.0, 129)), np.ones(129)))
+    height[1, -1] = 0.0
+    curves = [Trajectory(times, level + np.outer(z, [0.0, 0.0, 1.0]), periodic=True) for z in height]
+    return RiverBundle(tuple(River(c, epsilon, tau, drag) for c in curves), ("level", "wave", "high"))
+
+
+@njit
+def _ticks(
+    ops: IntArray, params: Array, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
+) -> float:
+    wrench, total = np.zeros(6), 0.0
+    for i in range(hands.shape[0]):
+        evaluate(ops, params, memory, hands[i], wrench)
+        limit_force(limits, limiter, wrench, force)
+        total += force[0]
+    return total
+
+
+def heaviest_field() -> tuple[Program, Array]:
+    """Ten rivers that all come near, smooth, of higher order, limited; and a lap of hands that feel them."""
+    lap = Trajectory.circle(0.05, 4.0)
+    times = np.linspace(0.0, 4.0, 129)
+    angle = 0.5 * np.pi * times
+    rivers: list[River] = []
+    for k in range(10):
+        points = lap.point(times)
+        points[:, 2] = 0.015 * np.sin((k % 3 + 1) * angle + k)
+        points[-1] = points[0]
+        rivers.append(River(Trajectory(times, points, periodic=True)))
+    bundle = RiverBundle(tuple(rivers), tuple(f"river {k}" for k in range(10)))
+    hands = np.array([HandState.at(lap.point(t), lap.velocity(t), t).vector() for t in np.arange(4000) * 1e-3])
+    return HigherOrder(bundle, 0.09, 0.025).program().limited(8.0), hands
+
+
+def heaviest_tick_microseconds() -> float:
+    """Mean time of a tick of `heaviest_field` with the safety limiter [µs], the best of five laps."""
+    program, hands = heaviest_field()
+    limiter, memory, best = ForceLimiter(1e-3), program.fresh_memory(), np.inf
+    heat = limiter.fresh_memory()
+    for lap in range(6):
+        rows = hands[:2] if lap == 0 else hands
+        begin = time.perf_counter()
+        _ticks(program.ops, program.params, memory, limiter.limits(), heat, rows, np.zeros(3))
+        best = best if lap == 0 else min(best, time.perf_counter() - begin)
+    return 1e6 * best / len(hands)

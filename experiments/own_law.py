@@ -1,0 +1,37 @@
+"""A run with a field of one's own, in Python or composed, in the place of a mode's."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from controllers.fields.instructions import Program
+from experiments.wiring import RunConfig, Session, load_clips, wire
+from sim.loop import Loop, Observer
+
+
+def loop_with(
+    config: RunConfig, program: Program, observe: Observer = lambda ticks, frames, n: None
+) -> tuple[Session, Loop]:
+    """Session of a configuration with its field replaced, and the loop that runs it.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Everything but the field: clips, hand, figure, device.
+    program : Program
+        The field; its laws in Python are called at every tick.
+    observe : Observer
+        What is done with each block of ticks.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `experiments.wiring.wire`.
+    """
+    clips, remarks = load_clips(config.clips)
+    session = wire(config, clips, remarks)
+    field = session.servo.field._replace(
+        ops=program.ops, params=program.params, memory=program.fresh_memory(), wrench=np.zeros(6)
+    )
+    session = replace(session, servo=session.servo._replace(field=field))
+    return session, Loop(session.servo, session.world, observe, python_laws=program.python_laws)
