@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.state import Array
 
@@ -22,6 +23,8 @@ def evaluate_map(kind: int, params: Array, x: Array, memory: Array, pose: Array)
     """
     if kind == CYLINDRICAL:
         cylindrical_map(params, x, memory, pose, np.empty((0, 6)))
+    elif kind == COMPOSITE:
+        composite_map(params, x, memory, pose, np.empty((0, 6)))
 
 
 @njit
@@ -29,3 +32,5 @@ def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pos
     """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
     if kind == CYLINDRICAL:
         cylindrical_map(params, x, memory, pose, jacobian)
+    elif kind == COMPOSITE:
+        composite_map(params, x, memory, pose, jacobian)

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.cylindrical import Cylindrical, eased
+from controllers.haptic_map.cylinder import eased
+from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAPS
 from controllers.haptic_map.mean import mean_rotation

@@ -1,0 +1,104 @@
+"""What maps that blend clips have in common: clips become loops, and a lap of the hand is a lap of every clip."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.blending import fresh_lap, packed_blend
+from controllers.haptic_map.limbs import Limb
+from controllers.haptic_map.loops import Loop, checked_clip, closed_loop
+from controllers.state import Array, Pose
+
+Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
+
+
+class AnimationMap(HapticMap):
+    """A map whose poses are blends of clips.
+
+    Parameters
+    ----------
+    kind : int
+        Which kernel (see `evaluate`).
+    kernel : Kernel
+        It: (params, x, memory, pose, jacobian).
+    clips : sequence of (Array, float)
+        Poses (n, nq) and frames per second; a pose is root position, root quaternion, then joint quaternions (wxyz).
+        Clips that do not close are closed (`closed_loop`), and all are aligned to the first in time (`alignment`).
+    numbers : sequence of float
+        What the kernel reads before the blend's own parameters.
+    second_group : sequence of int
+        Joints, counted from 1, whose weights are the second group's.
+    limbs : sequence of Limb
+        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+
+    Raises
+    ------
+    ParameterError
+        If the clips are not of the same kind of pose, or have not the joints of a limb or of the second group.
+    """
+
+    def __init__(
+        self,
+        kind: int,
+        kernel: Kernel,
+        clips: Sequence[tuple[Array, float]],
+        numbers: Sequence[float],
+        second_group: Sequence[int],
+        limbs: Sequence[Limb],
+    ) -> None:
+        poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
+        if len({clip.shape[1] for clip in poses}) != 1:
+            raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
+        self.loops: list[Loop] = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
+        self._nq = poses[0].shape[1]
+        groups = np.zeros((self._nq - 3) // 4, dtype=np.int64)
+        for joint in second_group:
+            if not 1 <= joint < len(groups):
+                raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group wants {joint}")
+            groups[joint] = 1
+        samples = int(np.clip(max(len(clip) for clip in poses) - 1, 64, 2048))
+        self._params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
+        self._kind, self._kernel = kind, kernel
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self._nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
+        return 6 + 3 * ((self._nq - 7) // 4)
+
+    @property
+    def lap_seconds(self) -> float:
+        """Time of a lap at which the clips run, on average, at their own pace [s]."""
+        return float(np.mean([loop.duration for loop in self.loops]))
+
+    @property
+    def travels(self) -> bool:
+        """Whether a lap moves or turns the figure, so that h depends on the laps done."""
+        return any(bool(loop.drift.any()) for loop in self.loops)
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run."""
+        return CompiledMap(self._kind, self._params, fresh_lap())
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
+        return self._evaluate(x, memory, 0)[0]
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
+        return self._evaluate(x, memory, self.nv)[1]
+
+    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
+        stylus = np.asarray(x, dtype=np.float64)
+        if stylus.shape != (STYLUS,):
+            raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
+        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
+        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
+        return pose, jacobian

@@ -1,0 +1,70 @@
+"""The red-blue composite map: one clip walks, two others fight over its arms (Donald & Henle 2000, Figs. 5 to 7)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.blending import blend
+from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder
+from controllers.haptic_map.limbs import Limb
+from controllers.state import Array
+
+COMPOSITE = 2
+_CLIPS = 3
+_R_MIN, _R_MAX, _BLEND = range(3)
+
+
+@njit
+def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Composite`: h(x), and h_*(x) unless `jacobian` has no rows."""
+    chain = np.empty((3, 6))
+    radius, angle = cylinder(x, chain)
+    a, slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
+    weights, changes = np.zeros((2, _CLIPS)), np.zeros((2, 2, _CLIPS))
+    weights[0, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - a, a
+    changes[1, 0, 1], changes[1, 0, 2] = -slope, slope
+    blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
+
+
+class Composite(AnimationMap):
+    r"""The lower body of one clip, the upper body blended between two.
+
+    θ = atan2(y, x) is the phase, the radius blends red (inside) and blue (outside): weights 1 − u(r) and u(r) for
+    the joints of the upper body, which ease in at the edges (C²). Root and all other joints are the lower clip's. h
+    depends neither on the height nor on the orientation of the stylus; on the axis r = 0 it is not defined.
+
+    Parameters
+    ----------
+    lower, red, blue : (Array, float)
+        Clips: poses (n, nq) and frames per second. Red and blue are aligned in time to the lower (`alignment`).
+    upper_joints : sequence of int
+        Joints of the upper body: joint k has the numbers 3 + 4k to 6 + 4k of a pose, the root is 0.
+    r_range : tuple of two floats
+        Interval [m] over which red turns to blue; r_min > 0.
+    limbs : sequence of Limb
+        Limbs of the lower body that stand (see `limbs`).
+
+    Raises
+    ------
+    ParameterError
+        If the clips are not of the same kind of pose or have not these joints, a limb belongs to the upper body, or
+        the interval is empty.
+    """
+
+    def __init__(
+        self,
+        lower: tuple[Array, float],
+        red: tuple[Array, float],
+        blue: tuple[Array, float],
+        upper_joints: Sequence[int],
+        r_range: tuple[float, float],
+        limbs: Sequence[Limb] = (),
+    ) -> None:
+        for limb in limbs:
+            if set(limb.joints) & set(upper_joints):
+                raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
+        numbers = checked_interval("r_range", r_range, 1e-3)
+        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs)

@@ -1,0 +1,59 @@
+"""The hand in cylindrical coordinates about the z axis of H: an angle that is the phase, and intervals that blend."""
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+_MARGIN = 0.15  # share of the interval at each edge over which the blend eases in
+_AXIS = 1e-3  # [m] nearer to the axis the derivative stops growing
+
+
+@njit
+def eased(s: float) -> tuple[float, float]:
+    """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between but for the eased edges; C²."""
+    if s <= 0.0:
+        return 0.0, 0.0
+    if s >= 1.0:
+        return 1.0, 0.0
+    slope = 1.0 / (1.0 - _MARGIN)
+    edge = min(s, 1.0 - s) / _MARGIN
+    if edge >= 1.0:
+        return slope * (s - 0.5 * _MARGIN), slope
+    # Integral of the smooth step 3x² − 2x³.
+    u = slope * _MARGIN * (edge**3 - 0.5 * edge**4)
+    return (u if s < 0.5 else 1.0 - u), slope * edge * edge * (3.0 - 2.0 * edge)
+
+
+@njit
+def blend_weight(x: float, low: float, high: float) -> tuple[float, float]:
+    """Weight of what lies at the upper end of an interval, and its derivative by x."""
+    u, slope = eased((x - low) / (high - low))
+    return u, slope / (high - low)
+
+
+@njit
+def cylinder(x: Array, chain: Array) -> tuple[float, float]:
+    """Radius [m] and angle in [0, 2π] of a stylus pose (7,).
+
+    `chain`, shape (3, 6), is written: the derivatives of angle, radius and height by the stylus.
+    """
+    radius = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    angle = np.arctan2(x[1], x[0])
+    if angle < 0.0:
+        angle = min(angle + 2.0 * np.pi, 2.0 * np.pi)
+    inside = max(radius, _AXIS)
+    chain[:] = 0.0
+    chain[0, 0], chain[0, 1] = -x[1] / (inside * inside), x[0] / (inside * inside)
+    chain[1, 0], chain[1, 1] = x[0] / inside, x[1] / inside
+    chain[2, 2] = 1.0
+    return radius, angle
+
+
+def checked_interval(name: str, interval: tuple[float, float], least: float) -> tuple[float, float]:
+    """An interval [m] that increases from more than `least`, or what is wrong with it."""
+    low, high = interval
+    if not (least < low < high < np.inf):
+        raise ParameterError(f"{name} must increase{' from 1 mm or more' * (least > 0.0)}, got {low, high} m")
+    return low, high
