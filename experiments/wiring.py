@@ -13,6 +13,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
+from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.safety import ForceLimiter
@@ -45,11 +47,12 @@ class RunConfig:
     ----------
     clips : tuple of str
         Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
-        or files (BVH, AMC, DeepMimic). Fewer than four are repeated.
+        or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
+        upper body inside, upper body outside.
     mode : {"follow", "bunny"}
         Field of force.
-    map : {"cylindrical"}
-        Haptic map.
+    map : {"cylindrical", "composite"}
+        Haptic map: four clips round a cylinder, or the lower body of one clip and the upper body blended between two.
     user : {"relaxed", "trace", "push"}
         A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
     seconds : float
@@ -84,7 +87,7 @@ class RunConfig:
 
     clips: tuple[str, ...] = FIGURE_CLIPS
     mode: Literal["follow", "bunny"] = "follow"
-    map: Literal["cylindrical"] = "cylindrical"
+    map: Literal["cylindrical", "composite"] = "cylindrical"
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1
@@ -110,7 +113,7 @@ class Session:
     clips: tuple[Clip, ...]
     remarks: tuple[str, ...]
     curve: Trajectory
-    haptic_map: Cylindrical
+    haptic_map: AnimationMap
     world: World
     figure: Figure
     servo: Servo
@@ -163,8 +166,9 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     ModelError, ControllerError, SimError
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
-    if not 1 <= len(clips) <= 4:
-        raise ParameterError(f"the cylindrical map blends 1 to 4 clips, got {len(clips)}")
+    most = 4 if config.map == "cylindrical" else 3
+    if not 1 <= len(clips) <= most:
+        raise ParameterError(f"the {config.map} map blends 1 to {most} clips, got {len(clips)}; name them with --clips")
     if config.figure_ticks < 1:
         raise ParameterError(
             f"figure_ticks is {config.figure_ticks}; expected 1 or more servo ticks between two updates"
@@ -180,13 +184,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
-    corners = [clips[i % len(clips)] for i in range(4)]
-    haptic_map = Cylindrical(
-        [(clip.poses, clip.fps) for clip in corners],
-        (config.radius - config.reach, config.radius + config.reach),
-        (-config.reach, config.reach),
-        figure_legs(world.figure),
-    )
+    haptic_map = _haptic_map(config, clips, world.figure)
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
     reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing)
@@ -210,6 +208,18 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
     return Session(config, clips, remarks, curve, haptic_map, world, figure, servo)
+
+
+def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> AnimationMap:
+    motions = [(clip.poses, clip.fps) for clip in clips]
+    radii = (config.radius - config.reach, config.radius + config.reach)
+    legs = figure_legs(figure)
+    if config.map == "cylindrical":
+        corners = [motions[i % len(motions)] for i in range(4)]
+        return Cylindrical(corners, radii, (-config.reach, config.reach), legs)
+    lower, red, blue = (motions[i % len(motions)] for i in range(3))
+    upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
+    return Composite(lower, red, blue, sorted(upper), radii, legs)
 
 
 def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
