@@ -12,12 +12,12 @@ from controllers.certificates.flight_fit import GRAVITY
 from controllers.certificates.repair import RepairPlan, RepairTask, repair
 from experiments.ballistics import ClipBallistics, clip_ballistics
 from models.errors import ModelError
-from models.mocap.bvh import write_bvh
 from models.mocap.clip import Clip
 from models.mocap.contacts import contacts
 from models.mocap.library import load_clip
 from models.mocap.momentum import momentum
 from models.mocap.moved_legs import leg_lines, with_moved_body
+from models.mocap.own_bvh import write_bvh
 from sim.clip_motion import clip_motion
 
 Array = npt.NDArray[np.float64]

@@ -5,6 +5,7 @@ import resource
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import cast
@@ -14,15 +15,16 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from experiments.summary import RunSummary, SpeedSummary, summarise
+from experiments.measures import BLOCK_FRAMES, summarise
+from experiments.summary import RunSummary, SpeedSummary
 from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
-from models.mocap.bvh import write_bvh
 from models.mocap.clip import Clip
+from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model
 from sim.clock import RealTime
 from sim.compiled import is_cached
 from sim.errors import SimError
-from sim.loop import Loop, groups, record_into
+from sim.loop import BLOCK_SECONDS, Loop, groups, record_into
 from sim.recorder import Recorder
 from sim.recording import Recording
 from sim.reference import poses_along
@@ -79,10 +81,10 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     ) as recorder:
         speed = _simulate(session, recorder, console, started, view)
         recorder.flush()
-        default, summary = _measure(out, session, speed)
+        summary = _measure(out, session, speed)
         told = asdict(summary) | {"lines": summary.lines()}
         recorder.close(told)
-    _write_animations(out, default)
+    _write_animations(out, session)
     (out / SUMMARY).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
     write_report_of(out)
     for line in summary.lines():
@@ -147,7 +149,7 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
         record(ticks, frames, n)
         page.show(servo.plant.qpos, ticks.hand[n - 1, 1:4], ticks.force[n - 1])
 
-    loop = Loop(servo, session.world, observe, *([VIEW_BLOCK_SECONDS] if view else []))
+    loop = Loop(servo, session.world, observe, block_seconds=VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS)
     first = servo.plant.period * servo.figure_ticks
     loop.run(first)
     first_tick = time.perf_counter() - started
@@ -177,24 +179,42 @@ def _peak_memory_mb() -> float:
     return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
-def _measure(out: Path, session: Session, speed: SpeedSummary) -> tuple[Array, RunSummary]:
-    """Poses at the nearest points of the curve, frame by frame, and the summary."""
+def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     with Recording(out / RECORDING) as recording:
-        stride = session.servo.figure_ticks
-        nearest = recording.channel("ticks", "nearest")[::stride]
-        compiled = session.haptic_map.compiled()
-        default = np.empty((len(nearest), session.haptic_map.nq))
-        poses_along(compiled.kind, compiled.params, compiled.memory, stylus_path(nearest), default)
-        return default, summarise(recording, default, speed, session.world.warnings())
+        return summarise(recording, default_poses(session), speed, session.world.warnings())
 
 
-def _write_animations(out: Path, default: Array) -> None:
+def default_poses(session: Session) -> Callable[[Array], Array]:
+    """The animation of the curve itself: the map at its points, (k, 3) → (k, 75), lap after lap."""
+    kind, params, memory = session.haptic_map.compiled()
+
+    def poses_at(points: Array) -> Array:
+        poses = np.empty((len(points), session.haptic_map.nq))
+        poses_along(kind, params, memory, stylus_path(points), poses)
+        return poses
+
+    return poses_at
+
+
+def _write_animations(out: Path, session: Session) -> None:
+    """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
     with Recording(out / RECORDING) as recording:
-        reference = recording.channel("frames", "reference")
+        reference, nearest = recording.channel("frames", "reference"), recording.channel("ticks", "nearest")
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))
         fps = recording.rates["frames"] / stride
-        write_bvh(Clip(reference[::stride], fps, "edited"), out / EDITED)
-        write_bvh(Clip(default[::stride], fps, "default"), out / DEFAULT)
+        n = -(-len(reference) // stride)
+        per_frame = stride * session.servo.figure_ticks
+        poses_at = default_poses(session)
+        starts = range(0, n, BLOCK_FRAMES)
+        write_bvh_blocks(
+            out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
+        )
+        write_bvh_blocks(
+            out / DEFAULT,
+            n,
+            fps,
+            (poses_at(nearest[k * per_frame : (k + BLOCK_FRAMES) * per_frame : per_frame]) for k in starts),
+        )
 
 
 def write_report_of(folder: Path) -> None:

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from models.mocap import choreography, flights, gait
-from models.mocap.bvh import write_bvh
+from models.mocap.own_bvh import write_bvh
 
 CLIPS = choreography.CLIPS | gait.CLIPS | flights.CLIPS
 

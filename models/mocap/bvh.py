@@ -1,10 +1,4 @@
-"""BVH: a reader for anybody's files, and a writer whose channels are exactly the figure's 57.
-
-The writer's files are Y up, facing +Z, left = +X, in centimetres, as most programs expect of BVH: with world (x, y, z)
-in metres, the file's (X, Y, Z) is 100 (y, z, x), an exchange of axes that loses no digit. The order of each joint's
-rotations is chosen so that its middle angle, which locks at ±90°, is the one that moves least; a locked pose is still
-written exactly.
-"""
+"""BVH: a reader for anybody's files."""
 
 import re
 from array import array
@@ -15,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap import quaternions
-from models.mocap.clip import Clip
 from models.mocap.motion_file import (
     FRAME_LIMIT,
     JOINT_LIMIT,
@@ -34,11 +26,6 @@ from models.mocap.source_motion import SourceMotion
 
 Array = npt.NDArray[np.float64]
 
-_CENTIMETRES = 100.0
-_TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
-         "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
-_TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
-_TO_WORLD = [2, 0, 1]
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 
@@ -212,83 +199,3 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int
     if found < n_frames and n_columns:
         raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
     return np.array(values).reshape(n_frames, n_columns), fps
-
-
-def _rotation_order(joint: str) -> tuple[int, int, int]:
-    """File axes of a joint's rotations, first to last. World x, y, z are the file's Z, X, Y."""
-    if joint == "root":
-        return (1, 2, 0)  # turn, lean, then somersault: locks only when lying on a side
-    if joint.endswith("shoulder"):
-        return (2, 0, 1)  # raise, twist, swing: a twist rarely reaches 90°
-    return (0, 2, 1)  # bend, lean, turn
-
-
-def _euler_angles(q: Array, order: tuple[int, int, int]) -> Array:
-    """Angles [rad] of intrinsic rotations about three different axes, shape (n, 3).
-
-    Bernardes & Viollet (2022), without their threshold: where the middle angle locks, the split between the other two
-    is arbitrary but their product with it is still the rotation.
-    """
-    k, j, i = order  # intrinsic rotations are extrinsic ones in reverse
-    sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
-    w, x, y, z = q[:, 0], q[:, 1 + i], q[:, 1 + j], sign * q[:, 1 + k]
-    a, b, c, d = w - y, x + z, y + w, z - x
-    middle = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - np.pi / 2
-    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
-    first, last = sign * (half_sum + half_difference), half_sum - half_difference
-    return np.unwrap(np.column_stack((first, middle, last)), axis=0)
-
-
-def write_bvh(clip: Clip, path: Path) -> None:
-    """Write a clip, so that reading it again gives the same poses to 1e-9 rad.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    lines, columns = ["HIERARCHY"], [clip.poses[:, _TO_FILE] * _CENTIMETRES]
-    model = figure_model()
-    open_segments: list[int] = []
-    for index, segment in enumerate(SEGMENTS):
-        while open_segments and open_segments[-1] != segment.parent:
-            open_segments.pop()
-            lines.append("\t" * len(open_segments) + "}")
-        order = _rotation_order(segment.joint)
-        channels = " ".join(f"{'XYZ'[axis]}rotation" for axis in order)
-        indent = "\t" * len(open_segments)
-        # The pelvis of the model stands at its rest height; a BVH root starts from the origin.
-        offset = model.body(segment.body).pos if index else np.zeros(3)
-        positions = "3" if index else "6 Xposition Yposition Zposition"
-        lines += [f"{indent}{'JOINT' if index else 'ROOT'} {segment.joint}", f"{indent}{{",
-                  f"{indent}\tOFFSET {_vector(offset)}", f"{indent}\tCHANNELS {positions} {channels}"]  # fmt: skip
-        if segment.joint in _TIPS:
-            tip = _vector(np.array(_TIPS[segment.joint]))
-            lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {tip}", f"{indent}\t}}"]
-        open_segments.append(index)
-        quaternion = clip.poses[:, 3 + 4 * index : 7 + 4 * index]
-        angles = _euler_angles(quaternion[:, [0, *(1 + axis for axis in _TO_FILE)]], order)
-        columns.append(np.rad2deg(angles))
-    lines += ["\t" * depth + "}" for depth in reversed(range(len(open_segments)))]
-    lines += ["MOTION", f"Frames: {clip.n_frames}", f"Frame Time: {1.0 / clip.fps!r}"]
-    lines += [" ".join(f"{value:.9f}" for value in row) for row in np.hstack(columns)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _vector(world: Array) -> str:
-    return " ".join(f"{value:.6f}" for value in world[_TO_FILE] * _CENTIMETRES)
-
-
-def own_clip(motion: SourceMotion) -> Clip | None:
-    """The clip in a file that `write_bvh` wrote (same joints, same bones); None for any other skeleton."""
-    if motion.joints != tuple(segment.joint for segment in SEGMENTS):
-        return None
-    if motion.parents != tuple(segment.parent for segment in SEGMENTS):
-        return None
-    model = figure_model()
-    bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:, _TO_FILE] * _CENTIMETRES
-    if np.abs(motion.offsets[1:] - bones).max() > 1e-4:
-        return None
-    quaternion = motion.rotations[..., [0, *(1 + axis for axis in _TO_WORLD)]]
-    position = motion.translations[:, 0, _TO_WORLD] / _CENTIMETRES
-    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 from models.errors import ModelError
 from models.mocap.asf_amc import read_amc
-from models.mocap.bvh import own_clip, read_bvh, write_bvh
+from models.mocap.bvh import read_bvh
 from models.mocap.clip import Clip
 from models.mocap.deepmimic import read_deepmimic
 from models.mocap.motion_file import MotionFileError, numbered_lines
+from models.mocap.own_bvh import own_clip, write_bvh
 from models.mocap.retarget import RetargetReport, retarget
 from models.mocap.skeleton_roles import roles_of
 from models.mocap.source_motion import SourceMotion

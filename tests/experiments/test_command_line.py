@@ -80,8 +80,8 @@ def test_a_motion_file_that_is_none_is_refused(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from models.mocap.bvh import write_bvh
     from models.mocap.library import embedded
+    from models.mocap.own_bvh import write_bvh
 
     source, target = tmp_path / "in.bvh", tmp_path / "out.bvh"
     write_bvh(embedded("cheer"), source)

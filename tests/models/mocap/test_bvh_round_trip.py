@@ -1,3 +1,4 @@
+import itertools
 from pathlib import Path
 
 import mujoco
@@ -7,10 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, JOINTS, SEGMENTS, figure_model, rest_pose
-from models.mocap.bvh import own_clip, read_bvh, write_bvh
+from models.mocap.bvh import read_bvh
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import load
+from models.mocap.own_bvh import own_clip, write_bvh, write_bvh_blocks
 
 
 def random_clip(seed, n=60, fps=120.0):
@@ -107,3 +110,20 @@ def test_a_file_of_the_figure_is_not_retargeted_and_a_scaled_one_is(tmp_path):
     assert report is not None
     assert report.missing == ()
     assert report.taken["left_thigh"] == "left_hip"
+
+
+def test_blocks_give_the_same_file_as_the_whole(tmp_path: Path) -> None:
+    """Angles go on over the edges of blocks, also where a joint has turned by more than half a turn."""
+    from models.mocap.library import embedded
+
+    clip = embedded("spin")
+    write_bvh(clip, tmp_path / "whole.bvh")
+    edges = [0, 1, 2, 50, 120, clip.n_frames]
+    blocks = (clip.poses[a:b] for a, b in itertools.pairwise(edges))
+    write_bvh_blocks(tmp_path / "blocks.bvh", clip.n_frames, clip.fps, blocks)
+    assert (tmp_path / "blocks.bvh").read_text() == (tmp_path / "whole.bvh").read_text()
+
+
+def test_a_wrong_number_of_frames_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="3 frames were given; expected 4"):
+        write_bvh_blocks(tmp_path / "short.bvh", 4, 60.0, [random_clip(1, n=3).poses])

@@ -1,0 +1,200 @@
+"""A recording measured block by block, in memory that does not grow with the run."""
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.summary import (
+    AnimationSummary,
+    FigureSummary,
+    PathSummary,
+    PushSummary,
+    RunSummary,
+    SpeedSummary,
+)
+from models.humanoid.skeleton import N_TANGENT
+from models.mocap.clip import pose_difference
+from sim.recording import Recording
+
+Array = npt.NDArray[np.float64]
+
+SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
+HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
+BLOCK_FRAMES = 2000  # of the figure, read at a time
+_TICKS = ("t", "p", "nearest", "distance", "phase", "user")
+_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
+
+
+def summarise(
+    recording: Recording, default_poses: Callable[[Array], Array], speed: SpeedSummary, warnings: dict[str, int]
+) -> RunSummary:
+    """Measure a run, in memory that does not grow with it.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the channels of `sim.loop.groups`, and arrays ``curve_span`` (start and end of the phase), ``curve_closed``
+        and ``body_weight``.
+    default_poses : callable
+        Poses of the map at points of the curve, (k, 3) → (k, 75); called in order of time.
+    speed, warnings
+        Taken over.
+    """
+    path, animation, figure = PathMeasure(recording), AnimationMeasure(), FigureMeasure(recording)
+    per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
+    rows = BLOCK_FRAMES * per_frame
+    for first in range(0, len(recording.channel("ticks", "t")), rows):
+        ticks = {name: channel[first : first + rows] for name, channel in recording.groups["ticks"].items()
+                 if name in _TICKS}  # fmt: skip
+        start = first // per_frame
+        frames = {name: channel[start : start + BLOCK_FRAMES] for name, channel in recording.groups["frames"].items()
+                  if name in _FRAMES}  # fmt: skip
+        pushed = path.add(ticks)
+        animation.add(frames, default_poses(ticks["nearest"][::per_frame]), pushed[::per_frame])
+        figure.add(frames)
+    return RunSummary(path.summary(), animation.summary(), figure.summary(), speed, warnings)
+
+
+class _MeanSquare:
+    """Root mean square and largest of numbers that come in blocks."""
+
+    def __init__(self) -> None:
+        self._sum, self._count, self.largest = 0.0, 0, 0.0
+
+    def add(self, values: Array) -> None:
+        self._sum += float(np.sum(values**2))
+        self._count += values.size
+        self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
+
+    @property
+    def root(self) -> float:
+        return math.sqrt(self._sum / self._count) if self._count else 0.0
+
+
+class PathMeasure:
+    """`PathSummary` of ticks that come in blocks."""
+
+    def __init__(self, recording: Recording):
+        start, end = recording.array("curve_span")
+        self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
+        self._alone = _MeanSquare()
+        self._phase: float | None = None
+        self._turned, self._first, self._time = 0.0, 0.0, 0.0
+        self._released = -math.inf
+        self._pushes: list[PushSummary] = []
+        self._pushing = False
+
+    def add(self, ticks: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
+        """Take a block; returns at which ticks the hand pushes, or did so less than `SETTLING` ago."""
+        t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
+        at_work = size > HAND_AT_WORK
+        last = np.maximum.accumulate(np.where(at_work, t, self._released))
+        pushed = t - last <= SETTLING
+        self._released = float(last[-1])
+        self._alone.add(ticks["distance"][(t >= SETTLING) & ~pushed])
+        self._add_phase(t, ticks["phase"])
+        self._add_pushes(ticks, size, at_work)
+        return pushed
+
+    def _add_phase(self, t: Array, phase: Array) -> None:
+        if self._phase is None:
+            self._phase, self._first = float(phase[0]), float(t[0])
+        steps = np.diff(phase, prepend=self._phase)
+        if self._closed:
+            steps -= self._span * np.round(steps / self._span)
+        self._turned += float(np.sum(steps))
+        self._phase, self._time = float(phase[-1]), float(t[-1])
+
+    def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: npt.NDArray[np.bool_]) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], at_work.astype(int), [0]))))
+        for first, last in zip(edges[::2], edges[1::2], strict=True):
+            block = slice(int(first), int(last))
+            away = ticks["p"][block] - ticks["nearest"][block]
+            distance = np.linalg.norm(away, axis=1)
+            k = int(np.argmax(distance))
+            cosine = float(away[k] @ ticks["user"][block][k] / max(distance[k] * size[block][k], 1e-12))
+            t = ticks["t"][block]
+            push = PushSummary(
+                float(t[0]), float(t[-1] - t[0]), float(np.max(size[block])), 1e3 * float(distance[k]), cosine
+            )
+            if first == 0 and self._pushing:
+                push = _joined(self._pushes.pop(), push)
+            self._pushes.append(push)
+        self._pushing = bool(at_work[-1])
+
+    def summary(self) -> PathSummary:
+        """What was taken so far."""
+        laps = self._turned / self._span
+        lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else math.nan
+        return PathSummary(
+            1e3 * self._alone.root, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes)
+        )  # fmt: skip
+
+
+def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
+    """One push that was seen in two blocks."""
+    further = max(before, after, key=lambda push: push.deviation_mm)
+    return PushSummary(
+        before.start, after.start + after.seconds - before.start, max(before.peak_force, after.peak_force),
+        further.deviation_mm, further.along_push,
+    )  # fmt: skip
+
+
+class AnimationMeasure:
+    """`AnimationSummary` of frames that come in blocks."""
+
+    def __init__(self) -> None:
+        self._pushed, self._unpushed = 0.0, 0.0
+
+    def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
+        """Take a block of frames, their poses at the curve, and at which the hand pushes."""
+        turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
+        largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
+        settled = frames["t"] >= SETTLING
+        self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
+        self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
+
+    def summary(self) -> AnimationSummary:
+        """What was taken so far."""
+        return AnimationSummary(math.degrees(self._pushed), math.degrees(self._unpushed))
+
+
+class FigureMeasure:
+    """`FigureSummary` of frames that come in blocks."""
+
+    def __init__(self, recording: Recording):
+        self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
+        self._joints, self._root, self._force, self._moment, self._flying = (_MeanSquare() for _ in range(5))
+        self._frames, self._flight, self._saturated, self._ground = 0, 0, 0.0, 0.0
+
+    def add(self, frames: Mapping[str, Array]) -> None:
+        """Take a block of frames."""
+        flight = frames["flight"] > 0.0
+        residual = frames["residual"]
+        self._joints.add(frames["joint_error"])
+        self._root.add(frames["root_error"])
+        self._force.add(np.linalg.norm(residual[~flight, :3], axis=1))
+        self._moment.add(np.linalg.norm(residual[~flight, 3:], axis=1))
+        self._flying.add(residual[flight])
+        self._frames += len(flight)
+        self._flight += int(np.sum(flight))
+        self._saturated += float(np.sum(frames["saturated"]))
+        self._ground += float(np.sum(frames["ground"][:, 2]))
+
+    def summary(self) -> FigureSummary:
+        """What was taken so far."""
+        frames = max(self._frames, 1)
+        return FigureSummary(
+            joint_error_rms_deg=math.degrees(self._joints.root),
+            root_error_rms_cm=100.0 * self._root.root,
+            root_error_max_cm=100.0 * self._root.largest,
+            residual_force_rms=self._force.root / self._weight,
+            residual_force_max=self._force.largest / self._weight,
+            residual_moment_rms=self._moment.root / self._weight,
+            residual_in_flight_max=self._flying.largest,
+            flight_seconds=self._flight / self._rate,
+            saturated=self._saturated / frames / (N_TANGENT - 6),
+            ground_force_mean=self._ground / frames / self._weight,
+        )
