@@ -1,0 +1,161 @@
+"""Certificates of a run's field: what is known of its stability, passivity and energy before it is felt."""
+
+import json
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.certificates.device import Device, Sampling
+from controllers.certificates.energy import energy
+from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.passivity import passivity
+from controllers.certificates.report import Certificate, Verdict, hash_of
+from controllers.certificates.stability import HandRange, River, boundary, stability
+from controllers.curves.trajectory import Trajectory
+from controllers.safety import ForceLimiter
+from experiments.wiring import RunConfig
+from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
+from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
+from models.phantom.parameters import PREMIUM_1_5
+from sim.compiled import source_hash
+from sim.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
+
+CERTIFICATE, PAGE, PLOT = "certificate.json", "certificate.html", "stability.png"
+
+
+def phantom_device() -> Device:
+    """The Phantom as certificates know it: its own kernels, on symbols, in the hand frame."""
+
+    def jacobian_H(theta: Any) -> Any:
+        columns = zip(*jacobian.py_func(theta), strict=True)
+        return tuple(zip(*(vector_to_hand_frame.py_func(column) for column in columns), strict=True))
+
+    p = PREMIUM_1_5
+    return Device(
+        position=lambda theta: vector_to_hand_frame.py_func(forward_kinematics.py_func(theta)),
+        jacobian=jacobian_H, mass=mass_matrix.py_func, coriolis=coriolis_matrix.py_func,
+        gravity=gravity_torques.py_func, angles=phantom_angles, viscous=p.viscous_friction,
+        coulomb=p.coulomb_friction, encoder_step=p.encoder_step, peak_torque=p.peak_torque,
+    )  # fmt: skip
+
+
+def certified_river(config: RunConfig, delay: float = 0.0) -> River:
+    """The river of a run, as it is certified: its curve, gains and clock, with a delay of the torques [s].
+
+    A bunny is certified in the form that runs on the clock's or the hand's pace near it: attraction to a point.
+    """
+    curve = Trajectory.circle(config.radius, config.lap)
+    law, width = (FOLLOW_LAW, config.tube) if config.mode == "follow" else (BUNNY_LAW, config.bunny_width)
+    sampling = Sampling(config.scene.servo_period, delay, config.cutoff)
+    return River(law, config.stiffness, config.damping, width, curve, phantom_device(), sampling)
+
+
+def certificate_inputs(river: River, hands: HandRange, push: float) -> dict[str, object]:
+    """All that the verdicts depend on, for `hash_of`: the device is in its parameters and in the sources."""
+    return {
+        "law": "follow" if river.law is FOLLOW_LAW else "bunny",
+        "gains": [river.k_r, river.b_d, river.width],
+        "curve": river.curve.packed(),
+        "sampling": river.sampling,
+        "device": PREMIUM_1_5,
+        "hands": hands,
+        "push": push,
+        "code": [source_hash(), version("casadi")],
+    }
+
+
+def certify(river: River, hands: HandRange, push: float) -> Certificate:
+    """Stability with hands within intervals, passivity, and the bound for a push [N]; energy is FOLLOW's alone."""
+    verdicts: dict[str, Verdict] = {"stability": stability(river, hands.hands()), "passivity": passivity(river)}
+    if river.law is FOLLOW_LAW:
+        verdicts["energy"] = energy(river, push, ForceLimiter(river.sampling.period).peak)
+    return Certificate(verdicts, hash_of(certificate_inputs(river, hands, push)))
+
+
+def certify_into(
+    config: RunConfig, out: Path, delay: float = 0.0, hands: HandRange | None = None, push: float = 1.0
+) -> Certificate:
+    """Certify a run's field, or take the certificate that the folder holds if it is of the same inputs.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Of the run.
+    out : Path
+        Folder; written are ``certificate.json``, ``certificate.html`` and ``stability.png``.
+    delay : float
+        Of the torques [s].
+    hands : HandRange, optional
+        Intervals of the hand's impedance.
+    push : float
+        U_max of the bound on the distance [N].
+
+    Raises
+    ------
+    ControllerError, SimError
+        If a number is out of its interval, or the curve is out of the workspace.
+    """
+    river, hands = certified_river(config, delay), hands or HandRange()
+    file = out / CERTIFICATE
+    if file.exists() and (out / PAGE).exists():
+        held = json.loads(file.read_text(encoding="utf-8"))
+        if isinstance(held, dict) and held.get("inputs") == hash_of(certificate_inputs(river, hands, push)):
+            return Certificate.from_json(held)
+    certificate = certify(river, hands, push)
+    out.mkdir(parents=True, exist_ok=True)
+    stability_figure(river, certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
+    (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
+    file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return certificate
+
+
+def stability_figure(river: River, verdict: Verdict) -> Figure:
+    """Boundary of the gains with the river's own, and the critical stiffness along the curve."""
+    damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
+    critical = boundary(river, damping)
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    gains, along = figure.subplots(1, 2)
+    gains.fill_between(damping, 1.0, np.maximum(critical, 1.0), color="#dbe7f4", label="stable at every phase, no hand")
+    gains.plot(damping, critical, color="#2f6db3")
+    gains.plot(river.b_d, river.k_r, "o", color="#c2473b", label="this river")
+    gains.set(xscale="log", yscale="log", xlabel="b_d [N s/m]", ylabel="k_r [N/m]", ylim=(10.0, None))
+    gains.set_title("stability boundary", loc="left")
+    gains.legend(frameon=False, fontsize=8, loc="lower center")
+    phases = np.asarray(verdict.figures["phases"], dtype=np.float64)
+    along.plot(phases, np.asarray(verdict.figures["critical_stiffness"], dtype=np.float64), color="#2f6db3")
+    along.axhline(river.k_r, color="#c2473b", label="this river")
+    along.set(yscale="log", xlabel="phase [s]", ylabel="critical k_r [N/m]")
+    along.set_title("along the curve, worst hand", loc="left")
+    along.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def certificate_page(certificate: Certificate) -> str:
+    """A readable page of a certificate, with the plot beside it."""
+    colour = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
+    parts = [
+        "<!doctype html><meta charset='utf-8'><title>Certificate</title>",
+        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#222}"
+        "td{padding:.1rem .8rem .1rem 0;vertical-align:top}img{width:100%}small{color:#666}</style>",
+        f"<h1>Certificate</h1><p><small>inputs {escape(certificate.inputs)}</small></p>",
+    ]
+    for name, verdict in certificate.verdicts.items():
+        numbers = {key: value for key, value in verdict.figures.items() if isinstance(value, float)}
+        rows = "".join(f"<tr><td>{escape(key)}</td><td>{value:.5g}</td></tr>" for key, value in numbers.items())
+        margin = "" if verdict.margin is None else f" <small>margin {verdict.margin:.4g}</small>"
+        parts.append(
+            f"<h2>{escape(name)}: <span style='color:{colour[verdict.verdict]}'>{verdict.verdict}</span>{margin}</h2>"
+            f"<p>{escape(verdict.reason)}</p><ul>{''.join(f'<li>{escape(a)}</li>' for a in verdict.assumptions)}</ul>"
+            f"<table>{rows}</table>"
+        )
+        if verdict.counterexample:
+            parts.append(f"<p>Counterexample: <code>{escape(str(dict(verdict.counterexample)))}</code></p>")
+    parts.append(f"<img src='{PLOT}' alt='stability boundary'>")
+    return "\n".join(parts)
