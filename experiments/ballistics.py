@@ -23,7 +23,7 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap import quaternions
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.contacts import contacts
-from models.mocap.library import load_clip
+from models.mocap.library import load
 from models.mocap.momentum import momentum
 from sim.clip_motion import clip_motion
 from sim.compiled import source_hash
@@ -111,9 +111,12 @@ def body_motion(clip: Clip) -> BodyMotion:
 
 
 def clip_ballistics(
-    clip: Clip, tolerance: BallisticTolerance | None = None, friction: float = FRICTION
+    clip: Clip,
+    tolerance: BallisticTolerance | None = None,
+    friction: float = FRICTION,
+    assumptions: tuple[str, ...] = (),
 ) -> ClipBallistics:
-    """Judge all flights of a clip, and the turns between them."""
+    """Judge all flights of a clip, and the turns between them; `assumptions` are added to those of the verdict."""
     tolerance = tolerance or BallisticTolerance()
     laps = clip
     if clip.closes():
@@ -128,6 +131,7 @@ def clip_ballistics(
     verdict = ballistic_verdict(motion, flights, tolerance)
     if verdict.verdict == "refuted":
         verdict = _with_initial_state(verdict, laps, flights)
+    verdict = replace(verdict, assumptions=(*verdict.assumptions, *assumptions))
     certificate = Certificate(
         {"ballistic": verdict, "turns": turns_verdict(motion, flights, friction, clip.n_frames)},
         hash_of([clip.poses, clip.fps, tolerance, friction, source_hash()]),
@@ -146,7 +150,11 @@ def certify_file(path: Path, tolerance: BallisticTolerance | None = None, fricti
     MotionFileError
         If the file cannot be read.
     """
-    return clip_ballistics(load_clip(path), tolerance, friction)
+    clip, report = load(path)
+    scaled = (
+        () if report is None else (f"lengths, and gravity with them, are scaled to the figure; {report.lines()[1]}",)
+    )
+    return clip_ballistics(clip, tolerance, friction, scaled)
 
 
 def _with_initial_state(verdict: Verdict, clip: Clip, flights: tuple[FlightJudgement, ...]) -> Verdict:

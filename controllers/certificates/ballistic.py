@@ -34,8 +34,8 @@ class BallisticTolerance:
     Parameters
     ----------
     gravity : (float, float)
-        Least and greatest gravity that viewers take for natural [m/s²] (after Reitsma & Pollard 2003, who found that
-        too much is noticed less than too little; see docs/ballistics.md).
+        Least and greatest gravity that viewers take for natural [m/s²] (after Reitsma & Pollard 2003; what that rests
+        on is said in docs/ballistics.md).
     distance : float
         How far a body that really falls may stray from the recorded centre of mass [m].
     misfit : float

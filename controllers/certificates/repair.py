@@ -119,7 +119,6 @@ def repair(task: RepairTask) -> RepairPlan:
     shift = opti.variable(n, 3)
     steps = step * ca.exp(pace)
     moved = task.com + shift
-    times = ca.vertcat(0, ca.cumsum(steps))
     velocity = (moved[1:, :] - moved[:-1, :]) / ca.repmat(steps, 1, 3)
     between = (steps[1:] + steps[:-1]) / 2.0
     rise = (velocity[1:, 2] - velocity[:-1, 2]) / between
@@ -134,7 +133,7 @@ def repair(task: RepairTask) -> RepairPlan:
         airborne[start + 1 : end] = True
         state = opti.variable(2, 3)
         states.append(state)
-        since = times[start : end + 1] - times[start]
+        since = ca.vertcat(0, ca.cumsum(steps[start:end]))
         fall = ca.repmat(state[0, :], end - start + 1, 1) + since @ state[1, :]
         opti.subject_to(moved[start : end + 1, :2] == fall[:, :2])
         opti.subject_to(moved[start : end + 1, 2] == fall[:, 2] - 0.5 * GRAVITY * since**2)
@@ -169,7 +168,7 @@ def repair(task: RepairTask) -> RepairPlan:
             f"({opti.return_status()}); expected flights that timing and height can mend"
         ) from None
     return RepairPlan(
-        times=np.asarray(solution.value(times)).ravel(),
+        times=np.concatenate([[0.0], np.cumsum(np.asarray(solution.value(steps)).ravel())]),
         shift=np.asarray(solution.value(shift)).reshape(n, 3),
         falls=np.array([np.asarray(solution.value(state)) for state in states]).reshape(-1, 2, 3),
         iterations=int(solution.stats()["iter_count"]),

@@ -20,6 +20,7 @@ Mask = npt.NDArray[np.bool_]
 _CERTAIN = 0.005  # what is lower than this touches, however fast [m]
 _REACH, _HAND_REACH = 0.06, 0.12  # what is higher than this does not, however slow [m]
 _SLOW = 0.6  # m/s: soles that stand slip and roll slower, soles that fly pass faster
+_LOW, _LEVEL = 0.03, 0.25  # what is lower [m] and hardly rises or sinks [m/s] skids over the floor
 
 
 class Contacts(NamedTuple):
@@ -69,10 +70,18 @@ def contacts(clip: Clip) -> Contacts:
         places[k, : len(spheres)] = data.geom_xpos[spheres] - (0.0, 0.0, CONTACT_RADIUS)
         places[k, len(spheres) :] = data.geom_xpos[others] + np.einsum("gij,gj->gi", R, middle)
         places[k, len(spheres) :, 2] -= np.einsum("gj,gj->g", np.abs(R[:, 2]), half)
-    speeds = np.zeros(places.shape[:2])
-    if clip.n_frames > 1:
-        speeds = np.linalg.norm(np.gradient(places, 1.0 / clip.fps, axis=0), axis=2)
+    slides = _slower_side(np.abs(np.diff(places[:, :, 2], axis=0)) * clip.fps)
+    speeds = _slower_side(np.linalg.norm(np.diff(places, axis=0), axis=2) * clip.fps)
     heights = places[:, :, 2]
     reach = np.full(heights.shape[1], _REACH)
     reach[len(FOOT_CONTACTS) : len(spheres)] = _HAND_REACH
-    return Contacts(heights, (heights < _CERTAIN) | ((heights < reach) & (speeds < _SLOW)))
+    rests = (heights < reach) & (speeds < _SLOW)
+    skids = (heights < _LOW) & (slides < _LEVEL)
+    return Contacts(heights, (heights < _CERTAIN) | rests | skids)
+
+
+def _slower_side(speeds: Array) -> Array:
+    """Speeds at n frames from those between them: at take-off a sole has been at rest, at landing it will be."""
+    if len(speeds) == 0:
+        return np.zeros((1, speeds.shape[1]))
+    return np.minimum(np.vstack([speeds, speeds[-1:]]), np.vstack([speeds[:1], speeds]))
