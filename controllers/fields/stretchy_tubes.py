@@ -10,7 +10,9 @@ from controllers.curves.closest_point import closest_phase
 from controllers.curves.deformation import (
     ANCHOR,
     COUNT,
+    EDIT,
     PHASE,
+    TABLE,
     carry_to,
     commit,
     let_go,
@@ -31,8 +33,8 @@ CLICK_TIME = 0.4  # [s] a shorter click takes the last edit back, a longer one m
 
 NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
 # Memory: phase t*, mode, when and where the switch was pressed, how far the stylus was carried since, the normal of a
-# push, FOLLOW's gains, then the record of the curve.
-_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13
+# push, FOLLOW's gains, how far off the stylus a held point ever was, then the record of the curve.
+_PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13, 14
 _SEEK, _STRETCH, _DAMPING, _RADIUS, _UNTIL = range(5)
 
 
@@ -151,6 +153,8 @@ def stretchy_wrench(params: Array, at: int, memory: Array, slot: int, hand: Arra
     if mode in (HOLDING, PUSHING):
         x, y, z = curve_point(memory, curve, phase)
         distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
+    if mode == HOLDING:
+        memory[slot + _OFF] = max(memory[slot + _OFF], distance)
     leave_trace(memory, curve, memory, phase, distance, phase)
 
 
@@ -226,7 +230,7 @@ class StretchyTubes:
         follow = self.then
         gains = [0.0, 0.0, 0.0] if follow is None else [follow.k_r, follow.b_d, follow.epsilon**-2]
         state = np.zeros(_RECORD)
-        state[_PHASE], state[_GAINS:_RECORD] = np.nan, gains
+        state[_PHASE], state[_GAINS:_OFF] = np.nan, gains
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
         params = [self.k_f, self.k_s, self.b, self.epsilon, self.until]
         return Program.law(STRETCHY, params, memory.tolist())
@@ -253,6 +257,12 @@ class StretchyTubes:
         """
         return curve_of(memory, slot + _RECORD, self.curve)
 
-    def edits(self, memory: Array, slot: int = TRACE_SIZE) -> int:
-        """How many edits are in force in the memory of a run, up to `depth`."""
-        return int(memory[slot + _RECORD + COUNT])
+    def edits(self, memory: Array, slot: int = TRACE_SIZE) -> Array:
+        """Edits in force in the memory of a run, [t̂ [s], h [s], δ̂ (3) [m]] each, shape (n, 5), n up to `depth`."""
+        record = memory[slot + _RECORD :]
+        table, count = int(record[TABLE]), int(record[COUNT])
+        return record[table : table + EDIT * count].reshape(count, EDIT).copy()
+
+    def held_off(self, memory: Array, slot: int = TRACE_SIZE) -> float:
+        """Largest distance [m] of a held point from the stylus in a run."""
+        return float(memory[slot + _OFF])

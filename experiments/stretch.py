@@ -1,0 +1,229 @@
+"""STRETCHY TUBES as a run: the field, what a hand does in it by default, and what is kept of the bent curve."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import CurveError
+from controllers.fields.follow import Follow
+from controllers.fields.stretchy_tubes import StretchyTubes
+from sim.errors import SimError
+from sim.users.intent import Grab
+from sim.viewer.palette import CURVE, FIELD, USER
+
+Array = npt.NDArray[np.float64]
+
+CURVE_FILE = "curve.json"
+PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
+
+
+class StretchFlags(Protocol):
+    """What of a run's configuration decides on the field; see `experiments.wiring.RunConfig`."""
+
+    @property
+    def mode(self) -> str:
+        """Name of the mode."""
+        ...
+
+    @property
+    def seek(self) -> float:
+        """k_f [N/m]."""
+        ...
+
+    @property
+    def rubber(self) -> float:
+        """k_s [N/m]."""
+        ...
+
+    @property
+    def rubber_tube(self) -> float:
+        """ε [m]."""
+        ...
+
+    @property
+    def bump(self) -> float:
+        """Half width h of a bump [s]."""
+        ...
+
+    @property
+    def stiffness(self) -> float:
+        """k_r with which the bent curve is performed [N/m]."""
+        ...
+
+    @property
+    def damping(self) -> float:
+        """b_d with which the bent curve is performed [N s/m]."""
+        ...
+
+    @property
+    def tube(self) -> float:
+        """ε with which the bent curve is performed [m]."""
+        ...
+
+
+def law(config: StretchFlags, curve: Trajectory, grabs: tuple[Grab, ...]) -> StretchyTubes:
+    """Field of the modes "stretch", and "stretch-then-follow", which performs once the last grab is over.
+
+    Raises
+    ------
+    ControllerError
+        If a number is out of its interval.
+    """
+    then = until = None
+    if config.mode == "stretch-then-follow":
+        then = Follow(curve, config.stiffness, config.damping, config.tube)
+        until = max((grab.end for grab in grabs), default=0.0) + PAUSE
+    return StretchyTubes(
+        curve, config.seek, config.rubber, epsilon=config.rubber_tube, width=config.bump,
+        until=np.inf if until is None else until, then=then,
+    )  # fmt: skip
+
+
+def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
+    """What a hand does by default, in eleven seconds.
+
+    It pulls the curve outwards, pulls it up, takes that back and does it again by a short and a long click, and pushes
+    it inwards from outside.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    epsilon : float
+        Radius of its tube [m].
+    """
+    phases = curve.start + curve.duration * np.array([1.0, 3.0, 5.0]) / 8.0
+    first, second, third = curve.point(phases)
+    centre = curve.point(np.linspace(curve.start, curve.end, 64)).mean(axis=0)
+    away = (third - centre) / np.linalg.norm(third - centre)
+    outwards = 0.02 * (first - centre) / np.linalg.norm(first - centre)
+    still = (0.0, 0.0, 0.0)
+    doings = (
+        (outwards, 1.0, 0.4, first),
+        (np.array([0.0, 0.0, 0.015]), 1.0, 0.4, second),
+        (np.array(still), 0.15, 0.0, None),
+        (np.array(still), 0.7, 0.0, None),
+        (-(3.5 * epsilon + 0.01) * away, 1.0, 0.4, third + 3.5 * epsilon * away),
+    )
+    grabs: list[Grab] = []
+    for carry, duration, hold, place in doings:
+        start = grabs[-1].end + PAUSE if grabs else PAUSE
+        grabs.append(Grab(start, _vector(carry), duration, hold, None if place is None else _vector(place)))
+    return tuple(grabs)
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+@dataclass(frozen=True)
+class StretchSummary:
+    """How a curve was bent.
+
+    Attributes
+    ----------
+    edits : int
+        In force at the end.
+    largest_mm : float
+        Largest distance of a point of the bent curve from where it was.
+    changed : float
+        Share of the curve's phases at which it is not where it was.
+    held_off_m : float
+        Largest distance of a held point from the stylus.
+    length_before_mm, length_after_mm : float
+    reach_mm : float
+        Radius up to which the bent curve's nearest point is unique (an estimate; see `Trajectory.reach`).
+    """
+
+    edits: int
+    largest_mm: float
+    changed: float
+    held_off_m: float
+    length_before_mm: float
+    length_after_mm: float
+    reach_mm: float
+
+    def line(self) -> str:
+        """What happened, in a sentence."""
+        times = "once" if self.edits == 1 else f"{self.edits} times"
+        return (
+            f"The curve was bent {times}, by up to {self.largest_mm:.1f} mm over {100 * self.changed:.0f} % of it; "
+            f"the held point was at the stylus within {self.held_off_m:.0e} m."
+        )
+
+
+def stretch_summary(tubes: StretchyTubes, memory: Array) -> StretchSummary:
+    """Measure the bent curve in the memory of a run against the one before."""
+    bent, phases = tubes.edited(memory), np.linspace(tubes.curve.start, tubes.curve.end, 2001)
+    moved = np.linalg.norm(bent.point(phases) - tubes.curve.point(phases), axis=1)
+    return StretchSummary(
+        edits=len(tubes.edits(memory)),
+        largest_mm=1e3 * float(moved.max()),
+        changed=float(np.mean(moved > 1e-9)),
+        held_off_m=tubes.held_off(memory),
+        length_before_mm=1e3 * tubes.curve.length,
+        length_after_mm=1e3 * bent.length,
+        reach_mm=1e3 * bent.reach,
+    )
+
+
+def save_curve(curve: Trajectory, path: Path) -> None:
+    """Write a curve as JSON: times [s], positions in H [m], quaternions wxyz, periodic, ends."""
+    samples = {name: np.asarray(getattr(curve, name)).tolist() for name in ("times", "positions", "quaternions")}
+    path.write_text(json.dumps(samples | {"periodic": curve.periodic, "ends": curve.ends}) + "\n", encoding="utf-8")
+
+
+def load_curve(path: Path) -> Trajectory:
+    """Curve that `save_curve` wrote.
+
+    Raises
+    ------
+    SimError
+        If the file is not one.
+    CurveError
+        If its numbers make no curve.
+    """
+    keys = ("times", "positions", "quaternions", "periodic", "ends")
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        times, positions, quaternions, periodic, ends = (values[key] for key in keys)
+        return Trajectory(times, positions, quaternions, bool(periodic), ends)
+    except CurveError as error:
+        raise CurveError(f"{path}: {error}") from None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise SimError(f"{path}: no curve ({error}); expected JSON with {', '.join(keys)}") from None
+
+
+def stretch_figure(before: Trajectory, bent: Trajectory, path: Array) -> Figure:
+    """The curve before and after, and where the stylus went, from above and from the right [mm].
+
+    Parameters
+    ----------
+    before, bent : Trajectory
+        In the hand frame H.
+    path : Array
+        Of the stylus in H [m], shape (n, 3).
+    """
+    phases = np.linspace(before.start, before.end, 801)
+    old, new, way = 1e3 * before.point(phases), 1e3 * bent.point(phases), 1e3 * path
+    figure = Figure(figsize=(8.0, 3.9), layout="constrained")
+    for ax, (i, j), title in zip(
+        figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the right"), strict=True
+    ):
+        ax.plot(way[:, i], way[:, j], color=USER, lw=0.7, alpha=0.7, label="stylus")
+        ax.plot(old[:, i], old[:, j], color=CURVE, lw=0.9, ls=(0, (4, 3)), label="curve before")
+        ax.plot(new[:, i], new[:, j], color=FIELD, lw=1.8, label="curve after")
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_title(title, loc="left")
+        ax.set(xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
+        ax.grid(color="#e6e8ec")
+        ax.spines[["top", "right"]].set_visible(False)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
