@@ -153,3 +153,12 @@ def test_captured_flights_are_flown_as_predicted(file):
         (0.95 * flight.done[0], False), (1.08 * flight.done[1], False),
     ):  # fmt: skip
         assert (fly(found.clip, flight.fit, rate).distance <= 0.05) == expected
+
+
+@shared
+@pytest.mark.slow
+def test_what_is_repaired_is_flown():
+    repaired = repair_clip(load_clip(SHARED / "snu" / "backflip.bvh"))
+    for found, expected in ((repaired.before, False), (repaired.after, True)):
+        trial = fly(found.clip, found.flights[0].fit, 1.0)
+        assert (trial.distance <= 0.05) == expected
