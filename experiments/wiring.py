@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.bunny import Bunny
-from controllers.fields.follow import Follow
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.safety import ForceLimiter
+from experiments.modes import law
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
 from models.mocap.clip import Clip
@@ -49,7 +48,7 @@ class RunConfig:
         Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
         or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
         upper body inside, upper body outside.
-    mode : {"follow", "bunny"}
+    mode : {"follow", "bunny", "rivers"}
         Field of force.
     map : {"cylindrical", "composite"}
         Haptic map: four clips round a cylinder, or the lower body of one clip and the upper body blended between two.
@@ -67,6 +66,14 @@ class RunConfig:
         Radius ε in which the field is felt [m].
     bunny_width : float
         δ of the bunny [m].
+    bunny_attraction : {"point", "along"}
+        To the bunny itself, or along the curve.
+    bunny_pace : {"clock", "wait"}
+        Whether the bunny waits for the hand.
+    river_tube : float
+        Radius ε of the rivers [m].
+    crossing : {"smooth", "discrete", "sum"}
+        How crossing rivers share the hand: by its velocity, smoothly or with hysteresis, or not at all.
     lap : float
         Time of a lap of the curve [s].
     radius : float
@@ -86,7 +93,7 @@ class RunConfig:
     """
 
     clips: tuple[str, ...] = FIGURE_CLIPS
-    mode: Literal["follow", "bunny"] = "follow"
+    mode: Literal["follow", "bunny", "rivers"] = "follow"
     map: Literal["cylindrical", "composite"] = "cylindrical"
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
@@ -95,6 +102,10 @@ class RunConfig:
     damping: float = 8.0
     tube: float = 0.25
     bunny_width: float = 0.02
+    bunny_attraction: Literal["point", "along"] = "point"
+    bunny_pace: Literal["clock", "wait"] = "wait"
+    river_tube: float = 0.02
+    crossing: Literal["smooth", "discrete", "sum"] = "smooth"
     lap: float = 4.0
     radius: float = 0.0477
     reach: float = 0.025
@@ -193,7 +204,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
     world.reset(start, poses[0])
     figure = Figure(world.model, world.data, world.figure, FIGURE)
-    program = _law(config, curve).program()
+    program = law(config, curve).program()
     limiter = ForceLimiter(period)
     servo = Servo(
         plant=make_plant(world),
@@ -237,12 +248,6 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
 def stylus_path(points: Array) -> Array:
     """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
     return np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))))
-
-
-def _law(config: RunConfig, curve: Trajectory) -> Follow | Bunny:
-    if config.mode == "follow":
-        return Follow(curve, config.stiffness, config.damping, config.tube)
-    return Bunny(curve, config.stiffness, config.damping, config.bunny_width)
 
 
 def _user(config: RunConfig, curve: Trajectory) -> Arm:
