@@ -100,7 +100,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
     """
     phases = curve.start + curve.duration * np.array([1.0, 3.0, 5.0]) / 8.0
     first, second, third = curve.point(phases)
-    centre = curve.point(np.linspace(curve.start, curve.end, 64)).mean(axis=0)
+    centre = curve.point(np.linspace(curve.start, curve.end, 64, endpoint=not curve.periodic)).mean(axis=0)
     away = (third - centre) / np.linalg.norm(third - centre)
     outwards = 0.02 * (first - centre) / np.linalg.norm(first - centre)
     still = (0.0, 0.0, 0.0)

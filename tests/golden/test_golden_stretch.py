@@ -1,0 +1,54 @@
+"""STRETCHY TUBES, then FOLLOW: a hand on a mass bends the default curve and lets go; the path is a known one.
+
+Run this file to write the path anew, after a change that means to change it.
+"""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.program import evaluate
+from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
+from experiments.stretch import law, stretch_grabs
+from sim.users.arm import Arm, hand_force
+
+GOLDEN = Path(__file__).with_name("stretch_then_follow.json")
+FLAGS = SimpleNamespace(
+    mode="stretch-then-follow", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5,
+    stiffness=300.0, damping=4.0, tube=0.25,
+)  # fmt: skip
+MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 17.0, 250
+
+
+def _run() -> dict[str, list]:
+    curve = Trajectory.circle(0.0477, 4.0)
+    grabs = stretch_grabs(curve, FLAGS.rubber_tube)
+    field, arm = law(FLAGS, curve, grabs), Arm(grabs=grabs).compiled()
+    program = field.program()
+    memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
+    p, v, path = curve.point(0.0), np.zeros(3), []
+    for k in range(round(SECONDS / PERIOD)):
+        hand[0], hand[HAND_SWITCH] = k * PERIOD, arm.switch[0]
+        hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
+        evaluate(program.ops, program.params, memory, hand, wrench)
+        hand_force(arm, k * PERIOD, p, v, user)
+        if k % EVERY == 0:
+            path.append(p.tolist())
+        v = v + PERIOD / MASS * (wrench[:3] + user)
+        p = p + PERIOD * v
+    return {"path": path, "edits": field.edits(memory).tolist(), "held_off": field.held_off(memory)}
+
+
+def test_the_hand_goes_where_it_went_and_the_curve_is_bent_as_it_was() -> None:
+    golden, now = json.loads(GOLDEN.read_text(encoding="utf-8")), _run()
+    np.testing.assert_allclose(now["path"], golden["path"], atol=1e-8)
+    np.testing.assert_allclose(now["edits"], golden["edits"], atol=1e-8)
+    assert len(now["edits"]) == 3
+    assert now["held_off"] < 1e-9
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text(json.dumps(_run()) + "\n", encoding="utf-8")

@@ -1,0 +1,105 @@
+"""The servo with STRETCHY TUBES: a simulated hand bends the curve, and the figure shows what is under it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.stretch import law, load_curve, save_curve, stretch_figure, stretch_grabs, stretch_summary
+from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from models.mocap.clip import pose_difference
+from sim.errors import SimError
+from sim.loop import Loop
+from sim.plant import make_hand
+from sim.reference import poses_along
+from sim.servo import FrameLog, TickLog
+from sim.users.arm import Arm
+
+FLAGS = SimpleNamespace(
+    mode="stretch", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5, stiffness=300.0, damping=4.0, tube=0.25
+)
+SECONDS = 3.2  # the first grab, and a little more
+
+
+def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
+    config = RunConfig(clips=("cheer", "angry"), seconds=SECONDS)
+    session = wire(config, load_clips(config.clips)[0])
+    grabs = stretch_grabs(session.curve, FLAGS.rubber_tube)[:1]
+    field = law(FLAGS, session.curve, grabs)
+    program, channels = field.program(), {"p": [], "switch": [], "distance": [], "force": []}
+    shown: list[np.ndarray] = []
+    compiled = session.servo.field._replace(ops=program.ops, params=program.params, memory=program.fresh_memory())
+    servo = session.servo._replace(field=compiled, hand=make_hand(Arm(grabs=grabs)))
+
+    def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        for name, block in (("p", ticks.hand[:, 1:4]), ("switch", ticks.hand[:, 14]), ("distance", ticks.trace[:, 4])):
+            channels[name].append(block[:n].copy())
+        channels["force"].append(ticks.force[:n].copy())
+        shown.append(frames.reference[: -(-n // servo.figure_ticks)].copy())
+
+    Loop(servo, session.world, keep).run(SECONDS)
+    told = {name: np.concatenate(blocks) for name, blocks in channels.items()}
+    return session, field, told | {"shown": np.concatenate(shown), "memory": servo.field.memory}
+
+
+@pytest.fixture(scope="module")
+def ran() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
+    return run()
+
+
+def test_the_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(ran) -> None:
+    _, field, told = ran
+    held = told["switch"] > 0.0
+    period = SECONDS / len(held)
+    assert np.sum(held) * period == pytest.approx(1.4, abs=0.01)
+    assert told["distance"][held].max() < 1e-9
+    summary = stretch_summary(field, told["memory"])
+    assert summary.edits == 1
+    assert 8.0 < summary.largest_mm < 20.0
+    assert 0.2 < summary.changed < 0.3
+    assert summary.held_off_m < 1e-9
+    assert summary.line().startswith("The curve was bent once, by up to 1")
+    last = np.flatnonzero(held)[-1]
+    np.testing.assert_allclose(field.edited(told["memory"]).point(0.5), told["p"][last], atol=1e-4)
+
+
+def test_the_rubber_pulls_the_hand_back(ran) -> None:
+    _, field, told = ran
+    last = np.flatnonzero(told["switch"] > 0.0)[-1]
+    away = told["p"][last] - field.curve.point(0.5)
+    np.testing.assert_allclose(told["force"][last], -FLAGS.rubber * away, atol=0.1)
+
+
+def test_the_figure_shows_the_animation_under_the_held_point(ran) -> None:
+    session, _, told = ran
+    last = np.flatnonzero(told["switch"] > 0.0)[-1]
+    compiled, poses = session.haptic_map.compiled(), np.empty((2, session.haptic_map.nq))
+    points = np.array([told["p"][last], session.curve.point(0.5)])
+    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(points), poses)
+    frame = int(last // session.servo.figure_ticks)
+    under, before = (np.abs(pose_difference(told["shown"][frame : frame + 1], pose[None])[0, 6:]) for pose in poses)
+    # The hand has been at rest for 0.4 s, so the stylus filter has caught up.
+    assert under.max() < np.radians(1.0)
+    assert before.max() > 3.0 * under.max()
+
+
+def test_the_same_run_bends_the_same_curve_to_the_last_bit(ran) -> None:
+    _, _, told = ran
+    np.testing.assert_array_equal(run()[2]["memory"], told["memory"])
+
+
+def test_a_bent_curve_is_kept_and_drawn(ran, tmp_path) -> None:
+    _, field, told = ran
+    bent, path = field.edited(told["memory"]), tmp_path / "curve.json"
+    save_curve(bent, path)
+    again = load_curve(path)
+    phases = np.linspace(0.0, 4.0, 501)
+    np.testing.assert_allclose(again.point(phases), bent.point(phases), atol=1e-12)
+    assert again.periodic
+    stretch_figure(field.curve, bent, told["p"]).savefig(tmp_path / "stretch.png")
+    assert (tmp_path / "stretch.png").stat().st_size > 10_000
+    for text in ("{", "[1]", '{"times": 1}', '{"times": [0], "positions": [], "quaternions": [], "periodic": 1}'):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(SimError, match=r"curve\.json: no curve"):
+            load_curve(path)
