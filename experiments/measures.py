@@ -22,6 +22,7 @@ Array = npt.NDArray[np.float64]
 
 SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
 HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
+FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
 BLOCK_FRAMES = 2000  # of the figure, read at a time
 _TICKS = ("t", "p", "nearest", "distance", "phase", "user")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
@@ -127,7 +128,7 @@ class PathMeasure:
     def summary(self) -> PathSummary:
         """What was taken so far."""
         laps = self._turned / self._span
-        lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else math.nan
+        lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else None
         return PathSummary(
             1e3 * self._alone.root, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes)
         )  # fmt: skip
@@ -168,9 +169,17 @@ class FigureMeasure:
         self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
         self._joints, self._root, self._force, self._moment, self._flying = (_MeanSquare() for _ in range(5))
         self._frames, self._flight, self._saturated, self._ground = 0, 0, 0.0, 0.0
+        self._fell_at: float | None = None
 
     def add(self, frames: Mapping[str, Array]) -> None:
-        """Take a block of frames."""
+        """Take a block of frames; those after a fall do not count."""
+        if self._fell_at is not None:
+            return
+        fallen = frames["root_error"] > FALLEN
+        if np.any(fallen):
+            fall = int(np.argmax(fallen))
+            self._fell_at = float(frames["t"][fall])
+            frames = {name: channel[:fall] for name, channel in frames.items()}
         flight = frames["flight"] > 0.0
         residual = frames["residual"]
         self._joints.add(frames["joint_error"])
@@ -187,6 +196,7 @@ class FigureMeasure:
         """What was taken so far."""
         frames = max(self._frames, 1)
         return FigureSummary(
+            fell_at=self._fell_at,
             joint_error_rms_deg=math.degrees(self._joints.root),
             root_error_rms_cm=100.0 * self._root.root,
             root_error_max_cm=100.0 * self._root.largest,

@@ -71,7 +71,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     check_folder(out, overwrite)
     clips, remarks = load_clips(config.clips)
     session = wire(config, clips, remarks)
-    for remark in remarks:
+    for remark in session.remarks:
         console.print(remark, highlight=False)
     if not is_cached():
         console.print("Compiling the servo loop; this happens once for each version of the code.")

@@ -36,15 +36,15 @@ class PathSummary:
         Distance from the curve after the first second, while and soon after pushes left out.
     laps : float
         Laps of a closed curve, or times its length.
-    lap_seconds : float
-        Mean time of a lap; NaN before the first.
+    lap_seconds : float or None
+        Mean time of a lap; None before the first.
     pushes : tuple of PushSummary
     """
 
     deviation_rms_mm: float
     deviation_max_mm: float
     laps: float
-    lap_seconds: float
+    lap_seconds: float | None
     pushes: tuple[PushSummary, ...]
 
 
@@ -65,10 +65,12 @@ class AnimationSummary:
 
 @dataclass(frozen=True)
 class FigureSummary:
-    """How the physical figure followed the animation.
+    """How the physical figure followed the animation, until it fell, if it did.
 
     Attributes
     ----------
+    fell_at : float or None
+        When its root was first half a metre from the animation's [s], if it was. What follows is of the time before.
     joint_error_rms_deg, root_error_rms_cm, root_error_max_cm : float
     residual_force_rms : float
         Residual force at the root while the reference is on the ground, as a share of body weight.
@@ -85,6 +87,7 @@ class FigureSummary:
         Mean vertical ground force as a share of body weight.
     """
 
+    fell_at: float | None
     joint_error_rms_deg: float
     root_error_rms_cm: float
     root_error_max_cm: float
@@ -128,7 +131,8 @@ class RunSummary:
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "
             f"{self.animation.unpushed_deg:.2f}° elsewhere.",
-            f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
+            ("" if figure.fell_at is None else f"The physical figure fell at {figure.fell_at:.1f} s. Until then: ")
+            + f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
             f"{figure.root_error_rms_cm:.2f} cm at the root; residual force {100 * figure.residual_force_rms:.1f} % "
             "of body weight RMS.",
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "

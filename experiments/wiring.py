@@ -35,6 +35,7 @@ from sim.world import World, phantom_angles
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 4.0  # of the hand that pushes [N]; the motors can hold 1.5 N for ever, and this for a while
+MOST_PACE = 1.4  # times the clips' own that passes without a word
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
 
 
@@ -101,7 +102,7 @@ class RunConfig:
     stiffness: float = 300.0
     damping: float = 8.0
     tube: float = 0.25
-    bunny_width: float = 0.02
+    bunny_width: float = 0.05
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
     river_tube: float = 0.02
@@ -218,7 +219,18 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         figure=figure.state,
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
+    remarks += _pace_remark(config.lap, haptic_map.lap_seconds)
     return Session(config, clips, remarks, curve, haptic_map, world, figure, servo)
+
+
+def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
+    """What is said when a lap plays the clips much faster or slower than they are."""
+    if 1.0 / MOST_PACE <= clips / lap <= MOST_PACE:
+        return ()
+    return (
+        f"a lap takes {lap:.1f} s and the clips {clips:.1f} s on average, so they are played {clips / lap:.2g} times "
+        f"as fast; --lap {clips:.1f} plays them at their own pace",
+    )
 
 
 def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> AnimationMap:

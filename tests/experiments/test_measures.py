@@ -1,0 +1,104 @@
+"""The measures of a run against the same measures taken at once, and against what is put into a recording by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments import measures
+from experiments.measures import summarise
+from experiments.summary import RunSummary, SpeedSummary
+from models.humanoid.skeleton import rest_pose
+from sim.recorder import Group, Recorder
+from sim.recording import Recording
+
+PERIOD, EVERY, N = 1e-3, 10, 4000
+
+
+def recording_of(path: Path, root_error: np.ndarray) -> Recording:
+    """Four seconds on a line, 0.2 mm off, but for a push to 10 mm at 2 s, when one joint is 0.1 rad off."""
+    t = np.arange(N) * PERIOD
+    pushing = (t >= 2.0) & (t < 2.5)
+    bump = np.where(pushing, np.sin(np.pi * (t - 2.0) / 0.5) ** 2, 0.0)
+    phase = t % 1.5
+    nearest = np.stack((phase, np.zeros(N), np.zeros(N)), axis=1)
+    distance = np.maximum(0.01 * bump, 2e-4)
+    p = nearest + distance[:, None] * np.array([0.0, 1.0, 0.0])
+    user = 3.0 * bump[:, None] * np.array([0.0, 1.0, 0.0])
+    m = N // EVERY
+    reference = np.tile(rest_pose(), (m, 1))
+    turned = pushing[::EVERY]
+    reference[turned, 7:11] = [np.cos(0.05), np.sin(0.05), 0.0, 0.0]
+    flight = np.zeros(m)
+    flight[100:120] = 1.0
+    residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
+    ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
+    frames = {
+        "t": t[::EVERY], "reference": reference, "joint_error": np.full(m, 0.02), "root_error": root_error,
+        "residual": residual, "ground": np.tile([0.0, 0.0, 700.0], (m, 1)), "flight": flight,
+        "saturated": np.full(m, 5.1),
+    }  # fmt: skip
+    groups = {
+        "ticks": Group(1 / PERIOD, {name: array.shape[1:] for name, array in ticks.items()}),
+        "frames": Group(1 / PERIOD / EVERY, {name: array.shape[1:] for name, array in frames.items()}),
+    }
+    static = {"curve_span": np.array([0.0, 1.5]), "curve_closed": 1.0, "body_weight": 700.0}
+    with Recorder(path, {}, 0, groups, static) as recorder:
+        recorder.append("ticks", ticks)
+        recorder.append("frames", frames)
+    return Recording(path)
+
+
+def summary_of(path: Path, root_error: np.ndarray | None = None) -> RunSummary:
+    error = np.full(N // EVERY, 0.03) if root_error is None else root_error
+    with recording_of(path, error) as recording:
+        return summarise(recording, lambda points: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {})
+
+
+def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
+    summary = summary_of(tmp_path / "run.h5")
+    assert summary.path.deviation_rms_mm == pytest.approx(0.2)
+    assert summary.path.laps == pytest.approx((N - 1) * PERIOD / 1.5)
+    (push,) = summary.path.pushes
+    assert push.start == pytest.approx(2.0, abs=0.01)
+    assert push.seconds == pytest.approx(0.5, abs=0.02)
+    assert (push.peak_force, push.deviation_mm) == (pytest.approx(3.0), pytest.approx(10.0))
+    assert push.along_push == pytest.approx(1.0)
+    assert summary.animation.pushed_deg == pytest.approx(np.degrees(0.1))
+    assert summary.animation.unpushed_deg == 0.0
+    figure = summary.figure
+    assert figure.fell_at is None
+    assert figure.joint_error_rms_deg == pytest.approx(np.degrees(0.02))
+    assert (figure.root_error_rms_cm, figure.root_error_max_cm) == (pytest.approx(3.0), pytest.approx(3.0))
+    assert figure.residual_force_rms == pytest.approx(5.0 / 700.0)
+    assert figure.residual_moment_rms == pytest.approx(2.0 / 700.0)
+    assert figure.residual_in_flight_max == 0.0
+    assert figure.flight_seconds == pytest.approx(0.2)
+    assert figure.saturated == pytest.approx(0.1)
+    assert figure.ground_force_mean == pytest.approx(1.0)
+    assert len(summary.lines()) == 5
+
+
+@pytest.mark.parametrize("block", [1, 7, 113, 205])
+def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a block ends in the middle of a push."""
+    whole = summary_of(tmp_path / "whole.h5")
+    monkeypatch.setattr(measures, "BLOCK_FRAMES", block)
+    pieces = summary_of(tmp_path / "pieces.h5")
+    assert len(pieces.path.pushes) == 1
+    for part in ("path", "animation", "figure"):
+        for name, value in vars(getattr(whole, part)).items():
+            other = getattr(getattr(pieces, part), name)
+            if name == "pushes":
+                assert vars(other[0]) == pytest.approx(vars(value[0]))
+            else:
+                assert other == (value if value is None else pytest.approx(value)), name
+
+
+def test_a_fall_is_told_and_what_follows_does_not_count(tmp_path: Path) -> None:
+    error = np.full(N // EVERY, 0.03)
+    error[300:] = 0.9
+    summary = summary_of(tmp_path / "run.h5", error)
+    assert summary.figure.fell_at == pytest.approx(3.0)
+    assert summary.figure.root_error_max_cm == pytest.approx(3.0)
+    assert "fell at 3.0 s" in " ".join(summary.lines())
