@@ -27,7 +27,7 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     user = 3.0 * bump[:, None] * np.array([0.0, 1.0, 0.0])
     m = N // EVERY
     reference = np.tile(rest_pose(), (m, 1))
-    turned = pushing[::EVERY]
+    turned = bump[::EVERY] > 0.01
     reference[turned, 7:11] = [np.cos(0.05), np.sin(0.05), 0.0, 0.0]
     flight = np.zeros(m)
     flight[100:120] = 1.0
