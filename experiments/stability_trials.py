@@ -1,358 +1,177 @@
 """The experiment that could refute the stability certificates: where MuJoCo goes unstable, and where it should.
 
-Each trial draws a place on a curve, a curve, gains, a clock and a hand. Its critical stiffness is predicted from the
-linearised loop, and found again by stepping the linkage in MuJoCo under the servo's own kernels. Onset is where the
-growth rate of the slowest mode, identified from the motion across the curve, changes its sign.
+Each trial draws a place on a curve, a curve, a damping, a clock and a hand. Its critical stiffness is predicted from
+the linear loop, and found again in simulations that know nothing of it: onset is where the growth rate of the slowest
+mode, identified from the motion across the curve, changes its sign. With Coulomb friction the onset depends on the
+amplitude; the prediction is then a describing function's, and onset is where a swing neither grows nor decays.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from types import FunctionType
-from typing import cast
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from numba import njit
-from scipy.optimize import brentq
+import tyro
+from matplotlib.figure import Figure
 
-from controllers.certificates.device import HandImpedance, Sampling
-from controllers.certificates.laws import FOLLOW_LAW
-from controllers.certificates.linear_loop import linearise
-from controllers.certificates.sampled_loop import SampledLoop
-from controllers.certificates.stability import critical_stiffness, slowest_mode
-from controllers.curves.trajectory import Trajectory
-from controllers.fields.follow import Follow
-from controllers.fields.program import evaluate
-from experiments.certify import phantom_device
-from models.phantom.spec import phantom_spec
-from models.scene import PHANTOM, R_WP
-from sim.compiled import entry_point
-from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
-from sim.errors import SimError
-from sim.plant import Hand, Plant, advance, make_hand
-from sim.users.arm import Arm
-from sim.world import phantom_angles
+from experiments.trial_onset import observed, observed_with_friction, predicted, with_friction
+from experiments.trial_simulation import Conditions, Trial, draw_trial
 
 Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
-LAP = 1e6  # [s] of a lap: the curve stands still, so a trial is about one configuration
-START = 1e-6  # [m] distance from the curve at which a trial begins
-LARGEST = 20.0  # times as far, the motion is no longer taken for linear
-
-
-@njit
-def _exact_reading(theta: tuple[float, float, float]) -> tuple[float, float, float]:
-    return theta
-
-
-# The servo's own sensing with its encoders' rounding taken out: the same source, one name bound to another function.
-_sense_exactly = njit(
-    FunctionType(sense.py_func.__code__, sense.py_func.__globals__ | {"encoder_reading": _exact_reading})
-)
-
-
-@entry_point
-def run_late(
-    plant: Plant,
-    port: PhantomPort,
-    hand: Hand,
-    ops: IntArray,
-    params: Array,
-    memory: Array,
-    late: Array,
-    rounded: bool,
-    path: Array,
-) -> None:
-    """The servo's loop over one device, without limiter and figure, its torques late by whole periods.
-
-    Parameters
-    ----------
-    plant, port, hand, ops, params, memory
-        As in the servo.
-    late : Array
-        Torques on their way, the next to act first, shape (m, 3); m is the delay in periods.
-    rounded : bool
-        Whether the encoders round.
-    path : Array
-        Written: the hand as measured at each tick, shape (n, 3); NaN from where it is farther than 5 cm off.
-    """
-    path[:] = np.nan
-    wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
-    for k in range(path.shape[0]):
-        t = k * plant.period
-        if rounded:
-            sense(port, t, 0.0)
-        else:
-            _sense_exactly(port, t, 0.0)
-        evaluate(ops, params, memory, port.hand, wrench)
-        actuate(port, wrench[:3])
-        for i in range(3):
-            if late.shape[0] > 0:
-                slot = k % late.shape[0]
-                port.ctrl[port.motor[i]] = late[slot, i]
-                late[slot, i] = port.torque[i]
-            path[k, i] = port.hand[1 + i]
-        if np.sum((path[k] - path[0]) ** 2) > 0.05**2:
-            break
-        advance(plant, port, hand, t, False, applied)
-
-
-CLOSURE = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 1], [0, 1, -1]], dtype=np.float64)
-"""All five hinges of the linkage, by θ."""
+_WORLDS_OWN = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+FINE = Conditions()
+FINER = Conditions(substeps=128)
+OWN_FINE, OWN_COARSE = Conditions(64, _WORLDS_OWN), Conditions(8, _WORLDS_OWN)
+RUBBING, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What is drawn.
+class Row:
+    """One trial: what was drawn, and critical k_r [N/m], predicted and observed; NaN where no onset was found.
 
     Attributes
     ----------
-    curve : Trajectory
-        A circle somewhere in the workspace, so slow that it stands still.
-    phase : float
-        Where on it [s].
-    b_d : float
-        Damping [N s/m].
-    sampling : Sampling
-        The clock; its delay is a whole number of periods.
-    hand : HandImpedance
-        On the stylus.
-    direction : Array
-        Across the curve, of the first displacement, shape (3,).
+    period, delay, cutoff, b_d, mass, damping, stiffness : float
+        T [s], delay [s], filter [Hz], b_d [N s/m], and the hand.
+    predicted, observed : float
+        Linear loop; simulation without Coulomb friction and rounding, by Runge and Kutta's method.
+    own_fine, own_coarse : float
+        The same with the world's own integrator at 64 and at 8 steps a period.
+    amplitude, friction_predicted, friction_observed, rounded_observed : float
+        With Coulomb friction at an amplitude [m]; and with encoders that round.
     """
 
-    curve: Trajectory
-    phase: float
+    period: float
+    delay: float
+    cutoff: float
     b_d: float
-    sampling: Sampling
-    hand: HandImpedance
-    direction: Array
-
-    def loop(self) -> SampledLoop:
-        """The linearised loop at the trial's place."""
-        linear = linearise(phantom_device(), FOLLOW_LAW, self.curve, np.array([self.phase]), self.hand)
-        return SampledLoop(linear, self.sampling)
-
-    def predicted(self) -> float:
-        """Critical k_r [N/m]."""
-        return float(critical_stiffness(self.loop(), self.b_d)[0])
-
-
-def draw_trial(rng: np.random.Generator) -> Trial:
-    """A random trial: curve, phase, clock, hand, and a damping between 5 and 70 % of what is stable by itself."""
-    while True:
-        radius, centre = rng.uniform(0.02, 0.06), rng.uniform([-0.06, -0.08, -0.06], [0.06, 0.08, 0.1])
-        axes = np.linalg.qr(rng.normal(size=(3, 3)))[0][:, :2]
-        angle = np.linspace(0.0, 2.0 * np.pi, 97)
-        points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes.T
-        points[-1] = points[0]
-        curve = Trajectory(LAP * angle / (2.0 * np.pi), points, periodic=True)
-        period = float(0.25e-3 * 16.0 ** rng.uniform())
-        sampling = Sampling(period, float(rng.integers(4)) * period, float(rng.uniform(80.0, 250.0)))
-        hand = HandImpedance()
-        if rng.uniform() < 0.7:
-            stiffness = float(rng.uniform(50.0, 500.0)) if rng.uniform() < 0.5 else 0.0
-            hand = HandImpedance(float(rng.uniform(0.0, 0.3)), float(rng.uniform(0.5, 8.0)), stiffness)
-        try:
-            for point in curve.point(np.linspace(0.0, LAP, 24)):
-                phantom_angles(point)
-        except SimError:  # out of the workspace: another one
-            continue
-        phase = float(rng.uniform(0.0, LAP))
-        tangent = curve.velocity(phase) / np.linalg.norm(curve.velocity(phase))
-        sideways = rng.normal(size=3)
-        sideways -= tangent * (tangent @ sideways)
-        trial = Trial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
-        loop = trial.loop()
-        most = _critical_damping(loop)
-        return Trial(curve, phase, float(rng.uniform(0.05, 0.7)) * most, sampling, hand, trial.direction)
+    mass: float
+    damping: float
+    stiffness: float
+    predicted: float
+    observed: float
+    own_fine: float
+    own_coarse: float
+    amplitude: float
+    friction_predicted: float
+    friction_observed: float
+    rounded_observed: float
 
 
-def _critical_damping(loop: SampledLoop) -> float:
-    """Largest b_d [N s/m] that is stable with hardly any stiffness."""
-    gains = np.geomspace(0.05, 500.0, 60)
-    stable = [bool(loop.radius(1.0, b)[0] < 1.0) for b in gains]
-    first = int(np.argmin(stable)) if not all(stable) else len(gains) - 1
-    return float(gains[max(0, first - 1)])
-
-
-def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: mujoco.mjtIntegrator) -> mujoco.MjModel:
-    """The Phantom alone in the world's frame, with the hand's mass on its tip, which carries its own weight."""
-    spec = mujoco.MjSpec()
-    spec.option.timestep = step
-    spec.option.integrator = integrator
-    spec.option.tolerance = 1e-14
-    device = phantom_spec()
-    stylus = device.body("stylus")
-    stylus.mass, stylus.gravcomp = stylus.mass + hand.mass, 1.0
-    if not coulomb:
-        for joint in device.joints:
-            joint.frictionloss = 0.0
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, R_WP.ravel())
-    spec.attach(device, prefix=PHANTOM, frame=spec.worldbody.add_frame(quat=quaternion.tolist()))
-    return spec.compile()
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What is modelled beyond the linear loop, and how finely time is cut.
-
-    Attributes
-    ----------
-    substeps : int
-        Physics steps a servo period.
-    integrator : mujoco.mjtIntegrator
-        Runge and Kutta's by default. The world's own is of first order: it leads by half a step, which stabilises.
-    rounded : bool
-        Encoders round.
-    coulomb : bool
-        Coulomb friction acts.
-    start : float
-        Distance from the curve at the beginning [m].
-    """
-
-    substeps: int = 32
-    integrator: mujoco.mjtIntegrator = mujoco.mjtIntegrator.mjINT_RK4
-    rounded: bool = False
-    coulomb: bool = False
-    start: float = START
-
-
-def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
-    """Displacement across the curve at each tick [m], shape (n, 3), n ≤ ticks, after letting go beside it.
-
-    Parameters
-    ----------
-    trial, conditions
-        What is simulated, and how.
-    k_r : float
-        [N/m].
-    ticks : int
-        How long; shorter if the hand gets 5 cm off.
-    state : Array, optional
-        State ξ of the linear loop to begin in; by default at rest, `conditions.start` off in the trial's direction.
-    """
-    sampling, period = trial.sampling, trial.sampling.period
-    model = trial_model(trial.hand, period / conditions.substeps, conditions.coulomb, conditions.integrator)
-    data = mujoco.MjData(model)
-    centre = trial.curve.point(trial.phase)
-    port = phantom_port(model, data, period, sampling.cutoff)
-    late = np.zeros((sampling.whole_delay, 3))
-    if state is None:
-        theta, rate = np.array(phantom_angles(centre + conditions.start * trial.direction)), np.zeros(3)
-    else:
-        still = np.array(phantom_angles(centre))
-        theta, rate = still + state[:3], state[3:6]
-        port.memory[:3], port.memory[6:9], port.memory[12] = still + state[6:9], state[9:12], 1.0
-        port.hand[4] = 1.0
-        late += state[12:].reshape(-1, 3)[::-1]
-    late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
-    names = [PHANTOM + name for name in (*ARM_JOINTS, "elbow", "twin")]
-    for i, name in enumerate(names):
-        data.joint(name).qpos[0], data.joint(name).qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
-    mujoco.mj_forward(model, data)
-    a, b, c = (int(model.joint(name).dofadr[0]) for name in names[:3])
-    plant = Plant(
-        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
-        ground=np.zeros(3), arm_v=(a, b, c), substeps=conditions.substeps, period=period,
+def run_trial(trial: Trial) -> Row:
+    """Predict and observe one trial under all conditions."""
+    expected = predicted(trial)
+    # The swing's torques stay within the motors': 3 N at the tip, at most 1 mm.
+    amplitude = float(np.clip(3.0 / expected, 1e-4, 1e-3))
+    rubbing = with_friction(trial, amplitude)
+    return Row(
+        period=trial.sampling.period, delay=trial.sampling.delay, cutoff=trial.sampling.cutoff, b_d=trial.b_d,
+        mass=trial.hand.mass, damping=trial.hand.damping, stiffness=trial.hand.stiffness,
+        predicted=expected, observed=observed(trial, expected, FINE), own_fine=observed(trial, expected, OWN_FINE),
+        own_coarse=observed(trial, expected, OWN_COARSE), amplitude=amplitude, friction_predicted=rubbing.k_r,
+        friction_observed=observed_with_friction(trial, rubbing, amplitude, RUBBING),
+        rounded_observed=observed_with_friction(trial, rubbing, amplitude, ROUNDED),
     )  # fmt: skip
-    held = trial.hand.damping > 0.0 or trial.hand.stiffness > 0.0
-    hand = make_hand(Arm(trial.hand.stiffness, trial.hand.damping, centre[None] if held else np.zeros((0, 3))))
-    program = Follow(trial.curve, k_r, trial.b_d, np.inf).program()
-    path = np.zeros((ticks, 3))
-    run_late(plant, port, hand, program.ops, program.params, program.fresh_memory(), late, conditions.rounded, path)
-    tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))
-    away = path[np.isfinite(path[:, 0])] - centre
-    return away - np.outer(away @ tangent, tangent)
 
 
-def growth(path: Array) -> float:
-    """Largest modulus of the modes of a free linear motion, per sample, by the matrix pencil method.
+def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44, seed: int = 1) -> None:
+    """Run random trials and write ``trials.json``, ``trials.md`` and ``trials.png``; the worst one again, finer.
 
     Parameters
     ----------
-    path : Array
-        Samples, shape (n, 3); modes that make less than 1e-4 of the strongest one's part of it are taken for noise.
+    out : Path
+        Folder.
+    count : int
+        Trials.
+    seed : int
+        Of what is drawn.
     """
-    stride = max(1, len(path) // 200)
-    samples = path[::stride]
-    window = len(samples) // 2
-    rows = len(samples) - window
-    hankel = np.vstack([samples[i : i + rows].T for i in range(window + 1)])
-    past, future = hankel[:-3], hankel[3:]
-    u, sizes, v = np.linalg.svd(past, full_matrices=False)
-    rank = int(np.sum(sizes > 1e-6 * sizes[0]))
-    reduced = (u[:, :rank].T @ future @ v[:rank].T) / sizes[:rank]
-    modes = np.linalg.eigvals(reduced)
-    powers = modes[None, :] ** np.arange(len(samples))[:, None]
-    parts = np.linalg.lstsq(powers, samples.astype(complex), rcond=None)[0]
-    sizes = np.linalg.norm(parts, axis=1) * np.linalg.norm(powers, axis=0)
-    return float(np.abs(modes[sizes > 1e-4 * sizes.max()]).max() ** (1.0 / stride))
+    rng = np.random.default_rng(seed)
+    trials = [draw_trial(rng) for _ in range(count)]
+    rows: list[Row] = []
+    for number, trial in enumerate(trials):
+        rows.append(run_trial(trial))
+        row = rows[-1]
+        print(
+            f"{number + 1}/{count}: predicted {row.predicted:.1f} N/m, {_percent(row.observed, row.predicted)}",
+            flush=True,
+        )
+    errors = np.array([abs(row.observed / row.predicted - 1.0) for row in rows])
+    worst = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
+    again = observed(trials[worst], rows[worst].predicted, FINER)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "trials.json").write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+    told = table(rows) + (
+        f"\nThe worst, trial {worst + 1}: {_percent(rows[worst].observed, rows[worst].predicted)} at {FINE.substeps} "
+        f"physics steps a period, {_percent(again, rows[worst].predicted)} at {FINER.substeps}.\n"
+    )
+    (out / "trials.md").write_text(told, encoding="utf-8")
+    trials_figure(rows).savefig(out / "trials.png", dpi=150)
+    print(told)
 
 
-def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
-    """Rate at which the slowest mode grows [1/s], from a simulation of up to 0.3 s."""
-    period = trial.sampling.period
-    path = simulate(trial, k_r, int(np.clip(0.3 / period, 120, 800)), conditions)
-    size = np.linalg.norm(path, axis=1)
-    beyond = np.flatnonzero(size > LARGEST * conditions.start)
-    end = int(beyond[0]) if len(beyond) else len(path)
-    # What decays at once tells nothing of the slowest mode.
-    return float(np.log(growth(path[end // 4 : end]))) / period
+def table(rows: list[Row]) -> str:
+    """Rows as Markdown, and the median and largest error of each column."""
+    lines = [
+        "| T [ms] | delay | hand m, b, k | b_d | predicted k_r | observed | 64 own steps | 8 own steps | A [mm] "
+        "| friction, predicted | observed | with rounding |",
+        "|" + "---|" * 12,
+    ]
+    for r in rows:
+        lines.append(
+            f"| {1e3 * r.period:.2f} | {round(r.delay / r.period)} T "
+            f"| {r.mass:.2f}, {r.damping:.1f}, {r.stiffness:.0f} "
+            f"| {r.b_d:.2f} | {r.predicted:.0f} | {_percent(r.observed, r.predicted)} "
+            f"| {_percent(r.own_fine, r.predicted)} | {_percent(r.own_coarse, r.predicted)} | {1e3 * r.amplitude:.2f} "
+            f"| {_percent(r.friction_predicted, r.predicted)} | {_percent(r.friction_observed, r.friction_predicted)} "
+            f"| {_percent(r.rounded_observed, r.friction_predicted)} |"
+        )
+    lines.append("")
+    for name, found, expected in (
+        ("observed", "observed", "predicted"), ("64 own steps", "own_fine", "predicted"),
+        ("8 own steps", "own_coarse", "predicted"), ("Coulomb friction", "friction_observed", "friction_predicted"),
+        ("Coulomb friction and rounding", "rounded_observed", "friction_predicted"),
+    ):  # fmt: skip
+        errors = np.array([abs(getattr(r, found) / getattr(r, expected) - 1.0) for r in rows])
+        known = errors[np.isfinite(errors)]
+        lines.append(
+            f"- {name}: {len(known)} of {len(rows)} with an onset; error: median {100 * np.median(known):.2f} %, "
+            f"largest {100 * np.max(known):.2f} %"
+        )
+    return "\n".join(lines) + "\n"
 
 
-def observed(trial: Trial, guess: float, conditions: Conditions) -> float:
-    """Critical k_r [N/m] of the simulation, between a half and twice a guess; NaN if the onset is not there."""
-
-    def rate(log_k: float) -> float:
-        return observed_growth(trial, float(np.exp(log_k)), conditions)
-
-    return _root(rate, guess)
-
-
-def _root(rate: Callable[[float], float], guess: float) -> float:
-    """Where a rate changes its sign upwards, as a function of the logarithm of a gain, near a guess."""
-    for width in (1.1, 1.4, 2.0):
-        low, high = float(np.log(guess / width)), float(np.log(guess * width))
-        if rate(low) < 0.0 < rate(high):
-            return float(np.exp(cast(float, brentq(rate, low, high, xtol=1e-3))))
-    return float("nan")
-
-
-def with_friction(trial: Trial, amplitude: float) -> float:
-    """Critical k_r [N/m] predicted with Coulomb friction, for a motion of some amplitude across the curve [m].
-
-    Describing function: friction f_c on a joint that swings with rate amplitude Ω is the damping 4 f_c/(π Ω). The
-    mode's own rates at the boundary give Ω; a few rounds agree.
-    """
-    loop, device = trial.loop(), phantom_device()
-    k_r = trial.predicted()
-    for _ in range(12):
-        rates = amplitude * np.abs(slowest_mode(loop, k_r, trial.b_d, 0)[1][3:6])
-        damping = 4.0 * np.array(device.coulomb) / (np.pi * np.maximum(rates, 1e-9))
-        linear = trial.loop().linear
-        loop = SampledLoop(replace(linear, inverse_rate=linear.inverse_rate + np.diag(damping)), trial.sampling)
-        k_r = float(np.sqrt(k_r * min(critical_stiffness(loop, trial.b_d)[0], 4.0 * k_r)))
-    return k_r
+def trials_figure(rows: list[Row]) -> Figure:
+    """Observed against predicted critical stiffness, and the errors."""
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    series = (
+        ("no Coulomb friction", "predicted", "observed", "#2f6db3", "o"),
+        ("Coulomb friction", "friction_predicted", "friction_observed", "#c2473b", "s"),
+        ("Coulomb friction, encoders", "friction_predicted", "rounded_observed", "#7a5195", "^"),
+    )
+    for label, expected, found, colour, marker in series:
+        x, y = (np.array([getattr(row, name) for row in rows]) for name in (expected, found))
+        left.plot(x, y, marker, color=colour, mfc="none", ms=5, label=label)
+        right.plot(x, 100.0 * (y / x - 1.0), marker, color=colour, mfc="none", ms=5)
+    low, high = left.get_xlim()
+    ends = np.array([max(low, 10.0), high])
+    left.plot(ends, ends, color="#9aa0aa", lw=0.8, zorder=0)
+    left.set(xscale="log", yscale="log", xlabel="predicted k_r [N/m]", ylabel="observed k_r [N/m]")
+    left.set_title("critical stiffness", loc="left")
+    left.legend(frameon=False, fontsize=8)
+    right.axhspan(-5.0, 5.0, color="#eef3f9", zorder=0)
+    right.set(xscale="log", xlabel="predicted k_r [N/m]", ylabel="observed / predicted − 1 [%]")
+    right.set_title("error; shaded: 5 %", loc="left")
+    return figure
 
 
-def observed_with_friction(trial: Trial, guess: float, amplitude: float, conditions: Conditions) -> float:
-    """Critical k_r [N/m] of the simulation for a motion of some amplitude [m]: where it neither grows nor decays.
+def _percent(found: float, expected: float) -> str:
+    return f"{100.0 * (found / expected - 1.0):+.2f} %" if np.isfinite(found) else "none"
 
-    Each simulation begins in the slowest mode at that amplitude; its first two swings are compared.
-    """
-    loop = trial.loop()
 
-    def rate(log_k: float) -> float:
-        k_r = float(np.exp(log_k))
-        value, mode = slowest_mode(loop, k_r, trial.b_d, 0)
-        swing = max(4, round(2.0 * np.pi / max(abs(np.angle(value)), 1e-3)))
-        path = simulate(trial, k_r, min(3 * swing, 4000), conditions, amplitude * mode.real)
-        if len(path) < min(3 * swing, 4000):
-            return 1.0
-        return float(np.log(np.linalg.norm(path[swing : 2 * swing]) / np.linalg.norm(path[:swing])))
-
-    return _root(rate, guess)
+if __name__ == "__main__":
+    tyro.cli(stability_trials)

@@ -185,10 +185,15 @@ def _counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, obj
     return {"phase": phase, "p": river.curve.point(phase), "hand": hand, "state": state, "growth_rate": growth}
 
 
-def slowest_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[complex, npt.NDArray[np.complex128]]:
-    """Multiplier and complex state ξ of the slowest (or growing) mode at one phase; its tip swings by 1 m."""
+def slowest_mode(
+    loop: SampledLoop, k_r: float, b_d: float, at: int, swings: bool = False
+) -> tuple[complex, npt.NDArray[np.complex128]]:
+    """Multiplier and complex state ξ of the slowest (or growing) mode at one phase, of those that swing if so asked.
+
+    Its tip swings by 1 m.
+    """
     values, vectors = np.linalg.eig(loop.frozen(k_r, b_d)[at])
-    largest = int(np.argmax(np.abs(values)))
+    largest = int(np.argmax(np.where(swings & (np.abs(np.angle(values)) < 1e-3), 0.0, np.abs(values))))
     mode = loop.across[0][at] @ vectors[:, largest]
     # Turned to where its tip is farthest off, so that the real part is that moment.
     away = loop.linear.jacobian[at] @ mode[:3]
