@@ -1,5 +1,7 @@
 """Bending a curve: exact under the hand, nothing outside the bump, closed curves closed, undo to the last bit."""
 
+from pathlib import Path
+
 import casadi
 import numpy as np
 import pytest
@@ -233,3 +235,11 @@ def test_a_held_point_is_carried_to_finite_places_only() -> None:
     editable.take_hold(1.0)
     with pytest.raises(CurveError, match="three finite numbers"):
         editable.carry_to([np.nan, 0.0, 0.0])
+
+
+def test_the_example_of_the_documentation_runs() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "stretchy-tubes.md").read_text(encoding="utf-8")
+    names: dict = {}
+    exec(text.split("```python\n")[1].split("```")[0], names)
+    np.testing.assert_allclose(names["bent"].point(1.0), [0.0, 0.07, 0.01], atol=1e-12)
+    np.testing.assert_allclose(names["editable"].curve.point(1.0), [0.0, 0.05, 0.0], atol=1e-12)

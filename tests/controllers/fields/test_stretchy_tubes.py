@@ -1,5 +1,6 @@
 """STRETCHY TUBES: sought, held, bent, pushed from outside, undone by clicks, and then performed."""
 
+import casadi
 import numpy as np
 import pytest
 
@@ -8,7 +9,7 @@ from controllers.errors import CurveError, ParameterError
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_SIZE
 from controllers.fields.program import Program, evaluate
-from controllers.fields.stretchy_tubes import CLICK_TIME, StretchyTubes
+from controllers.fields.stretchy_tubes import CLICK_TIME, StretchyTubes, stretch_force
 from controllers.state import HandState
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
@@ -236,6 +237,13 @@ def test_from_python_and_from_the_program_the_force_is_the_same_to_the_last_bit(
         program = TUBES.program()
         evaluate(program.ops, program.params, program.fresh_memory(), hand.vector(), wrench)
         np.testing.assert_array_equal(TUBES.wrench(hand).force, wrench[:3])
+
+
+def test_the_law_is_also_symbolic() -> None:
+    symbols = [casadi.SX.sym(name) for name in ("p", "v", "target", "k", "b")]
+    symbolic = casadi.Function("F", symbols, [stretch_force.py_func(*symbols)])
+    numbers = (0.04, -0.2, 0.05, 150.0, 3.0)
+    assert float(symbolic(*numbers)) == pytest.approx(stretch_force(*numbers), rel=1e-15)
 
 
 @pytest.mark.parametrize(
