@@ -4,6 +4,7 @@ import time
 
 _STARTED = time.perf_counter()
 
+import json  # noqa: E402
 import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
 from dataclasses import dataclass, field  # noqa: E402
@@ -99,6 +100,52 @@ class Track:
 
 
 @dataclass(frozen=True)
+class Certify:
+    """Say what is certain of the field of a run, or of the flights of a clip: certified, refuted or unknown."""
+
+    config: tyro.conf.OmitArgPrefixes[RunConfig] = field(default_factory=RunConfig)
+    clip: Path | None = None
+    """Judge the flights of this motion file instead of a field."""
+    out: Path = Path("runs/certificate")
+    """Folder for the certificate of a field; one that is there already is taken if nothing has changed."""
+    json: bool = False
+    """Print the certificate as JSON."""
+
+    def __call__(self) -> int:
+        """Certify."""
+        from experiments.ballistics import certify_file
+        from experiments.certify import certify_into
+
+        certificate = certify_into(self.config, self.out) if self.clip is None else certify_file(self.clip).certificate
+        if self.json:
+            print(json.dumps(certificate.to_json(), indent=2))
+            return 0
+        for name, verdict in certificate.verdicts.items():
+            print(f"{name}: {verdict.verdict}; {verdict.reason}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Write the nearest motion whose flights can be flown."""
+
+    source: Positional[Path]
+    """Motion file to read."""
+    target: Positional[Path]
+    """BVH file to write."""
+    overwrite: bool = False
+    """Replace the target if it exists."""
+
+    def __call__(self) -> int:
+        """Repair, and say what was changed."""
+        from experiments.repair import repair_file
+
+        for line in repair_file(self.source, self.target, self.overwrite).lines():
+            print(line)
+        return 0
+
+
+@dataclass(frozen=True)
 class Report:
     """Draw the figures and the page of a run again, from its recording."""
 
@@ -161,6 +208,8 @@ Command = (
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Track, tyro.conf.subcommand("track")]
+    | Annotated[Certify, tyro.conf.subcommand("certify")]
+    | Annotated[Repair, tyro.conf.subcommand("repair")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
