@@ -54,8 +54,9 @@ def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
     size = np.linalg.norm(path, axis=1)
     beyond = np.flatnonzero(size > LARGEST * conditions.start)
     end = int(beyond[0]) if len(beyond) else len(path)
-    # What decays at once tells nothing of the slowest mode.
-    return float(np.log(growth(path[end // 4 : end]))) / period
+    # What decays at once tells nothing of the slowest mode; what the compensated weight leaves is a constant offset and
+    # no mode, so differences are taken.
+    return float(np.log(growth(np.diff(path[end // 4 : end], axis=0)))) / period
 
 
 def observed(trial: Trial, guess: float, conditions: Conditions) -> float:

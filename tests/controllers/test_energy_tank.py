@@ -1,0 +1,81 @@
+"""The tank bounds what a field injects, and leaves alone what takes energy away."""
+
+import numpy as np
+import pytest
+
+from controllers.energy_tank import TANK_ENERGY, EnergyTank, guard_energy
+from controllers.errors import ParameterError
+
+TANK = EnergyTank(1e-3, power=0.02, capacity=0.05)
+
+
+def _push_a_mass(tank, law, seconds, mass=0.1):
+    """A mass under a law of force through the tank: energy injected up to each tick, and speeds."""
+    memory, params, period = tank.fresh_memory(), tank.params(), tank.period
+    p, v, force = np.zeros(3), np.array([0.01, 0.0, 0.0]), np.zeros(3)
+    injected, speeds = [0.0], []
+    for _ in range(round(seconds / period)):
+        force[:] = law(p, v)
+        guard_energy(params, memory, p, v, force)
+        step = v * period + 0.5 * force / mass * period**2
+        injected.append(injected[-1] + force @ step)
+        p, v = p + step, v + force / mass * period
+        speeds.append(np.linalg.norm(v))
+    return np.array(injected), np.array(speeds)
+
+
+@pytest.mark.parametrize("period", [2.5e-4, 1e-3, 4e-3])
+def test_an_active_field_injects_no_more_than_its_budget(period):
+    tank = EnergyTank(period, 0.02, 0.05)
+    injected, _ = _push_a_mass(tank, lambda p, v: 5.0 * v, 3.0)
+    time = period * np.arange(len(injected))
+    assert injected[-1] > 0.5 * (0.05 + 0.02 * 3.0)
+    # One period's change of speed is booked a period late.
+    assert np.all(injected <= 0.05 + 0.02 * time + 1e-3)
+    bare = EnergyTank(period, 1e6, 1e6)
+    assert _push_a_mass(bare, lambda p, v: 5.0 * v, 0.2)[0][-1] > 5.0
+
+
+def test_a_force_that_takes_energy_is_not_touched():
+    memory = TANK.fresh_memory()
+    memory[TANK_ENERGY] = -1.0
+    for v in ([-0.3, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.5, 0.0]):
+        force = np.array([2.0, 0.0, 0.0])
+        guard_energy(TANK.params(), memory, np.zeros(3), np.array(v), force)
+        assert force.tolist() == [2.0, 0.0, 0.0]
+
+
+def test_a_vanishing_speed_is_no_trouble():
+    memory = TANK.fresh_memory()
+    for speed in (1e-300, 1e-12, 1e-3):
+        force = np.array([3.0, 0.0, 0.0])
+        guard_energy(TANK.params(), memory, np.zeros(3), np.array([speed, 0.0, 0.0]), force)
+        assert force[0] == 3.0
+
+
+def test_the_store_changes_by_flows_only():
+    memory, p, v = TANK.fresh_memory(), np.zeros(3), np.array([0.1, 0.0, 0.0])
+    force = np.array([0.5, 0.0, 0.0])
+    guard_energy(TANK.params(), memory, p, v, force)
+    assert memory[TANK_ENERGY] == 0.05
+    guard_energy(TANK.params(), memory, p + 0.002, v, force)
+    assert memory[TANK_ENERGY] == pytest.approx(0.05 - 0.5 * 0.002 + 0.02e-3, rel=1e-12)
+    guard_energy(TANK.params(), memory, p - 0.5, v, np.zeros(3))
+    assert memory[TANK_ENERGY] == 0.05
+
+
+def test_an_empty_tank_still_gives_its_power_and_is_continuous():
+    memory = TANK.fresh_memory()
+    memory[TANK_ENERGY] = 0.0
+    powers = []
+    for speed in np.linspace(0.009, 0.011, 5):
+        force = np.array([2.0, 0.0, 0.0])
+        guard_energy(TANK.params(), memory.copy(), np.zeros(3), np.array([speed, 0.0, 0.0]), force)
+        powers.append(force[0] * speed)
+    np.testing.assert_allclose(powers, [0.018, 0.019, 0.02, 0.02, 0.02], rtol=1e-12)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 1.0, 1.0, 1.0), (1e-3, np.inf, 1.0, 1.0), (1e-3, 1.0, 1.0, 1e-3)])
+def test_a_tank_that_cannot_be_is_refused(numbers):
+    with pytest.raises(ParameterError, match="tank"):
+        EnergyTank(*numbers)
