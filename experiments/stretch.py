@@ -14,12 +14,14 @@ from controllers.errors import CurveError
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
 from sim.errors import SimError
+from sim.recording import Recording
 from sim.users.intent import Grab
 from sim.viewer.palette import CURVE, FIELD, USER
 
 Array = npt.NDArray[np.float64]
 
 CURVE_FILE = "curve.json"
+POINTS = 2000  # drawn of a curve or a path
 PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
 
 
@@ -103,12 +105,12 @@ def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
     centre = curve.point(np.linspace(curve.start, curve.end, 64, endpoint=not curve.periodic)).mean(axis=0)
     away = (third - centre) / np.linalg.norm(third - centre)
     outwards = 0.02 * (first - centre) / np.linalg.norm(first - centre)
-    still = (0.0, 0.0, 0.0)
+    still = np.zeros(3)
     doings = (
         (outwards, 1.0, 0.4, first),
         (np.array([0.0, 0.0, 0.015]), 1.0, 0.4, second),
-        (np.array(still), 0.15, 0.0, None),
-        (np.array(still), 0.7, 0.0, None),
+        (still, 0.15, 0.0, None),
+        (still, 0.7, 0.0, None),
         (-(3.5 * epsilon + 0.01) * away, 1.0, 0.4, third + 3.5 * epsilon * away),
     )
     grabs: list[Grab] = []
@@ -201,25 +203,30 @@ def load_curve(path: Path) -> Trajectory:
         raise SimError(f"{path}: no curve ({error}); expected JSON with {', '.join(keys)}") from None
 
 
-def stretch_figure(before: Trajectory, bent: Trajectory, path: Array) -> Figure:
+def draw_stretch(recording: Recording, folder: Path, target: Path) -> None:
+    """Draw the figure of a stretched run, from its recording and the curve that `save_curve` wrote into its folder."""
+    bent = load_curve(folder / CURVE_FILE)
+    path = recording.channel("ticks", "p")
+    thin = path[:: max(1, len(path) // POINTS)]
+    phases = np.linspace(bent.start, bent.end, POINTS)
+    stretch_figure(recording.array("curve"), bent.point(phases), thin).savefig(target, dpi=150)
+
+
+def stretch_figure(before: Array, after: Array, path: Array) -> Figure:
     """The curve before and after, and where the stylus went, from above and from the right [mm].
 
     Parameters
     ----------
-    before, bent : Trajectory
-        In the hand frame H.
-    path : Array
-        Of the stylus in H [m], shape (n, 3).
+    before, after, path : Array
+        Points of the curves and of the stylus in H [m], shapes (n, 3).
     """
-    phases = np.linspace(before.start, before.end, 801)
-    old, new, way = 1e3 * before.point(phases), 1e3 * bent.point(phases), 1e3 * path
     figure = Figure(figsize=(8.0, 3.9), layout="constrained")
     for ax, (i, j), title in zip(
         figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the right"), strict=True
     ):
-        ax.plot(way[:, i], way[:, j], color=USER, lw=0.7, alpha=0.7, label="stylus")
-        ax.plot(old[:, i], old[:, j], color=CURVE, lw=0.9, ls=(0, (4, 3)), label="curve before")
-        ax.plot(new[:, i], new[:, j], color=FIELD, lw=1.8, label="curve after")
+        ax.plot(1e3 * path[:, i], 1e3 * path[:, j], color=USER, lw=0.7, alpha=0.7, label="stylus")
+        ax.plot(1e3 * before[:, i], 1e3 * before[:, j], color=CURVE, lw=0.9, ls=(0, (4, 3)), label="curve before")
+        ax.plot(1e3 * after[:, i], 1e3 * after[:, j], color=FIELD, lw=1.8, label="curve after")
         ax.set_aspect("equal", adjustable="datalim")
         ax.set_title(title, loc="left")
         ax.set(xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")

@@ -2,17 +2,22 @@
 
 from types import SimpleNamespace
 
+import matplotlib.image
 import numpy as np
 import pytest
 
 from controllers.curves.closest_point import closest_phases
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.stretch import law, load_curve, save_curve, stretch_figure, stretch_grabs, stretch_summary
+from experiments.stretch import CURVE_FILE, draw_stretch, law, load_curve, save_curve, stretch_grabs, stretch_summary
 from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError
-from sim.loop import Loop
+from sim.loop import Loop, groups
 from sim.plant import make_hand
+from sim.recorder import Recorder
+from sim.recording import Recording
 from sim.reference import poses_along
 from sim.servo import FrameLog, TickLog
 from sim.users.arm import Arm
@@ -93,16 +98,41 @@ def test_the_same_run_bends_the_same_curve_to_the_last_bit(ran) -> None:
 
 
 def test_a_bent_curve_is_kept_and_drawn(ran, tmp_path) -> None:
-    _, field, told = ran
-    bent, path = field.edited(told["memory"]), tmp_path / "curve.json"
+    session, field, told = ran
+    bent, path = field.edited(told["memory"]), tmp_path / CURVE_FILE
     save_curve(bent, path)
     again = load_curve(path)
     phases = np.linspace(0.0, 4.0, 501)
     np.testing.assert_allclose(again.point(phases), bent.point(phases), atol=1e-12)
     assert again.periodic
-    stretch_figure(field.curve, bent, told["p"]).savefig(tmp_path / "stretch.png")
-    assert (tmp_path / "stretch.png").stat().st_size > 10_000
-    for text in ("{", "[1]", '{"times": 1}', '{"times": [0], "positions": [], "quaternions": [], "periodic": 1}'):
-        path.write_text(text, encoding="utf-8")
-        with pytest.raises(SimError, match=r"curve\.json: no curve"):
-            load_curve(path)
+    servo = session.servo
+    with Recorder(tmp_path / "run.h5", {}, 1, groups(servo), session.static()) as recorder:
+        names = groups(servo)["ticks"].channels
+        recorder.append("ticks", {name: told["p"] if name == "p" else np.zeros((len(told["p"]), *shape))
+                                  for name, shape in names.items()})  # fmt: skip
+    with Recording(tmp_path / "run.h5") as recording:
+        draw_stretch(recording, tmp_path, tmp_path / "stretch.png")
+    image = matplotlib.image.imread(tmp_path / "stretch.png")
+    green = (image[..., 1] > image[..., 0] + 0.2) & (image[..., 1] > image[..., 2] + 0.2)
+    assert green.sum() > 1000  # the curve after, twice
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{", "[1]", '{"times": 1}', '{"times": [0], "positions": [], "quaternions": [], "periodic": 1}', "[" * 9999],
+)
+def test_a_file_that_is_no_curve_is_refused(text: str, tmp_path) -> None:
+    path = tmp_path / CURVE_FILE
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SimError, match=r"curve\.json: no curve"):
+        load_curve(path)
+    with pytest.raises(SimError, match="no curve"):
+        load_curve(tmp_path / "missing.json")
+
+
+def test_a_curve_whose_numbers_make_no_sense_is_refused_with_them(tmp_path) -> None:
+    path = tmp_path / CURVE_FILE
+    save_curve(Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), path)
+    path.write_text(path.read_text(encoding="utf-8").replace("[0.0, 1.0]", "[1.0, 1.0]"), encoding="utf-8")
+    with pytest.raises(CurveError, match=r"curve\.json: times of a curve must increase"):
+        load_curve(path)
