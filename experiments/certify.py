@@ -14,9 +14,10 @@ from controllers.certificates.device import Device, Sampling
 from controllers.certificates.energy import energy
 from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
 from controllers.certificates.passivity import passivity
-from controllers.certificates.report import Certificate, Verdict, hash_of
+from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of
 from controllers.certificates.stability import HandRange, River, boundary, stability
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from controllers.safety import ForceLimiter
 from experiments.wiring import RunConfig
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
@@ -49,10 +50,20 @@ def phantom_device() -> Device:
 def certified_river(config: RunConfig, delay: float = 0.0) -> River:
     """The river of a run, as it is certified: its curve, gains and clock, with a delay of the torques [s].
 
-    A bunny is certified in the form that runs on the clock's or the hand's pace near it: attraction to a point.
+    Near a bunny that pulls along the curve the field is FOLLOW's, to first order; one that pulls to itself is taken to
+    run at the clock's pace.
+
+    Raises
+    ------
+    ParameterError
+        If there is no certificate for the run's mode.
     """
+    if config.mode not in ("follow", "bunny"):
+        raise ParameterError(f"no certificate is known for mode {config.mode!r}; there are those of follow and bunny")
     curve = Trajectory.circle(config.radius, config.lap)
-    law, width = (FOLLOW_LAW, config.tube) if config.mode == "follow" else (BUNNY_LAW, config.bunny_width)
+    law, width = FOLLOW_LAW, config.tube
+    if config.mode == "bunny":
+        law, width = (BUNNY_LAW, config.bunny_width) if config.bunny_attraction == "point" else (FOLLOW_LAW, np.inf)
     sampling = Sampling(config.scene.servo_period, delay, config.cutoff)
     return River(law, config.stiffness, config.damping, width, curve, phantom_device(), sampling)
 
@@ -105,15 +116,32 @@ def certify_into(
     river, hands = certified_river(config, delay), hands or HandRange()
     file = out / CERTIFICATE
     if file.exists() and (out / PAGE).exists():
-        held = json.loads(file.read_text(encoding="utf-8"))
-        if isinstance(held, dict) and held.get("inputs") == hash_of(certificate_inputs(river, hands, push)):
-            return Certificate.from_json(held)
+        try:
+            held = read_certificate(file)
+            held.check(certificate_inputs(river, hands, push))
+            return held
+        except CertificateError:
+            pass  # of another river, or of none: certified anew
     certificate = certify(river, hands, push)
     out.mkdir(parents=True, exist_ok=True)
     stability_figure(river, certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
     (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
     file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return certificate
+
+
+def read_certificate(file: Path) -> Certificate:
+    """Certificate of a file.
+
+    Raises
+    ------
+    CertificateError
+        If it holds none.
+    """
+    try:
+        return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
+    except (ValueError, RecursionError) as error:
+        raise CertificateError(f"{file}: {error}") from None
 
 
 def stability_figure(river: River, verdict: Verdict) -> Figure:

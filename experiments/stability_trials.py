@@ -16,6 +16,7 @@ import numpy.typing as npt
 import tyro
 from matplotlib.figure import Figure
 
+from controllers.certificates.stability import slowest_mode
 from experiments.trial_onset import observed, observed_with_friction, predicted, with_friction
 from experiments.trial_simulation import Conditions, Trial, draw_trial
 
@@ -25,6 +26,7 @@ _WORLDS_OWN = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
 FINER = Conditions(substeps=128)
 OWN_FINE, OWN_COARSE = Conditions(64, _WORLDS_OWN), Conditions(8, _WORLDS_OWN)
+COARSE = 1e-4  # [m] a few counts of the encoders: a smaller swing is mostly rounding
 RUBBING, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
 
@@ -61,11 +63,17 @@ class Row:
     rounded_observed: float
 
 
+def swing_amplitude(trial: Trial, k_r: float) -> float:
+    """Amplitude [m] at which the river asks for 3 N, which the motors give anywhere, but at most 1 mm."""
+    loop = trial.loop()
+    mode = slowest_mode(loop, k_r, trial.b_d, 0, swings=True)[1]
+    return min(1e-3, 3.0 / float(np.linalg.norm(loop.force(k_r, trial.b_d)[0] @ mode)))
+
+
 def run_trial(trial: Trial) -> Row:
     """Predict and observe one trial under all conditions."""
     expected = predicted(trial)
-    # The swing's torques stay within the motors': 3 N at the tip, at most 1 mm.
-    amplitude = float(np.clip(3.0 / expected, 1e-4, 1e-3))
+    amplitude = swing_amplitude(trial, expected)
     rubbing = with_friction(trial, amplitude)
     return Row(
         period=trial.sampling.period, delay=trial.sampling.delay, cutoff=trial.sampling.cutoff, b_d=trial.b_d,
@@ -73,7 +81,7 @@ def run_trial(trial: Trial) -> Row:
         predicted=expected, observed=observed(trial, expected, FINE), own_fine=observed(trial, expected, OWN_FINE),
         own_coarse=observed(trial, expected, OWN_COARSE), amplitude=amplitude, friction_predicted=rubbing.k_r,
         friction_observed=observed_with_friction(trial, rubbing, amplitude, RUBBING),
-        rounded_observed=observed_with_friction(trial, rubbing, amplitude, ROUNDED),
+        rounded_observed=observed_with_friction(trial, rubbing, amplitude, ROUNDED) if amplitude > COARSE else np.nan,
     )  # fmt: skip
 
 

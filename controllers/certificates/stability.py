@@ -167,7 +167,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     if least <= max(river.k_r, 1e-3):
         below = critical_stiffness(SampledLoop(river.still(hand), river.sampling), river.b_d, 1e-3)[at]
         said = said.replace(f"critical k_r = {least:.4g}", f"critical k_r = {below:.4g}")
-        margin = min(below / max(river.k_r, 1e-3), 1.0) - 1.0
+        margin = min(float(below) / max(river.k_r, 1e-3), 1.0) - 1.0
         return Verdict("refuted", f"unstable: {said}", margin, assumptions, _counterexample(river, hand, at), figures)
     if multipliers and max(multipliers) >= 1.0:
         reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"

@@ -8,7 +8,16 @@ import pytest
 
 from controllers.certificates.report import Certificate, CertificateError
 from controllers.certificates.stability import HandRange
-from experiments.certify import CERTIFICATE, PAGE, PLOT, certificate_inputs, certified_river, certify_into
+from controllers.errors import ParameterError
+from experiments.certify import (
+    CERTIFICATE,
+    PAGE,
+    PLOT,
+    certificate_inputs,
+    certified_river,
+    certify_into,
+    read_certificate,
+)
 from experiments.wiring import RunConfig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
@@ -55,7 +64,25 @@ def test_a_certificate_is_of_one_river_only(folder, change):
         certificate.check(certificate_inputs(certified_river(RunConfig()), HandRange(), 1.0))
 
 
+def test_the_bunny_is_certified_and_what_is_not_known_is_said():
+    point = certified_river(RunConfig(mode="bunny"))
+    along = certified_river(RunConfig(mode="bunny", bunny_attraction="along"))
+    assert (point.law.slides, along.law.slides) == (False, True)
+    with pytest.raises(ParameterError, match="'rivers'"):
+        certified_river(RunConfig(mode="rivers"))
+
+
+@pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])
+def test_what_is_no_certificate_is_refused(tmp_path, text):
+    (tmp_path / CERTIFICATE).write_text(text)
+    if text.startswith("{"):
+        assert read_certificate(tmp_path / CERTIFICATE).verdicts == {}
+    else:
+        with pytest.raises(CertificateError, match=CERTIFICATE):
+            read_certificate(tmp_path / CERTIFICATE)
+
+
 def test_a_held_file_that_is_no_certificate_is_replaced(folder, tmp_path):
-    (tmp_path / CERTIFICATE).write_text('{"inputs": "0"}')
+    (tmp_path / CERTIFICATE).write_text("not json")
     (tmp_path / PAGE).write_text("")
     assert certify_into(RunConfig(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
