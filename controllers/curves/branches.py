@@ -96,7 +96,8 @@ def branches(blob: Array, at: int, px: float, py: float, pz: float, radius: floa
             piece = int(runs[k, 2] if turn < runs[k, 0] else turn % pieces)
             leaf = tree + NODE * (first_leaf + piece)
             bound = best + blob[leaf + 7]
-            if chord_square(blob, leaf, px, py, pz) >= bound * bound:
+            again = turn >= runs[k, 0] and piece == runs[k, 2]
+            if again or chord_square(blob, leaf, px, py, pz) >= bound * bound:
                 continue
             h = blob[breaks + piece + 1] - blob[breaks + piece]
             square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)

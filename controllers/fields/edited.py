@@ -106,9 +106,9 @@ class Edited:
               U_j(s, p) = w(|p - \varphi'_j(s)|/\varepsilon)\,\bigl(\dot\varphi'_j(s) - V(\varphi'_j(s))\bigr)
 
     U is what the user added to the river in moving along φ'. So φ' is an integral curve of V + U (α = 1). As a force
-    it is the user's push as the river felt it, U = −F(φ', φ̇'): a hand that moves along φ' feels nothing, and one
-    that is let go on it traces φ' by itself. It holds the push, inertia and friction of the hand together, and
-    needs no force sensor.
+    it is the user's push as the river felt it, U = −F(φ', φ̇'): a hand that moves along φ' feels nothing, and a light
+    one that is let go on it traces φ' by itself; a heavy one departs from it by what its inertia does, and nothing
+    brings it back along the curve. U holds the push, inertia and friction together, and needs no force sensor.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wr
 # Parameters: a header, offsets of the rivers' blocks, and the blocks; offsets count from the header.
 _DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _HEADER = range(6)
 # A block: gains, tube, number of admissible speeds, then the speeds and the packed curve.
-_K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _SPEEDS, _BLOCK = range(6)
+_K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _TAU, _SPEEDS, _BLOCK = range(7)
 # What is known of a branch.
 _RIVER, _PHASE, _DISTANCE, _MISMATCH, _WINDOW, _CANDIDATE = range(6)
 
@@ -37,28 +37,29 @@ _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
 
 @njit
-def mismatch(speed: float, along: float, square: float, least: float, greatest: float) -> float:
-    """Distance m [m/s] of a velocity from the admissible ones, the multiples s φ̇/|φ̇| with least ≤ s ≤ greatest.
+def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
+    r"""Distance m [m/s] of a hand's velocity from a river's, m² = |e|² − (e·Y)²/(|Y|² + |φ̇|²).
+
+    e is the velocity less the nearest admissible one, and Y = (φ(t*) − p)/τ the current towards the curve. What e has
+    along Y is forgiven as far as Y outweighs the current along the curve, or a hand that springs back to its river
+    would be let go for the speed that the river gave it.
 
     Parameters
     ----------
-    speed : float
-        |φ̇| [m/s], positive.
-    along, square : float
-        v·φ̇ and |v|².
-    least, greatest : float
-        Of the interval [m/s].
+    square, towards : float
+        |e|² and e·Y [m²/s²].
+    draw, pace : float
+        |Y|² and |φ̇|² [m²/s²]; not both zero.
     """
-    along = along / speed
-    s = np.minimum(np.maximum(along, least), greatest)
-    return np.sqrt(np.maximum(0.0, square - along * along + (along - s) ** 2))
+    return np.sqrt(np.maximum(0.0, square - towards * towards / (draw + pace)))
 
 
 @njit
-def _branch_mismatch(params: Array, block: int, curve: int, phase: float, v: Array) -> float:
-    x, y, z = curve_velocity(params, curve, phase)
-    speed = max(math.sqrt(x * x + y * y + z * z), 1e-12)
-    least, greatest = speed, speed
+def _branch_mismatch(params: Array, block: int, curve: int, phase: float, p: Array, v: Array) -> float:
+    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    pace = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
+    speed = max(math.sqrt(pace), 1e-12)
+    s = speed
     rows = int(params[block + _SPEEDS])
     if rows > 0:
         share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START]) * (rows - 1)
@@ -66,8 +67,14 @@ def _branch_mismatch(params: Array, block: int, curve: int, phase: float, v: Arr
         low, high = block + _BLOCK + 2 * i, block + _BLOCK + 2 * (i + 1)
         least = params[low] + (share - i) * (params[high] - params[low])
         greatest = params[low + 1] + (share - i) * (params[high + 1] - params[low + 1])
-    along = v[0] * x + v[1] * y + v[2] * z
-    return mismatch(speed, along, v[0] * v[0] + v[1] * v[1] + v[2] * v[2], least, greatest)
+        s = min(max((v[0] * along[0] + v[1] * along[1] + v[2] * along[2]) / speed, least), greatest)
+    square = towards = draw = 0.0
+    for i in range(3):
+        e, y = v[i] - s / speed * along[i], (there[i] - p[i]) / params[block + _TAU]
+        square += e * e
+        towards += e * y
+        draw += y * y
+    return mismatch(square, towards, draw, pace + 1e-24)
 
 
 @njit
@@ -81,7 +88,7 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
         for k in range(branches(params, curve, p[0], p[1], p[2], params[block + _EPSILON], found)):
             row = table[count]
             row[_RIVER], row[_PHASE], row[_DISTANCE] = river, found[k, 0], found[k, 1]
-            row[_MISMATCH] = _branch_mismatch(params, block, curve, found[k, 0], v)
+            row[_MISMATCH] = _branch_mismatch(params, block, curve, found[k, 0], p, v)
             row[_WINDOW] = window(found[k, 1] * found[k, 1] * params[block + _INVERSE_SQUARE])
             count += row[_WINDOW] > 0.0
     return count
@@ -197,8 +204,8 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
 class HigherOrder:
     r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
 
-    With m_i the distance of the hand's velocity from the admissible velocities of river i at t*_i (`mismatch`), r
-    the admission, and a null weight for a hand that moves with none,
+    With m_i the distance of the hand's velocity from the admissible ones of river i, s φ̇_i/|φ̇_i| at t*_i with s in
+    the interval of `River.speeds` (`mismatch`), r the admission, and a null weight for a hand that moves with none,
 
     .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{w_i\,e^{-m_i^2/2\sigma^2}}
               {e^{-r^2/2\sigma^2} + \sum_j w_j\,e^{-m_j^2/2\sigma^2}} \quad\text{(smooth)}
@@ -246,7 +253,7 @@ class HigherOrder:
         blocks: list[Array] = []
         for river in self.bundle.rivers:
             speeds = np.zeros(0) if river.speeds is None else np.ravel(river.speeds)
-            gains = [river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, len(speeds) / 2]
+            gains = [river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, river.tau, len(speeds) / 2]
             blocks.append(np.concatenate([gains, speeds, river.curve.packed()]))
         release = self.admission + self.hysteresis
         header = [float(self.form == "discrete"), 0.5 * self.sigma**-2, self.admission, release, len(blocks)]

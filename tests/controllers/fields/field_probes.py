@@ -1,0 +1,67 @@
+"""What several tests of fields use: an evaluation in a compiled loop, a hunt for jumps, a mass in a field."""
+
+import numpy as np
+from numba import njit
+
+from controllers.fields.program import evaluate
+from controllers.state import HandState
+
+
+@njit
+def run_over(ops, params, memory, hands, wrenches):
+    for i in range(len(hands)):
+        evaluate(ops, params, memory, hands[i], wrenches[i])
+
+
+@njit
+def glide(ops, params, memory, mass, period, push, path, velocity):
+    """A mass in a field, from path[0] at velocity[0], pushed by a force at each tick."""
+    hand, wrench = np.zeros(15), np.zeros(6)
+    hand[4] = 1.0
+    for k in range(len(path) - 1):
+        hand[0], hand[1:4], hand[8:11] = k * period, path[k], velocity[k]
+        evaluate(ops, params, memory, hand, wrench)
+        velocity[k + 1] = velocity[k] + period / mass * (wrench[:3] + push[k])
+        path[k + 1] = path[k] + period * velocity[k + 1]
+
+
+def force_of(program, hand):
+    """Force at the first tick of a run."""
+    wrenches = np.empty((1, 6))
+    run_over(program.ops, program.params, program.fresh_memory(), hand.vector()[None], wrenches)
+    return wrenches[0, :3]
+
+
+def mass_in(program, start, velocity, push, mass=0.1, period=1e-3):
+    """Path of a mass in a field, and the memory at its end."""
+    path, speed = np.zeros((len(push), 3)), np.zeros((len(push), 3))
+    path[0], speed[0] = start, velocity
+    memory = program.fresh_memory()
+    glide(program.ops, program.params, memory, mass, period, push, path, speed)
+    return path, memory
+
+
+def largest_jump(program, start, end, v=(0.0, 0.0, 0.0), t=0.0, samples=400, hunts=4):
+    """Largest jump of the force along a line: where it changes most, intervals are halved until a jump is left."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+
+    def force(s):
+        return force_of(program, HandState.at(start + s * (end - start), v, t))
+
+    places = np.linspace(0.0, 1.0, samples + 1)
+    values = np.array([force(s) for s in places])
+    steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    # Where the slope changes most a jump hides, not only where the slope is largest.
+    bends = np.abs(np.diff(steps, prepend=steps[0])) + np.abs(np.diff(steps, append=steps[-1]))
+    worst = 0.0
+    for k in {*np.argsort(steps)[-hunts:], *np.argsort(bends)[-hunts:]}:
+        low, high, a, b = places[k], places[k + 1], values[k], values[k + 1]
+        while (high - low) * np.linalg.norm(end - start) > 1e-13:
+            middle = 0.5 * (low + high)
+            m = force(middle)
+            if np.linalg.norm(m - a) > np.linalg.norm(b - m):
+                high, b = middle, m
+            else:
+                low, a = middle, m
+        worst = max(worst, float(np.linalg.norm(b - a)))
+    return worst

@@ -1,0 +1,326 @@
+"""Fields of higher order: which river takes a hand, at crossings of every kind."""
+
+import numpy as np
+import pytest
+from field_probes import force_of, largest_jump, mass_in, run_over
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controllers.curves.branches import BRANCHES, branches
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
+from controllers.fields.river import River
+from controllers.state import HandState
+from experiments.field_figures import SPEED, crossing, eight, straight_river
+from experiments.modes import ADMISSION, HYSTERESIS, SIGMA, river_bundle
+
+SCALE = (ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED)
+R, S, H = SCALE
+DRAG = 4.0
+
+
+def _bundle(*rivers):
+    return RiverBundle(rivers, tuple(f"river {i}" for i in range(len(rivers))))
+
+
+def _pair(degrees):
+    return _bundle(straight_river(0.0), straight_river(degrees))
+
+
+def _run(program, hands):
+    memory, wrenches = program.fresh_memory(), np.empty((len(hands), 6))
+    run_over(program.ops, program.params, memory, np.array([hand.vector() for hand in hands]), wrenches)
+    return wrenches[:, :3], memory
+
+
+def test_branches_are_the_minima_of_distance_within_the_ball():
+    rng = np.random.default_rng(0)
+    curve = Trajectory(*_eight_samples(), periodic=True)
+    blob, found, twice = curve.packed(), np.empty((BRANCHES, 2)), 0
+    phases = np.linspace(0.0, 4.0, 8001)[:-1]
+    for _ in range(400):
+        p = curve.point(rng.uniform(0, 4)) * rng.choice([0.05, 1.0]) + rng.normal(size=3) * 0.005
+        square = ((curve.point(phases) - p) ** 2).sum(1)
+        low = (square <= np.roll(square, 1)) & (square < np.roll(square, -1)) & (square < 0.012**2)
+        count = branches(blob, 0, *p, 0.012, found)
+        assert count == low.sum()
+        np.testing.assert_allclose(np.sort(found[:count, 0]) % 4.0, phases[low], atol=5.1e-4)
+        if count:
+            assert found[:count, 1].min() == pytest.approx(closest_phase(blob, 0, *p, np.nan)[1], abs=1e-11)
+        twice += count == 2
+    assert twice > 20
+
+
+def _eight_samples():
+    angle = np.linspace(0.0, 2.0 * np.pi, 129)
+    points = np.stack((0.06 * np.sin(angle), 0.04 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
+    points[-1] = points[0]
+    return 4.0 * angle / (2.0 * np.pi), points
+
+
+def test_a_ball_over_the_whole_curve_has_one_branch_and_one_across_the_seam_is_one():
+    circle, found = Trajectory.circle(0.05, 4.0), np.empty((BRANCHES, 2))
+    blob = circle.packed()
+    for phase in (0.0, 1e-9, 4.0 - 1e-9, 0.01, 1.0):
+        for radius in (0.01, np.inf):
+            p = circle.point(phase) * 1.05
+            assert branches(blob, 0, *p, radius, found) == 1
+            np.testing.assert_allclose(circle.point(found[0, 0]), circle.point(phase), atol=1e-7)
+    assert branches(blob, 0, np.nan, 0.0, 0.0, 0.01, found) == 0
+    assert branches(blob, 0, 0.07, 0.0, 0.0, 0.01, found) == 0
+
+
+def _reference(rivers, p, v, admission, sigma):
+    """The smooth field by its formula, in NumPy, for circles and straight lines through densely sampled phases."""
+    null, total, force = np.exp(-(admission**2) / (2 * sigma**2)), 0.0, np.zeros(3)
+    for river in rivers:
+        t = np.linspace(river.curve.start, river.curve.end, 200001)
+        square = ((river.curve.point(t) - p) ** 2).sum(1)
+        k = square.argmin()
+        w = max(0.0, 1.0 - square[k] / river.epsilon**2) ** 3
+        x = river.curve.velocity(t[k])
+        e, y = v - x, (river.curve.point(t[k]) - p) / river.tau
+        a = w * np.exp(-(e @ e - (e @ y) ** 2 / (y @ y + x @ x)) / (2 * sigma**2))
+        total += a
+        force += a * w * (river.drag / river.tau * (river.curve.point(t[k]) - p) + river.drag * (x - v))
+    return force / (null + total)
+
+
+def test_the_smooth_field_is_its_formula():
+    rng = np.random.default_rng(1)
+    rivers = (straight_river(0.0), straight_river(40.0), River(Trajectory.circle(0.05, 4.0), 0.03, 0.02, 3.0))
+    field = HigherOrder(_bundle(*rivers), *SCALE)
+    for _ in range(20):
+        p, v = rng.uniform(-0.03, 0.03, 3) * [1, 1, 0.3], rng.normal(scale=0.06, size=3)
+        expected = _reference(rivers, p, v, R, S)
+        np.testing.assert_allclose(field.wrench(HandState.at(p, v)).force, expected, atol=2e-4)
+
+
+def test_at_crossings_a_hand_on_river_1_feels_the_documented_share_of_river_2():
+    for degrees in range(0, 181, 5):
+        row = crossing(float(degrees))
+        gap = 2.0 * SPEED * np.sin(np.radians(degrees) / 2.0)
+        a, null = np.exp(-(gap**2) / (2 * S**2)), np.exp(-(R**2) / (2 * S**2))
+        assert row.both == pytest.approx(DRAG * gap, abs=1e-9)
+        assert row.smooth == pytest.approx(DRAG * gap * a / (1.0 + a + null), rel=1e-6, abs=1e-12)
+        assert row.discrete < 1e-12
+        assert row.alone == pytest.approx(DRAG * gap if gap < R else 0.0, abs=1e-9)
+        if degrees >= 90:
+            assert row.smooth < 1e-5
+
+
+def _mismatch(river, hand):
+    """Of a straight river through the origin."""
+    x = river.curve.velocity(0.8)
+    e, y = hand.v - x, (x * (x @ hand.p) / (x @ x) - hand.p) / river.tau
+    return np.sqrt(e @ e - (e @ y) ** 2 / (y @ y + x @ x))
+
+
+def test_the_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
+    rng = np.random.default_rng(2)
+    compared = 0
+    for _ in range(200):
+        bundle = _pair(rng.uniform(20.0, 160.0))
+        hand = HandState.at(rng.uniform(-0.008, 0.008, 3), rng.normal(scale=0.07, size=3))
+        discrete = HigherOrder(bundle, R, S, 0.0, "discrete").wrench(hand).force
+        gaps = sorted([*(_mismatch(r, hand) for r in bundle.rivers), R])
+        if gaps[1] - gaps[0] < 5e-3:
+            continue
+        compared += 1
+        errors = [np.linalg.norm(HigherOrder(bundle, R, s).wrench(hand).force - discrete) for s in (3e-2, 1e-3)]
+        assert errors[1] < 0.03 * max(errors[0], 1e-3)
+    assert compared > 100
+
+
+def test_direction_and_speed_decide():
+    bundle = _bundle(straight_river(0.0))
+    field = HigherOrder(bundle, 0.3 * SPEED, 0.05 * SPEED, 0.0, "discrete")
+    off = [0.0, 0.004, 0.0]
+    assert np.linalg.norm(field.wrench(HandState.at(off, [SPEED, 0, 0])).force) > 0.1
+    for v in ([0.6 * SPEED, 0, 0], [1.4 * SPEED, 0, 0], [-SPEED, 0, 0], [0, SPEED, 0], [0, 0, 0]):
+        assert not field.wrench(HandState.at(off, v)).force.any()
+
+
+@pytest.mark.parametrize("form", ["smooth", "discrete"])
+def test_a_river_takes_the_speeds_that_it_admits_at_each_phase(form):
+    line = straight_river(0.0)
+    river = River(line.curve, drag=DRAG, speeds=[[0.02, 0.03], [0.10, 0.20]])
+    field = HigherOrder(_bundle(river), 0.01, 0.001, 0.0, form)
+    for share in (0.1, 0.5, 0.9):
+        p = line.curve.point(1.6 * share) + np.array([0.0, 0.003, 0.0])
+        least, greatest = 0.02 + 0.08 * share, 0.03 + 0.17 * share
+        for speed, taken in ((least - 0.015, 0), (least, 1), (greatest, 1), (greatest + 0.015, 0)):
+            force = np.linalg.norm(field.wrench(HandState.at(p, [speed, 0, 0])).force)
+            assert (force > 0.05) == taken
+
+
+def test_hysteresis_keeps_a_hand_between_admission_and_release():
+    program = HigherOrder(_bundle(straight_river(0.0)), 0.02, 1.0, 0.01, "discrete").program()
+    speeds = SPEED + np.array([0.025, 0.015, 0.025, 0.035, 0.025, 0.015])
+    forces, memory = _run(program, [HandState.at([0, 0.003, 0], [s, 0, 0]) for s in speeds])
+    taken = np.linalg.norm(forces, axis=1) > 0.0
+    assert taken.tolist() == [False, True, True, False, False, True]
+    assert memory[TRACE_RIVER] == 0.0
+
+
+def test_nearly_parallel_rivers_discrete_the_one_that_has_the_hand_keeps_it_to_the_edge_of_its_tube():
+    bundle = _pair(4.0)
+    program = HigherOrder(bundle, *SCALE, "discrete").program()
+    x, second = straight_river(0.0).curve.velocity(0.8), straight_river(4.0).curve
+    # From the crossing a hand is carried along river 2 for 0.7 s, then off to where only river 2 is.
+    hands = [HandState.at(second.point(t), x) for t in np.linspace(0.8, 1.5, 50)]
+    forces, memory = _run(program, hands)
+    assert memory[TRACE_RIVER] == 0.0
+    assert (np.linalg.norm(forces, axis=1) < 3.0).all()
+    over = [HandState.at([0.05, y, 0.0], x) for y in np.linspace(0.0, 0.022, 30)]
+    _, memory = _run(program, over)
+    assert memory[TRACE_RIVER] == 1.0
+
+
+def test_opposite_rivers_do_not_feel_each_other():
+    row = crossing(180.0)
+    assert row.discrete == 0.0
+    assert row.smooth < 1e-9
+    back = HigherOrder(_pair(180.0), *SCALE, "discrete").program()
+    _, memory = _run(back, [HandState.at([0, 0, 0], straight_river(180.0).curve.velocity(0.8))])
+    assert memory[TRACE_RIVER] == 1.0
+
+
+def test_coincident_rivers_are_felt_as_one():
+    river = straight_river(0.0)
+    hand = HandState.at([0.01, 0.004, 0.0], [0.9 * SPEED, 0.0, 0.01])
+    one, three = (HigherOrder(_bundle(*[river] * n), *SCALE) for n in (1, 3))
+    alone = one.wrench(hand).force
+    # Only the null weight is shared out anew.
+    np.testing.assert_allclose(three.wrench(hand).force, alone, rtol=1e-3)
+    discrete = HigherOrder(_bundle(river, river), *SCALE, "discrete")
+    np.testing.assert_allclose(discrete.wrench(hand).force, river.wrench(hand).force, atol=1e-15)
+
+
+@pytest.mark.parametrize("form", ["smooth", "discrete"])
+def test_a_mass_runs_straight_through_the_crossing_of_a_figure_of_eight(form):
+    curve = eight()
+    program = HigherOrder(_bundle(River(curve, 0.012, 0.013, DRAG)), *(2.0 * s for s in SCALE), form).program()
+    path, memory = mass_in(program, curve.point(0.0), curve.velocity(0.0), np.zeros((8000, 3)))
+    # Two laps later it is where the river would have carried it.
+    assert memory[TRACE_PHASE] == pytest.approx(0.0, abs=0.05) or memory[TRACE_PHASE] == pytest.approx(4.0, abs=0.05)
+    quarter = path[2000:4000, 0]
+    assert path[:2000, 0].min() > -0.004
+    assert quarter.max() < 0.004
+    assert memory[TRACE_DISTANCE] < 1e-3
+
+
+def _carried_along_the_wave(form, lift):
+    """Memory and last point of a mass that starts on the wave and is pushed up at its crest, 1.5 s later."""
+    bundle = river_bundle(Trajectory.circle(0.0477, 4.0), 0.025, 4.0 / 300.0, 4.0, 0.012)
+    wave, push = bundle["wave"].curve, np.zeros((1500, 3))
+    # The wave touches the highest river at its crest, at 0.5 s, and is lowest at 1.5 s.
+    push[450:700, 2] = lift
+    path, memory = mass_in(
+        HigherOrder(bundle, *SCALE, form).program(), wave.point(0.0), wave.velocity(0.0), push
+    )  # fmt: skip
+    return memory, path[-1]
+
+
+def test_at_a_tangential_crossing_a_hand_can_change_over_and_without_a_push_it_does_not():
+    memory, end = _carried_along_the_wave("discrete", 0.0)
+    assert memory[TRACE_RIVER] == 1.0
+    assert end[2] == pytest.approx(-0.015, abs=3e-4)
+    memory, end = _carried_along_the_wave("discrete", 0.5)
+    assert memory[TRACE_RIVER] == 2.0
+    assert end[2] == pytest.approx(0.015, abs=3e-4)
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.3, 0.6])
+def test_the_smooth_field_blends_rivers_that_touch_and_does_not_throw_the_hand_out(lift):
+    memory, _ = _carried_along_the_wave("smooth", lift)
+    assert memory[TRACE_RIVER] >= 0.0
+    assert memory[TRACE_DISTANCE] < 0.005
+
+
+@pytest.mark.parametrize("form", ["smooth", "discrete"])
+def test_a_hand_that_springs_back_to_its_river_is_not_let_go_for_its_speed(form):
+    circle = Trajectory.circle(0.05, 4.0)
+    program = HigherOrder(_bundle(River(circle, 0.02, 4.0 / 300.0, DRAG)), *SCALE, form).program()
+    away = circle.point(0.0) + np.array([0.006, 0.0, 0.004])
+    path, memory = mass_in(program, away, circle.velocity(0.0), np.zeros((1000, 3)))
+    # It comes back with more than twice the speed of the current.
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() / 1e-3 > 2.0 * SPEED
+    assert memory[TRACE_RIVER] == 0.0
+    assert memory[TRACE_DISTANCE] < 2e-4
+
+
+def test_the_smooth_field_has_no_jump_along_lines_through_edges_centres_and_crossings():
+    rng = np.random.default_rng(5)
+    bundles = [
+        _bundle(straight_river(0.0), straight_river(70.0), straight_river(110.0)),
+        _bundle(River(eight(), 0.012, 0.02, 4.0), straight_river(20.0)),
+    ]
+    for bundle in bundles:
+        program = HigherOrder(bundle, *SCALE).program()
+        for _ in range(8):
+            direction = rng.normal(size=3)
+            direction *= 0.05 / np.linalg.norm(direction)
+            centre = rng.uniform(-0.01, 0.01, 3)
+            v = rng.normal(scale=SPEED, size=3)
+            assert largest_jump(program, centre - direction, centre + direction, v) < 1e-9
+
+
+def test_the_smooth_field_is_continuous_in_velocity():
+    program = HigherOrder(_pair(60.0), *SCALE).program()
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        v, u = rng.normal(scale=SPEED, size=(2, 3))
+        u *= 1e-12 / np.linalg.norm(u)
+        p = rng.uniform(-0.008, 0.008, 3)
+        pair = [force_of(program, HandState.at(p, v + s * u)) for s in (0.0, 1.0)]
+        assert np.linalg.norm(pair[1] - pair[0]) < 1e-9
+
+
+RING = Trajectory.circle(0.05, 4.0)
+_HALT = Trajectory([0.0, 1.0, 2.0, 3.0], [[0, 0, 0], [0.02, 0, 0], [0.02, 0, 0], [0.04, 0.01, 0]])
+FIELDS = [
+    HigherOrder(_bundle(River(RING), River(RING, np.inf), River(_HALT), River(eight())), *SCALE, form)
+    for form in ("smooth", "discrete")
+]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.tuples(*[st.floats(-1e9, 1e9)] * 3), st.tuples(*[st.floats(-1e3, 1e3)] * 3))
+def test_it_is_finite_everywhere(p, v):
+    for field in FIELDS:
+        assert np.isfinite(field.wrench(HandState.at(p, v)).force).all()
+
+
+def test_it_is_finite_on_the_medial_axis_at_rest_and_where_samples_coincide():
+    for field in FIELDS:
+        for p in ([0, 0, 0], [0, 0, 0.01], [0.05, 0, 0], [0.02, 0, 0], [0.0201, 0, 0], [1e12, 0, 0]):
+            for v in ([0, 0, 0], [SPEED, 0, 0], [1e9, 0, 0]):
+                assert np.isfinite(field.wrench(HandState.at(p, v)).force).all()
+
+
+def test_a_hand_that_is_not_finite_gives_no_number():
+    for field in FIELDS:
+        assert np.isnan(field.wrench(HandState.at([np.nan, 0, 0])).force).all()
+        assert np.isnan(field.wrench(HandState.at([0.05, 0, 0], [np.inf, 0, 0])).force).all()
+
+
+def test_from_python_it_is_the_compiled_loops_to_the_last_bit():
+    rng = np.random.default_rng(7)
+    for field in FIELDS:
+        for _ in range(50):
+            hand = HandState.at(RING.point(rng.uniform(0, 4)) + rng.normal(size=3) * 0.005, rng.normal(size=3) * 0.08)
+            np.testing.assert_array_equal(field.wrench(hand).force, force_of(field.program(), hand))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [((0.0, 1.0), "admission"), ((1.0, 0.0), "sigma"), ((1.0, 1.0, -1.0), "hysteresis"), ((1, 1, 0, "odd"), "odd")],
+)
+def test_bad_numbers_of_a_higher_order_field_are_refused(options, says):
+    with pytest.raises(ParameterError, match=says):
+        HigherOrder(_pair(90.0), *options)

@@ -1,0 +1,137 @@
+"""Rivers: what the flow does, how long it takes, and that its force is FOLLOW."""
+
+import numpy as np
+import pytest
+from field_probes import force_of, largest_jump
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.follow import Follow
+from controllers.fields.river import River, integrate, settling_time
+from controllers.state import HandState
+
+CIRCLE = Trajectory.circle(0.05, 4.0)
+
+
+def _knot() -> Trajectory:
+    """A closed curve whose speed and curvature change all the time; its reach is 16 mm."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 65)
+    radius = 0.05 + 0.008 * np.cos(3.0 * angle)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.02 * np.sin(2.0 * angle)], axis=1)
+    points[-1] = points[0]
+    return Trajectory(angle, points, periodic=True)
+
+
+RIVERS = [River(CIRCLE, 0.03, 0.02), River(_knot(), 0.012, 0.05)]
+
+
+@pytest.mark.parametrize("river", RIVERS, ids=["circle", "knot"])
+def test_from_a_point_of_the_curve_the_integral_curve_is_the_curve_itself(river):
+    start = 0.3
+    course = integrate(river.flow, river.curve.point(start), np.linspace(0.0, river.curve.duration, 201))
+    away = np.linalg.norm(course.points - river.curve.point(start + course.times), axis=1)
+    assert away.max() < 1e-6
+
+
+@pytest.mark.parametrize("river", RIVERS, ids=["circle", "knot"])
+def test_from_within_the_tube_the_flow_is_at_the_curve_after_the_derived_time(river):
+    rng = np.random.default_rng(1)
+    assert river.curve.reach > river.epsilon
+    for _ in range(50):
+        phase, share = rng.uniform(0.0, river.curve.duration), rng.uniform(0.1, 0.97)
+        tangent = river.curve.velocity(phase)
+        normal = np.cross(tangent, rng.normal(size=3))
+        distance = share * river.epsilon
+        start = river.curve.point(phase) + distance * normal / np.linalg.norm(normal)
+        time = settling_time(distance, 1e-3, river.epsilon, river.tau)
+        course = integrate(river.flow, start, [0.0, time])
+        dense = river.curve.point(np.linspace(0.0, river.curve.duration, 20001))
+        left = np.linalg.norm(dense - course.points[-1], axis=1).min()
+        # Not a bound only: ḋ = −w d/τ is the same for every curve, so the time is exact.
+        assert left == pytest.approx(1e-3, abs=2e-6)
+
+
+def test_settling_time_is_the_integral_of_its_differential_equation():
+    d0, d1, epsilon, tau = 0.017, 0.001, 0.02, 0.05
+    d = np.geomspace(d1, d0, 200001)
+    rate = (1.0 - (d / epsilon) ** 2) ** 3 * d / tau
+    assert settling_time(d0, d1, epsilon, tau) == pytest.approx(np.trapezoid(1.0 / rate, d), rel=1e-8)
+    with pytest.raises(ParameterError, match="only if"):
+        settling_time(0.02, 0.001, 0.02, 0.05)
+
+
+def test_outside_its_tube_a_river_does_not_flow_and_is_not_felt():
+    river = RIVERS[0]
+    p = np.array([0.081, 0.0, 0.0])
+    assert not river.flow(0.0, p).any()
+    assert not river.wrench(HandState.at(p, [0.3, 0.1, 0.2])).force.any()
+
+
+def test_as_a_force_a_river_is_what_a_viscous_current_does_and_thus_follow():
+    rng = np.random.default_rng(2)
+    river = River(_knot(), 0.03, 0.02, 5.0)
+    follow = Follow(river.curve, 250.0, 5.0, 0.03)
+    for _ in range(50):
+        p = river.curve.point(rng.uniform(0, 6)) + rng.uniform(-0.01, 0.01, 3)
+        v = rng.normal(scale=0.1, size=3)
+        phase_distance = np.linalg.norm(river.curve.point(np.linspace(0, 2 * np.pi, 50001)) - p, axis=1).min()
+        w = max(0.0, 1.0 - (phase_distance / 0.03) ** 2) ** 3
+        np.testing.assert_allclose(river.wrench(HandState.at(p, v)).force, 5.0 * (river.flow(0, p) - w * v), atol=1e-6)
+        np.testing.assert_array_equal(river.wrench(HandState.at(p, v)).force, follow.wrench(HandState.at(p, v)).force)
+
+
+def test_the_force_of_a_river_and_of_a_bundle_has_no_jump_along_lines_through_tube_edge_and_centre():
+    rng = np.random.default_rng(3)
+    bundle = RiverBundle(tuple(RIVERS), ("circle", "knot")).program()
+    for program, epsilon in ((RIVERS[0].program(), 0.03), (bundle, 0.03)):
+        for _ in range(8):
+            centre = CIRCLE.point(rng.uniform(0, 4))
+            # A direction that leaves the tube without meeting the axis of the circle, its medial axis.
+            direction = np.cross(rng.normal(size=3), centre)
+            direction *= 1.4 * epsilon / np.linalg.norm(direction)
+            assert largest_jump(program, centre - direction, centre + direction, rng.normal(size=3) * 0.1) < 1e-9
+
+
+def test_a_bundle_is_the_sum_of_its_rivers_and_finds_them_by_name():
+    bundle = RiverBundle(tuple(RIVERS), ("circle", "knot"))
+    hand = HandState.at([0.05, 0.01, 0.005], [0.1, 0.0, 0.0])
+    total = RIVERS[0].wrench(hand).force + RIVERS[1].wrench(hand).force
+    assert np.linalg.norm(RIVERS[1].wrench(hand).force) > 0.01
+    np.testing.assert_array_equal(bundle.wrench(hand).force, total)
+    np.testing.assert_array_equal(force_of(bundle.program(), hand), total)
+    np.testing.assert_array_equal(bundle.flow(0.0, hand.p), RIVERS[0].flow(0, hand.p) + RIVERS[1].flow(0, hand.p))
+    assert bundle["knot"] is RIVERS[1]
+    with pytest.raises(ParameterError, match=r"no river 'brook'.*circle, knot"):
+        bundle["brook"]
+    with pytest.raises(ParameterError, match="a name of its own"):
+        RiverBundle(tuple(RIVERS), ("same", "same"))
+
+
+def test_a_bundle_comes_back_from_its_arrays_to_the_last_bit():
+    path = Trajectory([0.0, 0.5, 1.0], [[0, 0, 0], [0.02, 0.01, 0], [0.05, 0, 0.01]], ends="clamped")
+    rivers = (*RIVERS, River(path, 0.01, 0.1, 2.0, [[0.01, 0.05], [0.02, 0.1]]))
+    bundle = RiverBundle(rivers, ("circle", "knot", "a/path"))
+    arrays = bundle.arrays()
+    again = RiverBundle.from_arrays(arrays)
+    assert again.names == bundle.names
+    np.testing.assert_array_equal(again.program().params, bundle.program().params)
+    np.testing.assert_array_equal(again["a/path"].speeds, rivers[2].speeds)
+    del arrays["knot/times"]
+    with pytest.raises(ParameterError, match="'knot' of the bundle lacks times"):
+        RiverBundle.from_arrays(arrays)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"tau": 0.0}, "tau must be finite and at least 0.0001 s"),
+        ({"epsilon": -1.0}, "epsilon"),
+        ({"drag": np.nan}, "drag"),
+        ({"speeds": [[0.1, 0.2]]}, r"shape \(m, 2\), m ≥ 2; their shape is \(1, 2\)"),
+        ({"speeds": [[0.1, 0.2], [0.2, 0.1]]}, "row 1"),
+    ],
+)
+def test_bad_numbers_of_a_river_are_refused(options, says):
+    with pytest.raises(ControllerError, match=says):
+        River(CIRCLE, **options)
