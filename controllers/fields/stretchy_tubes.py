@@ -175,7 +175,7 @@ class StretchyTubes:
     commits. A press on the curve that carries the stylus less than 1 mm is a click: a short one (under 0.4 s) undoes
     the last edit, a longer one makes it again.
 
-    F leaps at the switch (unless k_f = k_s) and nowhere else within the curve's reach.
+    F leaps at the switch (unless k_f = k_s) and nowhere else within the curve's reach, open ends excepted.
 
     Parameters
     ----------
