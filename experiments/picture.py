@@ -16,7 +16,7 @@ from sim.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
-WIDTH, HEIGHT = 1760, 720
+WIDTH, HEIGHT = 1440, 600
 DEVICE_SHARE = 0.36  # of the width
 MOMENTS = 5  # of the figure, evenly over the second half of the run
 SPACING = 1.25  # between them [m]
