@@ -29,7 +29,7 @@ _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", 
 
 
 def summarise(
-    recording: Recording, default_poses: Callable[[Array], Array], speed: SpeedSummary, warnings: dict[str, int]
+    recording: Recording, default_poses: Callable[[Array, Array], Array], speed: SpeedSummary, warnings: dict[str, int]
 ) -> RunSummary:
     """Measure a run, in memory that does not grow with it.
 
@@ -39,7 +39,7 @@ def summarise(
         With the channels of `sim.loop.groups`, and arrays ``curve_span`` (start and end of the phase), ``curve_closed``
         and ``body_weight``.
     default_poses : callable
-        Poses of the map at points of the curve, (k, 3) → (k, 75); called in order of time.
+        Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,); called in order of time.
     speed, warnings
         Taken over.
     """
@@ -53,7 +53,9 @@ def summarise(
         frames = {name: channel[start : start + BLOCK_FRAMES] for name, channel in recording.groups["frames"].items()
                   if name in _FRAMES}  # fmt: skip
         pushed = path.add(ticks)
-        animation.add(frames, default_poses(ticks["nearest"][::per_frame]), pushed[::per_frame])
+        animation.add(
+            frames, default_poses(ticks["nearest"][::per_frame], ticks["phase"][::per_frame]), pushed[::per_frame]
+        )
         figure.add(frames)
     return RunSummary(path.summary(), animation.summary(), figure.summary(), speed, warnings)
 

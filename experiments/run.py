@@ -6,7 +6,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import cast
 
@@ -15,9 +15,11 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.measures import BLOCK_FRAMES, summarise
+from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
 from experiments.summary import RunSummary, SpeedSummary
-from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from experiments.wiring import STRETCHING, RunConfig, Session, load_clips, stylus_path, wire
 from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model
@@ -29,7 +31,7 @@ from sim.recorder import Recorder
 from sim.recording import Recording
 from sim.reference import poses_along
 from sim.servo import FrameLog, TickLog
-from sim.users.intent import Push
+from sim.users.intent import Grab, Push
 from sim.viewer.page import LivePage, NullPage, Page
 
 Array = npt.NDArray[np.float64]
@@ -104,7 +106,7 @@ def check_folder(out: Path, overwrite: bool) -> None:
 def clear_folder(out: Path) -> None:
     """Make the folder, and remove what an earlier run left in it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, SUMMARY, REPORT, EDITED, DEFAULT):
+    for name in (RECORDING, SUMMARY, REPORT, EDITED, DEFAULT, CURVE_FILE):
         (out / name).unlink(missing_ok=True)
     shutil.rmtree(out / FIGURES, ignore_errors=True)
 
@@ -126,6 +128,7 @@ def config_of(recording: Recording) -> RunConfig:
     try:
         values["scene"] = SceneConfig(**values["scene"])  # pyright: ignore[reportCallIssue]
         values["pushes"] = tuple(Push(**push) for push in values["pushes"])  # pyright: ignore
+        values["grabs"] = tuple(Grab(**grab) for grab in values["grabs"])  # pyright: ignore
         values["clips"] = tuple(values["clips"])  # pyright: ignore[reportArgumentType]
         return RunConfig(**values)  # pyright: ignore[reportArgumentType]
     except (TypeError, KeyError) as error:
@@ -181,14 +184,21 @@ def _peak_memory_mb() -> float:
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     with Recording(out / RECORDING) as recording:
-        return summarise(recording, default_poses(session), speed, session.world.warnings())
+        summary = summarise(recording, default_poses(session), speed, session.world.warnings())
+    if not isinstance(session.field, StretchyTubes):
+        return summary
+    memory = session.servo.field.memory
+    save_curve(session.field.edited(memory), out / CURVE_FILE)
+    return replace(summary, stretch=stretch_summary(session.field, memory))
 
 
-def default_poses(session: Session) -> Callable[[Array], Array]:
-    """The animation of the curve itself: the map at its points, (k, 3) → (k, 75), lap after lap."""
+def default_poses(session: Session) -> Callable[[Array, Array], Array]:
+    """The animation of the curve as it was given: the map at nearest points (k, 3) of phases (k,), lap after lap."""
     kind, params, memory = session.haptic_map.compiled()
 
-    def poses_at(points: Array) -> Array:
+    def poses_at(nearest: Array, phases: Array) -> Array:
+        # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.
+        points = session.curve.point(phases) if session.config.mode in STRETCHING else nearest
         poses = np.empty((len(points), session.haptic_map.nq))
         poses_along(kind, params, memory, stylus_path(points), poses)
         return poses
@@ -199,32 +209,33 @@ def default_poses(session: Session) -> Callable[[Array], Array]:
 def _write_animations(out: Path, session: Session) -> None:
     """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
     with Recording(out / RECORDING) as recording:
-        reference, nearest = recording.channel("frames", "reference"), recording.channel("ticks", "nearest")
+        reference = recording.channel("frames", "reference")
+        nearest, phase = recording.channel("ticks", "nearest"), recording.channel("ticks", "phase")
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))
         fps = recording.rates["frames"] / stride
         n = -(-len(reference) // stride)
         per_frame = stride * session.servo.figure_ticks
         poses_at = default_poses(session)
         starts = range(0, n, BLOCK_FRAMES)
+        blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
         write_bvh_blocks(
             out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
         )
-        write_bvh_blocks(
-            out / DEFAULT,
-            n,
-            fps,
-            (poses_at(nearest[k * per_frame : (k + BLOCK_FRAMES) * per_frame : per_frame]) for k in starts),
-        )
+        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(nearest[rows], phase[rows]) for rows in blocks))
 
 
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording, also of a run that was cut short."""
     from experiments.figures import draw_figures
     from experiments.report import write_report
+    from experiments.stretch_figure import draw_stretch
 
     with Recording(folder / RECORDING) as recording:
         config = config_of(recording)
         figures = draw_figures(recording, folder / FIGURES)
+        if (folder / CURVE_FILE).exists():
+            figures.insert(0, folder / FIGURES / "stretch.png")
+            draw_stretch(recording, folder, figures[0])
         title = f"{config.mode.upper()} over {', '.join(Path(clip).stem for clip in config.clips)}"
         write_report(folder / REPORT, recording, world_model(config.scene), title, _lines(recording), figures)
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from experiments.stretch import StretchSummary
+
 
 @dataclass(frozen=True)
 class PushSummary:
@@ -111,13 +113,14 @@ class SpeedSummary:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it; `lines` says it in five sentences."""
+    """All of it; `lines` says it in five sentences, or six where the curve was bent."""
 
     path: PathSummary
     animation: AnimationSummary
     figure: FigureSummary
     speed: SpeedSummary
     warnings: dict[str, int]
+    stretch: StretchSummary | None = None
 
     def lines(self) -> list[str]:
         """What happened, a sentence each."""
@@ -126,7 +129,9 @@ class RunSummary:
             f"{push.peak_force:.1f} N at {push.start:.1f} s moved it {push.deviation_mm:.1f} mm" for push in path.pushes
         )
         warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
+        bent = [] if self.stretch is None else [self.stretch.line()]
         return [
+            *bent,
             f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "

@@ -16,7 +16,9 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.safety import ForceLimiter
-from experiments.modes import law
+from experiments.modes import Field, law
+from experiments.stretch import law as stretch_law
+from experiments.stretch import stretch_grabs
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
 from models.mocap.clip import Clip
@@ -27,14 +29,16 @@ from sim.devices.phantom_port import phantom_port
 from sim.figure import Figure
 from sim.plant import make_hand, make_plant
 from sim.reference import make_reference, poses_along
-from sim.servo import Field, Servo
+from sim.servo import Field as CompiledField
+from sim.servo import Servo
 from sim.users.arm import Arm
-from sim.users.intent import Push
+from sim.users.intent import Grab, Push
 from sim.world import World, phantom_angles
 
 Array = npt.NDArray[np.float64]
 
-PUSH_FORCE = 4.0  # of the hand that pushes [N]; the motors can hold 1.5 N for ever, and this for a while
+PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
+STRETCHING = ("stretch", "stretch-then-follow")
 MOST_PACE = 1.4  # times the clips' own that passes without a word
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
 
@@ -49,7 +53,7 @@ class RunConfig:
         Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
         or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
         upper body inside, upper body outside.
-    mode : {"follow", "bunny", "rivers"}
+    mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow"}
         Field of force.
     map : {"cylindrical", "composite"}
         Haptic map: four clips round a cylinder, or the lower body of one clip and the upper body blended between two.
@@ -75,6 +79,14 @@ class RunConfig:
         Radius ε of the rivers [m].
     crossing : {"smooth", "discrete", "sum"}
         How crossing rivers share the hand: by its velocity, smoothly or with hysteresis, or not at all.
+    seek : float
+        k_f, with which stretchy tubes draw the hand to the curve [N/m].
+    rubber : float
+        k_s of a held or pushed tube [N/m].
+    rubber_tube : float
+        Radius of the tube that can be held and pushed [m].
+    bump : float
+        Half width of what a bend changes [s], at most half a lap.
     lap : float
         Time of a lap of the curve [s].
     radius : float
@@ -91,10 +103,12 @@ class RunConfig:
         Figure's size, servo period and physics step.
     pushes : tuple of Push
         What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on.
+    grabs : tuple of Grab
+        What it takes hold of; in the modes that stretch, by default, a tour of what can be done.
     """
 
     clips: tuple[str, ...] = FIGURE_CLIPS
-    mode: Literal["follow", "bunny", "rivers"] = "follow"
+    mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
     map: Literal["cylindrical", "composite"] = "cylindrical"
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
@@ -107,6 +121,10 @@ class RunConfig:
     bunny_pace: Literal["clock", "wait"] = "wait"
     river_tube: float = 0.02
     crossing: Literal["smooth", "discrete", "sum"] = "smooth"
+    seek: float = 150.0
+    rubber: float = 150.0
+    rubber_tube: float = 0.008
+    bump: float = 0.5
     lap: float = 4.0
     radius: float = 0.0477
     reach: float = 0.025
@@ -115,6 +133,7 @@ class RunConfig:
     figure_ticks: int = 10
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
+    grabs: tuple[Grab, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -125,6 +144,7 @@ class Session:
     clips: tuple[Clip, ...]
     remarks: tuple[str, ...]
     curve: Trajectory
+    field: Field
     haptic_map: AnimationMap
     world: World
     figure: Figure
@@ -188,10 +208,12 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     least = 2 * config.figure_ticks * config.scene.servo_period
     if not least <= config.seconds < np.inf:
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
-    for name in ("lap", "radius", "reach"):
+    for name in ("lap", "radius", "reach", "bump"):
         value = getattr(config, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} is {value}; expected a positive, finite number")
+    if config.bump > 0.5 * config.lap:
+        raise ParameterError(f"bump is {config.bump} s; expected at most half a lap, {0.5 * config.lap:g} s")
     world = World(config.scene)
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
@@ -205,22 +227,24 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
     world.reset(start, poses[0])
     figure = Figure(world.model, world.data, world.figure, FIGURE)
-    program = law(config, curve).program()
+    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
+    field = stretch_law(config, curve, grabs) if config.mode in STRETCHING else law(config, curve)
+    program = field.program()
     limiter = ForceLimiter(period)
     servo = Servo(
         plant=make_plant(world),
         port=phantom_port(world.model, world.data, period, config.cutoff),
-        field=Field(
+        field=CompiledField(
             ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
             limiter=limiter.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
         ),
-        hand=make_hand(_user(config, curve)),
+        hand=make_hand(_user(config, curve, grabs)),
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
     remarks += _pace_remark(config.lap, haptic_map.lap_seconds)
-    return Session(config, clips, remarks, curve, haptic_map, world, figure, servo)
+    return Session(config, clips, remarks, curve, field, haptic_map, world, figure, servo)
 
 
 def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
@@ -262,20 +286,22 @@ def stylus_path(points: Array) -> Array:
     return np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))))
 
 
-def _user(config: RunConfig, curve: Trajectory) -> Arm:
+def _user(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Arm:
     pushes = config.pushes
     if config.user == "push" and not pushes:
         laps = range(1, max(2, int(config.seconds / config.lap)))
         pushes = tuple(push for lap in laps for push in lap_pushes(lap * config.lap, config.lap))
+    if config.user == "trace" and grabs:
+        raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
     if config.user == "trace":
         times = np.arange(0.0, config.seconds, 0.01)
         return Arm(path=curve.point(times % config.lap), period=0.01, pushes=pushes)
-    return Arm(pushes=pushes)
+    return Arm(pushes=pushes, grabs=grabs)
 
 
-def lap_pushes(start: float, lap: float) -> tuple[Push, Push]:
-    """A push outwards and one inwards in the lap that begins at a time [s]."""
+def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
+    """A push outwards and one inwards [N] in the lap that begins at a time [s]."""
     return (
-        Push(start + 0.1 * lap, 0.3 * lap, PUSH_FORCE),
-        Push(start + 0.6 * lap, 0.3 * lap, -PUSH_FORCE),
+        Push(start + 0.1 * lap, 0.3 * lap, force),
+        Push(start + 0.6 * lap, 0.3 * lap, -force),
     )

@@ -66,9 +66,9 @@ def groups(servo: Servo) -> dict[str, Group]:
     ticks = Group(
         1.0 / plant.period,
         {
-            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "field": (6,), "force": (3,),
-            "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "ctrl": (len(plant.ctrl),),
-            "applied": (plant.substeps, 3), "residual": (6,),
+            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
+            "force": (3,), "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (),
+            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, 3), "residual": (6,),
         },
     )  # fmt: skip
     frames = Group(
@@ -188,6 +188,7 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
     hand, trace = ticks.hand[:n], ticks.trace[:n]
     return {
         "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
+        "switch": hand[:, 14],
         "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
         "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
         "distance": trace[:, TRACE_DISTANCE], "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n],

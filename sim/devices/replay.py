@@ -2,7 +2,6 @@
 
 from typing import Self
 
-
 from controllers.state import HandState, Vec3
 from sim.devices.base import DeviceError, checked_force
 from sim.recording import Recording
@@ -42,7 +41,8 @@ class ReplayDevice:
         if self._tick >= self._length:
             raise DeviceError(f"the recording ends after {self._length} ticks ({self._length * self._period:g} s)")
         row, k = self._ticks, self._tick
-        return HandState(float(row["t"][k]), row["p"][k], row["quaternion"][k], row["v"][k], row["omega"][k])
+        pressed = bool(row["switch"][k])
+        return HandState(float(row["t"][k]), row["p"][k], row["quaternion"][k], row["v"][k], row["omega"][k], pressed)
 
     def write(self, force: Vec3) -> None:
         """See `sim.devices.base.Device`; the force is checked and has no effect."""

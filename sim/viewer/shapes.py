@@ -88,7 +88,8 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDAr
     tangents = np.gradient(points, axis=0)
     if closed:
         tangents[0] = tangents[-1] = points[1] - points[-2]
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    # Where a path turns back on itself it has no direction, and the ring collapses.
+    tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
     normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     rings = np.empty((len(points), sides, 3))

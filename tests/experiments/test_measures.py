@@ -52,7 +52,9 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
 def summary_of(path: Path, root_error: np.ndarray | None = None) -> RunSummary:
     error = np.full(N // EVERY, 0.03) if root_error is None else root_error
     with recording_of(path, error) as recording:
-        return summarise(recording, lambda points: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {})
+        return summarise(
+            recording, lambda points, phases: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {}
+        )
 
 
 def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
