@@ -111,7 +111,8 @@ def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44,
     worst = int(np.argmax(np.nan_to_num(errors, nan=np.inf)))
     again = observed(trials[worst], rows[worst].predicted, FINER)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "trials.json").write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+    numbers = [{k: v if np.isfinite(v) else None for k, v in asdict(row).items()} for row in rows]
+    (out / "trials.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
     told = table(rows) + (
         f"\nThe worst, trial {worst + 1}: {_percent(rows[worst].observed, rows[worst].predicted)} at {FINE.substeps} "
         f"physics steps a period, {_percent(again, rows[worst].predicted)} at {FINER.substeps}.\n"
@@ -145,10 +146,10 @@ def table(rows: list[Row]) -> str:
     ):  # fmt: skip
         errors = np.array([abs(getattr(r, found) / getattr(r, expected) - 1.0) for r in rows])
         known = errors[np.isfinite(errors)]
-        lines.append(
-            f"- {name}: {len(known)} of {len(rows)} with an onset; error: median {100 * np.median(known):.2f} %, "
-            f"largest {100 * np.max(known):.2f} %"
-        )
+        summary = f"- {name}: {len(known)} of {len(rows)} with an onset"
+        if len(known):
+            summary += f"; error: median {100 * np.median(known):.2f} %, largest {100 * np.max(known):.2f} %"
+        lines.append(summary)
     return "\n".join(lines) + "\n"
 
 
