@@ -18,6 +18,7 @@ from controllers.fields.bunny import Bunny
 from controllers.fields.edited import Edited, performance
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.program import evaluate
 from controllers.fields.river import River, integrate
 from controllers.state import HandState
 from experiments.modes import ADMISSION, HYSTERESIS, SIGMA, Field
@@ -37,7 +38,7 @@ _STYLE: dict[Any, Any] = {
 
 
 class Crossing(NamedTuple):
-    """Force of river 2 on a hand that follows river 1, where they cross.
+    """Force of river 2 on a hand that follows river 1, where they cross, and on its way through.
 
     Attributes
     ----------
@@ -49,6 +50,8 @@ class Crossing(NamedTuple):
         In the fields of higher order; in the discrete one river 1 has the hand [N].
     alone : float
         In the discrete field without river 1: whether river 2 takes a hand that moves like this [N].
+    both_passing, smooth_passing, discrete_passing : float
+        The greatest on the way from 30 mm before the crossing to 30 mm behind it [N].
     """
 
     angle: float
@@ -56,6 +59,9 @@ class Crossing(NamedTuple):
     smooth: float
     discrete: float
     alone: float
+    both_passing: float
+    smooth_passing: float
+    discrete_passing: float
 
 
 def straight_river(degrees: float) -> River:
@@ -69,23 +75,34 @@ def crossing(degrees: float) -> Crossing:
     """Forces at a crossing of two straight rivers, on a hand that follows the first."""
     pair = RiverBundle((straight_river(0.0), straight_river(degrees)), ("1", "2"))
     second = RiverBundle((straight_river(degrees),), ("2",))
-    hand = HandState.at([0.0, 0.0, 0.0], [SPEED, 0.0, 0.0])
     scale = (ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED)
+    smooth, discrete = HigherOrder(pair, *scale), HigherOrder(pair, *scale, "discrete")
     # River 1 gives no force to a hand on it at its own speed: all that is felt comes from river 2.
-    fields: tuple[Field, ...] = (
-        pair,
-        HigherOrder(pair, *scale),
-        HigherOrder(pair, *scale, "discrete"),
-        HigherOrder(second, *scale, "discrete"),
-    )
-    return Crossing(degrees, *(float(np.linalg.norm(field.wrench(hand).force)) for field in fields))
+    way = np.linspace(-0.03, 0.03, 121)
+    alone = _felt(HigherOrder(second, *scale, "discrete"), np.zeros(1))
+    a, b, c = (_felt(field, way) for field in (pair, smooth, discrete))
+    at = len(way) // 2
+    return Crossing(degrees, a[at], b[at], c[at], alone[0], a.max(), b.max(), c.max())
+
+
+def _felt(field: Field, way: Array) -> Array:
+    """Force [N] on a hand that moves along x with the river's speed, at places x [m], one after the other."""
+    program = field.program()
+    memory, wrench = program.fresh_memory(), np.empty(6)
+    forces: list[float] = []
+    for x in way:
+        hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
+        evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+        forces.append(float(np.linalg.norm(wrench[:3])))
+    return np.array(forces)
 
 
 def crossing_table() -> str:
     """The table of crossings as Markdown."""
     lines = [
-        "| angle | static sum | smooth | discrete, on river 1 | discrete, river 1 away |",
-        "|--:|--:|--:|--:|--:|",
+        "| angle | static sum | smooth | discrete | discrete, river 1 away | sum, passing | smooth, passing "
+        "| discrete, passing |",
+        "|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
     for degrees in range(0, 181, STEP):
         row = crossing(float(degrees))
@@ -101,15 +118,19 @@ def _newtons(force: float) -> str:
 
 def crossing_figure() -> Figure:
     """Force of river 2 on a hand on river 1 over the angle between them."""
-    rows = [crossing(float(angle)) for angle in np.linspace(0.0, 180.0, 361)]
+    rows = [crossing(float(angle)) for angle in np.linspace(0.0, 180.0, 181)]
     angles = [row.angle for row in rows]
-    figure, ax = _axes((6.0, 3.2))
-    ax.plot(angles, [row.both for row in rows], color=TUBE, label="static sum")
-    ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 1 away")
-    ax.plot(angles, [row.smooth for row in rows], color=FIELD, label="smooth")
-    ax.plot(angles, [row.discrete for row in rows], color=CURVE, label="discrete, on river 1")
-    ax.set(xlabel="angle between the rivers [°]", ylabel="force of river 2 [N]", xticks=range(0, 181, 30))
-    ax.legend()
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    crossing_ax, passing_ax = figure.subplots(1, 2, sharey=True)
+    crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 1 away")
+    columns = (("static sum", TUBE), ("smooth", FIELD), ("discrete", CURVE))
+    for (name, colour), here, way in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
+        crossing_ax.plot(angles, [row[here] for row in rows], color=colour, label=name)
+        passing_ax.plot(angles, [row[way] for row in rows], color=colour)
+    for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "greatest on the way through")):
+        ax.set(xlabel="angle between the rivers [°]", xticks=range(0, 181, 30), title=title)
+    crossing_ax.set(ylabel="force of river 2 [N]")
+    crossing_ax.legend()
     return figure
 
 

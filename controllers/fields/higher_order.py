@@ -31,7 +31,7 @@ _DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _HEADER = range(6)
 # A block: gains, tube, number of admissible speeds, then the speeds and the packed curve.
 _K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _TAU, _SPEEDS, _BLOCK = range(7)
 # What is known of a branch.
-_RIVER, _PHASE, _DISTANCE, _MISMATCH, _WINDOW, _CANDIDATE = range(6)
+_RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
@@ -88,9 +88,11 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
         for k in range(branches(params, curve, p[0], p[1], p[2], params[block + _EPSILON], found)):
             row = table[count]
             row[_RIVER], row[_PHASE], row[_DISTANCE] = river, found[k, 0], found[k, 1]
-            row[_MISMATCH] = _branch_mismatch(params, block, curve, found[k, 0], p, v)
-            row[_WINDOW] = window(found[k, 1] * found[k, 1] * params[block + _INVERSE_SQUARE])
-            count += row[_WINDOW] > 0.0
+            w = window(found[k, 1] * found[k, 1] * params[block + _INVERSE_SQUARE])
+            if w > 0.0:
+                m = _branch_mismatch(params, block, curve, found[k, 0], p, v)
+                row[_WINDOW], row[_SCORE] = w, m * m - math.log(w) / params[at + _SHARPNESS]
+                count += 1
     return count
 
 
@@ -110,19 +112,16 @@ def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array
     sharpness, null = params[at + _SHARPNESS], params[at + _ADMISSION] ** 2
     least = null
     for k in range(count):
-        least = min(least, table[k, _MISMATCH] ** 2)
+        least = min(least, table[k, _SCORE])
     total = math.exp(-sharpness * (null - least))
     strongest, winner = total, -1
     for k in range(count):
-        a = table[k, _WINDOW] * math.exp(-sharpness * (table[k, _MISMATCH] ** 2 - least))
+        a = math.exp(-sharpness * (table[k, _SCORE] - least))
         total += a
         if a > strongest:
             strongest, winner = a, k
-    # A weight may underflow only where its river is hardly felt.
-    total = max(total, 1e-300)
     for k in range(count):
-        a = table[k, _WINDOW] * math.exp(-sharpness * (table[k, _MISMATCH] ** 2 - least))
-        _add_force(params, at, table[k], a / total, p, v, wrench)
+        _add_force(params, at, table[k], math.exp(-sharpness * (table[k, _SCORE] - least)) / total, p, v, wrench)
     return winner
 
 
@@ -142,12 +141,12 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
                 away = min(away, lap - away)
             if away < min(nearest, _NEIGHBOUR * lap):
                 current, nearest = k, away
-        if table[k, _MISMATCH] < admission and (best < 0 or table[k, _MISMATCH] < table[best, _MISMATCH]):
+        if best < 0 or table[k, _SCORE] < table[best, _SCORE]:
             best = k
-    if current >= 0 and table[current, _MISMATCH] >= release:
-        current = -1
-    if current < 0 or (best >= 0 and table[best, _MISMATCH] + (release - admission) < table[current, _MISMATCH]):
-        current = best
+    rival = math.inf if best < 0 else math.sqrt(table[best, _SCORE])
+    held = math.inf if current < 0 else math.sqrt(table[current, _SCORE])
+    if held >= release or rival + (release - admission) < held:
+        current = best if rival < admission else -1
     memory[slot] = -1.0 if current < 0 else table[current, _RIVER]
     memory[slot + 1] = 0.0 if current < 0 else table[current, _PHASE]
     return current
@@ -205,14 +204,15 @@ class HigherOrder:
     r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
 
     With m_i the distance of the hand's velocity from the admissible ones of river i, s φ̇_i/|φ̇_i| at t*_i with s in
-    the interval of `River.speeds` (`mismatch`), r the admission, and a null weight for a hand that moves with none,
+    the interval of `River.speeds` (`mismatch`), w_i its window, r the admission, and a null weight for a hand that
+    moves with none,
 
-    .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{w_i\,e^{-m_i^2/2\sigma^2}}
-              {e^{-r^2/2\sigma^2} + \sum_j w_j\,e^{-m_j^2/2\sigma^2}} \quad\text{(smooth)}
+    .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{e^{-s_i^2/2\sigma^2}}
+              {e^{-r^2/2\sigma^2} + \sum_j e^{-s_j^2/2\sigma^2}}, \qquad s_i^2 = m_i^2 - 2\sigma^2\ln w_i
 
-    As σ → 0 the smooth field tends to the discrete one without hysteresis: λ_i = 1 for the least m_i if it is below
-    r. The discrete field keeps the river that has the hand while m_i < r + h, unless m_j + h < m_i for another one
-    with m_j < r; it jumps where it changes.
+    is the smooth form. The discrete one gives the whole hand to one river: to the least s_i, if it is below r; and
+    with hysteresis h it stays there while s_i < r + h, unless s_j + h < s_i for another one. It jumps where it
+    changes. As σ → 0 both tend to the least m_i, if it is below r.
 
     A river takes part with each of its branches (`controllers.curves.branches`), so that one that crosses itself is
     treated like two that cross.
@@ -224,7 +224,7 @@ class HigherOrder:
     admission : float
         r [m/s].
     sigma : float
-        σ [m/s], of the smooth field.
+        σ [m/s]: how sharply rivers are told apart; and in both forms what a place near a tube's edge costs.
     hysteresis : float
         h [m/s], of the discrete field.
     form : {"smooth", "discrete"}

@@ -34,8 +34,9 @@ def test_integrating_v_plus_u_gives_the_performed_curve_for_twenty_random_pushes
         away = np.linalg.norm(path - CIRCLE.point(TIMES), axis=1).max()
         assert away > 2e-3
         edited = Edited(RIVER, (performance(TIMES, path),), (1.0,))
-        course = integrate(edited.flow, path[0], TIMES[::20])
-        error = np.linalg.norm(course.points - path[::20], axis=1)
+        course = integrate(edited.flow, path[0], TIMES[::17])
+        # Not at the spline's own samples.
+        error = np.linalg.norm(course.points - path[::17], axis=1)
         assert np.sqrt(np.mean(error**2)) < 1e-3
         assert error.max() < 1e-3
 

@@ -107,10 +107,11 @@ def test_at_crossings_a_hand_on_river_1_feels_the_documented_share_of_river_2():
         a, null = np.exp(-(gap**2) / (2 * S**2)), np.exp(-(R**2) / (2 * S**2))
         assert row.both == pytest.approx(DRAG * gap, abs=1e-9)
         assert row.smooth == pytest.approx(DRAG * gap * a / (1.0 + a + null), rel=1e-6, abs=1e-12)
-        assert row.discrete < 1e-12
+        assert row.discrete_passing < 1e-12
         assert row.alone == pytest.approx(DRAG * gap if gap < R else 0.0, abs=1e-9)
         if degrees >= 90:
-            assert row.smooth < 1e-5
+            assert row.smooth_passing < 1e-9
+            assert row.both_passing > 0.5
 
 
 def _mismatch(river, hand):
@@ -126,7 +127,7 @@ def test_the_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
     for _ in range(200):
         bundle = _pair(rng.uniform(20.0, 160.0))
         hand = HandState.at(rng.uniform(-0.008, 0.008, 3), rng.normal(scale=0.07, size=3))
-        discrete = HigherOrder(bundle, R, S, 0.0, "discrete").wrench(hand).force
+        discrete = HigherOrder(bundle, R, 1e-4, 0.0, "discrete").wrench(hand).force
         gaps = sorted([*(_mismatch(r, hand) for r in bundle.rivers), R])
         if gaps[1] - gaps[0] < 5e-3:
             continue
@@ -159,7 +160,7 @@ def test_a_river_takes_the_speeds_that_it_admits_at_each_phase(form):
 
 
 def test_hysteresis_keeps_a_hand_between_admission_and_release():
-    program = HigherOrder(_bundle(straight_river(0.0)), 0.02, 1.0, 0.01, "discrete").program()
+    program = HigherOrder(_bundle(straight_river(0.0)), 0.02, 1e-4, 0.01, "discrete").program()
     speeds = SPEED + np.array([0.025, 0.015, 0.025, 0.035, 0.025, 0.015])
     forces, memory = _run(program, [HandState.at([0, 0.003, 0], [s, 0, 0]) for s in speeds])
     taken = np.linalg.norm(forces, axis=1) > 0.0
@@ -183,8 +184,8 @@ def test_nearly_parallel_rivers_discrete_the_one_that_has_the_hand_keeps_it_to_t
 
 def test_opposite_rivers_do_not_feel_each_other():
     row = crossing(180.0)
-    assert row.discrete == 0.0
-    assert row.smooth < 1e-9
+    assert row.discrete_passing < 1e-12
+    assert row.smooth_passing < 1e-9
     back = HigherOrder(_pair(180.0), *SCALE, "discrete").program()
     _, memory = _run(back, [HandState.at([0, 0, 0], straight_river(180.0).curve.velocity(0.8))])
     assert memory[TRACE_RIVER] == 1.0

@@ -1,0 +1,43 @@
+"""Fields in files: they come back to the last bit, and a file that is none is refused."""
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.edited import Edited, performance
+from controllers.fields.river import River
+from experiments.field_files import load_field, save_field
+from sim.errors import SimError
+
+CIRCLE = Trajectory.circle(0.05, 4.0)
+FIELDS = [
+    RiverBundle((River(CIRCLE), River(CIRCLE, np.inf, speeds=[[0.0, 0.1], [0.05, 0.2]])), ("a river/one", "../two")),
+    Edited(River(CIRCLE), (performance(CIRCLE.times, 1.1 * CIRCLE.positions),), (0.5,), pace="wait"),
+]
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=lambda field: type(field).__name__)
+def test_a_field_comes_back_from_its_file_to_the_last_bit(field, tmp_path):
+    path = tmp_path / "field.npz"
+    save_field(field, path)
+    again = load_field(path)
+    assert type(again) is type(field)
+    for key, value in field.arrays().items():
+        np.testing.assert_array_equal(again.arrays()[key], value)
+    np.testing.assert_array_equal(again.program().params, field.program().params)
+
+
+def test_a_file_that_is_no_field_is_refused_by_name(tmp_path):
+    text = tmp_path / "text.npz"
+    text.write_text("no archive")
+    other, cut, odd = (tmp_path / name for name in ("other.npz", "cut.npz", "odd.npz"))
+    np.savez(other, a=np.zeros(3))
+    save_field(FIELDS[0], cut)
+    cut.write_bytes(cut.read_bytes()[:200])
+    np.savez(odd, kind=np.array("Edited"), keys=np.array(["edited"]), **{"0": np.zeros(3)})
+    for path in (text, other, cut, odd):
+        with pytest.raises(SimError, match=path.name):
+            load_field(path)
+    with pytest.raises(OSError, match="missing"):
+        load_field(tmp_path / "missing.npz")

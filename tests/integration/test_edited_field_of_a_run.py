@@ -1,0 +1,28 @@
+"""V + U of runs on the simulated Phantom: integrating it gives what the hand performed."""
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.edited import Edited, performance
+from controllers.fields.river import River, integrate
+from experiments.own_law import loop_with
+from experiments.wiring import RunConfig
+from sim.users.intent import Push
+
+CURVE = Trajectory.circle(0.0477, 4.0)
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, -0.8, 0.2), (-1.0, 0.3, -0.5)])
+def test_a_push_on_the_simulated_phantom_comes_out_of_v_plus_u(direction):
+    river = River(CURVE, 0.08, 4.0 / 300.0, 4.0)
+    config = RunConfig(clips=("cheer", "angry"), seconds=1.4, pushes=(Push(0.4, 0.5, 3.0, direction),))
+    rows = []
+    _, loop = loop_with(config, river.program(), lambda ticks, frames, n: rows.append(ticks.hand[:n, :4].copy()))
+    loop.run(config.seconds)
+    t, p = np.split(np.concatenate(rows), [1], axis=1)
+    pushed = np.linalg.norm(p - CURVE.point(t[:, 0]), axis=1).max()
+    assert pushed > 4e-3
+    edited = Edited(river, (performance(t[:, 0], p),), (1.0,))
+    course = integrate(edited.flow, edited.performed[0].point(0.0), t[::17, 0])
+    assert np.sqrt(np.mean(np.sum((course.points - p[::17]) ** 2, axis=1))) < 1e-4

@@ -1,0 +1,77 @@
+"""A law in plain Python: the example of the docs runs, and a tick cut in three is the compiled tick to the last bit."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.follow import Follow
+from controllers.fields.python_law import PythonLaw
+from experiments.own_law import loop_with
+from experiments.wiring import RunConfig
+from sim.errors import SimError
+from sim.loop import Loop
+
+CONFIG = RunConfig(clips=("cheer", "angry"), seconds=0.2)
+FOLLOW = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube).program()
+
+
+def _run(program, seconds=0.2):
+    logs = []
+
+    def keep(ticks, frames, n):
+        m = -(-n // CONFIG.figure_ticks)
+        logs.append([a[:n].copy() for a in ticks] + [a[:m].copy() for a in frames])
+
+    session, loop = loop_with(CONFIG, program, keep)
+    loop.run(seconds)
+    return session, logs
+
+
+def test_the_example_of_the_docs_runs_and_has_its_20_lines(capsys):
+    text = (Path(__file__).parents[2] / "docs" / "your-own-law.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 20
+    exec(compile(code, "your-own-law.md", "exec"), {"__name__": "example"})
+    factor, *_ = capsys.readouterr().out.split()
+    assert float(factor) > 0.0
+
+
+def test_a_tick_with_a_law_in_python_is_the_compiled_tick_to_the_last_bit():
+    seen = []
+
+    def nothing(hand):
+        seen.append((hand.t, *hand.p, *hand.v))
+        return np.zeros(3)
+
+    compiled, plain = _run(FOLLOW)
+    cut, logged = _run(FOLLOW + PythonLaw(nothing).program())
+    for one, other in zip(plain, logged, strict=True):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(compiled.world.data.qpos, cut.world.data.qpos)
+    # It was called once a tick, with what the device measured.
+    hands = np.concatenate([block[0] for block in plain])
+    np.testing.assert_array_equal(np.array(seen), hands[:, [0, 1, 2, 3, 8, 9, 10]])
+
+
+def test_a_built_in_law_called_from_python_gives_the_same_run_to_the_last_digits():
+    law = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube)
+    _, plain = _run(FOLLOW)
+    _, logged = _run(PythonLaw(lambda hand: law.wrench(hand).force).program())
+    np.testing.assert_allclose(logged[-1][0][:, 1:4], plain[-1][0][:, 1:4], atol=2e-5)
+
+
+def test_a_law_that_gives_no_number_latches_the_fault_and_the_device_lets_go():
+    _, logs = _run(PythonLaw(lambda hand: [np.nan if hand.t > 0.1 else 1.0, 0.0, 0.0]).program())
+    force = np.concatenate([block[2] for block in logs])
+    assert force[90, 0] == pytest.approx(1.0)
+    assert not force[105:].any()
+
+
+def test_a_loop_without_the_laws_of_its_field_is_refused():
+    session, _ = loop_with(CONFIG, PythonLaw(lambda hand: hand.p).program())
+    with pytest.raises(SimError, match="1 slots for laws in Python, 0 are given"):
+        Loop(session.servo, session.world)
