@@ -17,6 +17,7 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from experiments.modes import heaviest_tick_microseconds
 from experiments.run import SUMMARY
 from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
 from sim.compiled import entry_point
@@ -39,6 +40,7 @@ def bench() -> None:
     print(f"two threads / twice one thread: {thread_scaling(lambda: wire(config, clips)):.2f} (≥ 0.90)")
     small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
     print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
+    print(f"ten rivers of higher order, with the limiter: {heaviest_tick_microseconds():.1f} µs a tick (≤ 20)")
     print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
 

@@ -1,8 +1,11 @@
 """The ``hvf`` command: haptic vector fields from the command line."""
 
+import os
 import time
 
 _STARTED = time.perf_counter()
+# The matrices here are small: more threads only get into each other's way. Read by NumPy when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import json  # noqa: E402
 import sys  # noqa: E402

@@ -119,8 +119,8 @@ class RunConfig:
     bunny_width: float = 0.05
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
-    river_tube: float = 0.02
-    crossing: Literal["smooth", "discrete", "sum"] = "smooth"
+    river_tube: float = 0.015
+    crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     seek: float = 150.0
     rubber: float = 150.0
     rubber_tube: float = 0.008
@@ -130,7 +130,7 @@ class RunConfig:
     reach: float = 0.025
     cutoff: float = 150.0
     smoothing: float = 6.0
-    figure_ticks: int = 10
+    figure_ticks: int = 8
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
     grabs: tuple[Grab, ...] = ()

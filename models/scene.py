@@ -37,7 +37,7 @@ class SceneConfig:
     stature: float = DEFAULT_STATURE
     mass: float = DEFAULT_MASS
     servo_period: float = 1e-3
-    physics_step: float = 2.5e-4
+    physics_step: float = 1.25e-4
 
     def substeps(self) -> int:
         """Physics steps in a servo period.

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from numba import njit
 
 from models.scene import FIGURE, PHANTOM
-from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, push_stylus, true_motion
+from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, true_motion
 from sim.native import mj_step
 from sim.users.arm import Arm, CompiledArm, hand_force
 from sim.world import World
@@ -46,13 +46,13 @@ class Plant(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """The simulated user, what the hand feels (true position and velocity) and its force and torques; all in H."""
+    """The simulated user, and in H what the hand feels (true position, velocity, Jacobian) and its force."""
 
     arm: CompiledArm
     p: Array
     v: Array
+    jacobian: Array
     force: Array
-    torque: Array
 
 
 def make_plant(world: World) -> Plant:
@@ -69,7 +69,7 @@ def make_plant(world: World) -> Plant:
 
 def make_hand(arm: Arm) -> Hand:
     """A simulated user before its first tick."""
-    return Hand(arm.compiled(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
+    return Hand(arm.compiled(), np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
 
 
 @njit
@@ -85,14 +85,15 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
     replay : bool
         Take the hand's torques from `applied` instead of asking the hand.
     applied : Array
-        The hand's torques about θ1, θ2, θ3 at each physics step [N m], written or read, shape (substeps, 3).
+        The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], written or read, shape (substeps, 3).
     """
     for i in range(plant.substeps):
         if not replay:
-            true_motion(port, hand.p, hand.v)
+            true_motion(port, hand.p, hand.v, hand.jacobian)
             hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)
-            push_stylus(port, hand.force, hand.torque)
-            applied[i] = hand.torque
+            J, F = hand.jacobian, hand.force
+            for j in range(3):
+                applied[i, j] = J[0, j] * F[0] + J[1, j] * F[1] + J[2, j] * F[2]
         for j in range(3):
             plant.applied[plant.arm_v[j]] = applied[i, j]
         mj_step(plant.model, plant.data)

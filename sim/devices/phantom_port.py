@@ -189,38 +189,27 @@ def actuate(port: PhantomPort, force: Array) -> None:
 
 
 @njit
-def true_motion(port: PhantomPort, p: Array, v: Array) -> None:
-    """Where the stylus really is and how it moves, in H: what the hand feels, unquantised."""
-    q, a, b = port.qpos, port.arm_q, port.arm_v
-    theta = (q[a[0]], q[a[1]], q[a[2]])
-    rate = (port.qvel[b[0]], port.qvel[b[1]], port.qvel[b[2]])
-    j = jacobian(theta)
-    p_H = vector_to_hand_frame(forward_kinematics(theta))
-    v_H = vector_to_hand_frame(
-        (
-            j[0][0] * rate[0] + j[0][1] * rate[1] + j[0][2] * rate[2],
-            j[1][0] * rate[0] + j[1][1] * rate[1] + j[1][2] * rate[2],
-            j[2][0] * rate[0] + j[2][1] * rate[1] + j[2][2] * rate[2],
-        )
-    )
-    for i in range(3):
-        p[i], v[i] = p_H[i], v_H[i]
-
-
-@njit
-def push_stylus(port: PhantomPort, force: Array, applied: Array) -> None:
-    """External joint torques of a force on the tip, τ = J(θ)ᵀ F at the true angles.
+def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> None:
+    """Where the stylus really is and how it moves, in H: what the hand feels, unquantised.
 
     Parameters
     ----------
     port : PhantomPort
         Read only.
-    force : Array
-        In H [N], shape (3,).
-    applied : Array
-        Set: torques about θ1, θ2, θ3 [N m], shape (3,).
+    p, v : Array
+        Set: position [m] and velocity [m/s], shape (3,).
+    jacobian_H : Array
+        Set: ∂p_H/∂θ at the true angles, shape (3, 3).
     """
-    q, a = port.qpos, port.arm_q
-    torque = joint_torques((q[a[0]], q[a[1]], q[a[2]]), vector_to_device_frame((force[0], force[1], force[2])))
+    q, a, b = port.qpos, port.arm_q, port.arm_v
+    theta = (q[a[0]], q[a[1]], q[a[2]])
+    rate = (port.qvel[b[0]], port.qvel[b[1]], port.qvel[b[2]])
+    p_H = vector_to_hand_frame(forward_kinematics(theta))
+    j = jacobian(theta)
     for i in range(3):
-        applied[i] = torque[i]
+        column = vector_to_hand_frame((j[0][i], j[1][i], j[2][i]))
+        for k in range(3):
+            jacobian_H[k, i] = column[k]
+    for k in range(3):
+        p[k] = p_H[k]
+        v[k] = jacobian_H[k, 0] * rate[0] + jacobian_H[k, 1] * rate[1] + jacobian_H[k, 2] * rate[2]

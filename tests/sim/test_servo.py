@@ -46,7 +46,7 @@ def test_the_encoders_tell_the_tip_to_a_few_hundredths_of_a_millimetre() -> None
         sense(port, 0.0, 0.0)
         np.testing.assert_allclose(port.hand[1:4], p, atol=5e-5)
         true_p, true_v = np.zeros(3), np.zeros(3)
-        true_motion(port, true_p, true_v)
+        true_motion(port, true_p, true_v, np.zeros((3, 3)))
         np.testing.assert_allclose(true_p, p, atol=1e-12)
         site = world.data.site("phantom/tip")
         np.testing.assert_allclose(true_p, site.xpos - world.data.body("phantom/base").xpos, atol=1e-9)
