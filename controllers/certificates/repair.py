@@ -10,7 +10,8 @@ subject to free fall in every flight, c_k + δ_k = p + v τ_k − ½ g τ_k² e_
 that reach the feet that stand; and no part of a flying body below the floor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import casadi as ca
@@ -105,6 +106,18 @@ class RepairPlan:
     iterations: int
 
 
+@contextmanager
+def _matrix_indexing() -> Generator[None, None, None]:
+    """CasADi's own indexing while a program is written, whatever other code has chosen for the process."""
+    chosen = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(0)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setNumpyMode(chosen)
+
+
+@_matrix_indexing()
 def repair(task: RepairTask) -> RepairPlan:
     """Solve the nonlinear program of this module with IPOPT.
 

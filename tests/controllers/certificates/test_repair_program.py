@@ -67,3 +67,16 @@ def test_tasks_are_checked():
         task(9.81, flights=[(30, 90)])
     with pytest.raises(ParameterError, match="standing"):
         task(9.81, standing=np.zeros((90, 3), dtype=bool))
+
+
+def test_the_indexing_that_other_code_has_chosen_is_kept_and_does_not_matter() -> None:
+    import casadi
+
+    chosen = casadi.GlobalOptions.getNumpyMode()
+    try:
+        for mode in (0, 1):
+            casadi.GlobalOptions.setNumpyMode(mode)
+            test_what_falls_naturally_stays_nearly_as_it_is()
+            assert casadi.GlobalOptions.getNumpyMode() == mode
+    finally:
+        casadi.GlobalOptions.setNumpyMode(chosen)
