@@ -17,9 +17,10 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from experiments.config import RunConfig
 from experiments.modes import heaviest_tick_microseconds
 from experiments.run import SUMMARY
-from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from experiments.wiring import Session, load_clips, stylus_path, wire
 from sim.compiled import entry_point
 from sim.loop import make_logs
 from sim.servo import FrameLog, TickLog, run_block

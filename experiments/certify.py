@@ -19,7 +19,7 @@ from controllers.certificates.stability import HandRange, River, boundary, stabi
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.safety import ForceLimiter
-from experiments.wiring import RunConfig
+from experiments.config import RunConfig
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5

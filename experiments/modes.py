@@ -1,7 +1,7 @@
 """The modes of a run that are fields over a fixed curve: follow, bunny, rivers; and how fast the heaviest one is."""
 
 import time
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from controllers.safety import ForceLimiter, limit_force
 from controllers.state import HandState, Wrench
+from experiments.config import RunConfig
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -40,61 +41,7 @@ class Field(Protocol):
         ...
 
 
-class FieldFlags(Protocol):
-    """What of a run's configuration decides on its field; see `experiments.wiring.RunConfig`."""
-
-    @property
-    def mode(self) -> str:
-        """Name of the mode."""
-        ...
-
-    @property
-    def stiffness(self) -> float:
-        """k_r [N/m]."""
-        ...
-
-    @property
-    def damping(self) -> float:
-        """b_d [N s/m]."""
-        ...
-
-    @property
-    def tube(self) -> float:
-        """Radius ε of FOLLOW [m]."""
-        ...
-
-    @property
-    def bunny_width(self) -> float:
-        """δ [m]."""
-        ...
-
-    @property
-    def bunny_attraction(self) -> Literal["point", "along"]:
-        """Form of the bunny's attraction."""
-        ...
-
-    @property
-    def bunny_pace(self) -> Literal["clock", "wait"]:
-        """Pace of the bunny."""
-        ...
-
-    @property
-    def river_tube(self) -> float:
-        """Radius ε of rivers [m]."""
-        ...
-
-    @property
-    def crossing(self) -> Literal["smooth", "discrete", "sum"]:
-        """How crossing rivers share the hand."""
-        ...
-
-    @property
-    def reach(self) -> float:
-        """Half width of the map's domain [m]."""
-        ...
-
-
-def law(config: FieldFlags, curve: Trajectory) -> Field:
+def law(config: RunConfig, curve: Trajectory) -> Field:
     """Field of a mode over the default curve.
 
     Raises
@@ -113,7 +60,7 @@ def law(config: FieldFlags, curve: Trajectory) -> Field:
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
-def _rivers(config: FieldFlags, curve: Trajectory) -> Field:
+def _rivers(config: RunConfig, curve: Trajectory) -> Field:
     if config.damping <= 0.0 or config.stiffness <= 0.0:
         raise ParameterError(
             f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"

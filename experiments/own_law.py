@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.fields.instructions import Program
-from experiments.wiring import RunConfig, Session, load_clips, wire
+from experiments.config import RunConfig
+from experiments.wiring import Session, load_clips, wire
 from sim.loop import Loop, Observer
 
 

@@ -16,10 +16,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config import STRETCHING, RunConfig
 from experiments.measures import BLOCK_FRAMES, summarise
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
 from experiments.summary import RunSummary, SpeedSummary
-from experiments.wiring import STRETCHING, RunConfig, Session, load_clips, stylus_path, wire
+from experiments.wiring import Session, load_clips, stylus_path, wire
 from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model

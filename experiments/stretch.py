@@ -3,7 +3,6 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config import RunConfig
 from sim.errors import SimError
 from sim.users.intent import Grab
 
@@ -21,51 +21,7 @@ CURVE_FILE = "curve.json"
 PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
 
 
-class StretchFlags(Protocol):
-    """What of a run's configuration decides on the field; see `experiments.wiring.RunConfig`."""
-
-    @property
-    def mode(self) -> str:
-        """Name of the mode."""
-        ...
-
-    @property
-    def seek(self) -> float:
-        """k_f [N/m]."""
-        ...
-
-    @property
-    def rubber(self) -> float:
-        """k_s [N/m]."""
-        ...
-
-    @property
-    def rubber_tube(self) -> float:
-        """ε [m]."""
-        ...
-
-    @property
-    def bump(self) -> float:
-        """Half width h of a bump [s]."""
-        ...
-
-    @property
-    def stiffness(self) -> float:
-        """k_r with which the bent curve is performed [N/m]."""
-        ...
-
-    @property
-    def damping(self) -> float:
-        """b_d with which the bent curve is performed [N s/m]."""
-        ...
-
-    @property
-    def tube(self) -> float:
-        """ε with which the bent curve is performed [m]."""
-        ...
-
-
-def law(config: StretchFlags, curve: Trajectory, grabs: tuple[Grab, ...]) -> StretchyTubes:
+def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> StretchyTubes:
     """Field of the modes "stretch", and "stretch-then-follow", which performs once the last grab is over.
 
     Raises

@@ -18,7 +18,7 @@ from experiments.certify import (
     certify_into,
     read_certificate,
 )
-from experiments.wiring import RunConfig
+from experiments.config import RunConfig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 

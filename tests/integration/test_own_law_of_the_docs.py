@@ -9,8 +9,8 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
+from experiments.config import RunConfig
 from experiments.own_law import loop_with
-from experiments.wiring import RunConfig
 from sim.errors import SimError
 from sim.loop import Loop
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.wiring import RunConfig
+from experiments.config import RunConfig
 from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError

@@ -5,7 +5,8 @@ import pytest
 
 from controllers.fields.program import evaluate
 from controllers.safety import limit_force
-from experiments.wiring import RunConfig, Session, lap_pushes, load_clips, wire
+from experiments.config import RunConfig
+from experiments.wiring import Session, lap_pushes, load_clips, wire
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, jacobian

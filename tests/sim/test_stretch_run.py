@@ -10,9 +10,10 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config import RunConfig
 from experiments.stretch import CURVE_FILE, law, load_curve, save_curve, stretch_grabs, stretch_summary
 from experiments.stretch_figure import draw_stretch
-from experiments.wiring import RunConfig, Session, load_clips, stylus_path, wire
+from experiments.wiring import Session, load_clips, stylus_path, wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError
 from sim.loop import Loop, groups

@@ -1,0 +1,103 @@
+"""The configuration of a run: pure data, from which the command line is made and which is saved with the results."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from models.scene import SceneConfig
+from sim.users.intent import Grab, Push
+
+FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
+STRETCHING = ("stretch", "stretch-then-follow")
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """A run: with the seed, all that decides what happens.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
+        or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
+        upper body inside, upper body outside.
+    mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow"}
+        Field of force.
+    map : {"cylindrical", "composite"}
+        Haptic map: four clips round a cylinder, or the lower body of one clip and the upper body blended between two.
+    user : {"relaxed", "trace", "push"}
+        A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
+    seconds : float
+        Simulated time [s].
+    seed : int
+        Of where exactly the hand lets go of the stylus at the start.
+    stiffness : float
+        k_r of the field [N/m].
+    damping : float
+        b_d of the field [N s/m].
+    tube : float
+        Radius ε in which the field is felt [m].
+    bunny_width : float
+        δ of the bunny [m].
+    bunny_attraction : {"point", "along"}
+        To the bunny itself, or along the curve.
+    bunny_pace : {"clock", "wait"}
+        Whether the bunny waits for the hand.
+    river_tube : float
+        Radius ε of the rivers [m].
+    crossing : {"smooth", "discrete", "sum"}
+        How crossing rivers share the hand: by its velocity, smoothly or with hysteresis, or not at all.
+    seek : float
+        k_f, with which stretchy tubes draw the hand to the curve [N/m].
+    rubber : float
+        k_s of a held or pushed tube [N/m].
+    rubber_tube : float
+        Radius of the tube that can be held and pushed [m].
+    bump : float
+        Half width of what a bend changes [s], at most half a lap.
+    lap : float
+        Time of a lap of the curve [s].
+    radius : float
+        Of the default curve, a circle about the vertical [m].
+    reach : float
+        Half width of the map's domain about the default curve, in radius and in height [m].
+    cutoff : float
+        Corner frequency of the velocity filter [Hz].
+    smoothing : float
+        Bandwidth of the filter between stylus and figure [Hz].
+    figure_ticks : int
+        Servo ticks between two updates of the figure.
+    scene : SceneConfig
+        Figure's size, servo period and physics step.
+    pushes : tuple of Push
+        What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on.
+    grabs : tuple of Grab
+        What it takes hold of; in the modes that stretch, by default, a tour of what can be done.
+    """
+
+    clips: tuple[str, ...] = FIGURE_CLIPS
+    mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
+    map: Literal["cylindrical", "composite"] = "cylindrical"
+    user: Literal["relaxed", "trace", "push"] = "relaxed"
+    seconds: float = 20.0
+    seed: int = 1
+    stiffness: float = 300.0
+    damping: float = 8.0
+    tube: float = 0.25
+    bunny_width: float = 0.05
+    bunny_attraction: Literal["point", "along"] = "point"
+    bunny_pace: Literal["clock", "wait"] = "wait"
+    river_tube: float = 0.015
+    crossing: Literal["smooth", "discrete", "sum"] = "discrete"
+    seek: float = 150.0
+    rubber: float = 150.0
+    rubber_tube: float = 0.008
+    bump: float = 0.5
+    lap: float = 4.0
+    radius: float = 0.0477
+    reach: float = 0.025
+    cutoff: float = 150.0
+    smoothing: float = 6.0
+    figure_ticks: int = 8
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    pushes: tuple[Push, ...] = ()
+    grabs: tuple[Grab, ...] = ()
