@@ -23,6 +23,7 @@ Array = npt.NDArray[np.float64]
 SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
 HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
 FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
+TOUCH = 1.0  # [N] from which the ground bears the figure
 BLOCK_FRAMES = 2000  # of the figure, read at a time
 _TICKS = ("t", "p", "nearest", "distance", "phase", "user")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
@@ -170,7 +171,7 @@ class FigureMeasure:
     def __init__(self, recording: Recording):
         self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
         self._joints, self._root, self._force, self._moment, self._flying = (_MeanSquare() for _ in range(5))
-        self._frames, self._flight, self._saturated, self._ground = 0, 0, 0.0, 0.0
+        self._frames, self._flight, self._grounded, self._saturated, self._ground = 0, 0, 0, 0.0, 0.0
         self._fell_at: float | None = None
 
     def add(self, frames: Mapping[str, Array]) -> None:
@@ -191,6 +192,7 @@ class FigureMeasure:
         self._flying.add(residual[flight])
         self._frames += len(flight)
         self._flight += int(np.sum(flight))
+        self._grounded += int(np.sum(~flight & (frames["ground"][:, 2] > TOUCH)))
         self._saturated += float(np.sum(frames["saturated"]))
         self._ground += float(np.sum(frames["ground"][:, 2]))
 
@@ -208,5 +210,6 @@ class FigureMeasure:
             residual_in_flight_max=self._flying.largest,
             flight_seconds=self._flight / self._rate,
             saturated=self._saturated / frames / (N_TANGENT - 6),
+            grounded=self._grounded / max(self._frames - self._flight, 1),
             ground_force_mean=self._ground / frames / self._weight,
         )

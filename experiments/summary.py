@@ -85,6 +85,8 @@ class FigureSummary:
     flight_seconds : float
     saturated : float
         Share of the motors' time at their limit.
+    grounded : float
+        Share of the time in which the reference stands that the ground bears the figure.
     ground_force_mean : float
         Mean vertical ground force as a share of body weight.
     """
@@ -99,6 +101,7 @@ class FigureSummary:
     residual_in_flight_max: float
     flight_seconds: float
     saturated: float
+    grounded: float
     ground_force_mean: float
 
 
@@ -139,7 +142,7 @@ class RunSummary:
             ("" if figure.fell_at is None else f"The physical figure fell at {figure.fell_at:.1f} s. Until then: ")
             + f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
             f"{figure.root_error_rms_cm:.2f} cm at the root; residual force {100 * figure.residual_force_rms:.1f} % "
-            "of body weight RMS.",
+            f"of body weight RMS, feet on the ground {100 * figure.grounded:.0f} % of stance.",
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
             f"MuJoCo's warnings: {warned}.",
         ]

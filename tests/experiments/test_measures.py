@@ -33,9 +33,12 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
     ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
+    ground = np.tile([0.0, 0.0, 700.0], (m, 1))
+    ground[100:120] = 0.0  # in flight
+    ground[200:230] = 0.0  # and when it should stand
     frames = {
         "t": t[::EVERY], "reference": reference, "joint_error": np.full(m, 0.02), "root_error": root_error,
-        "residual": residual, "ground": np.tile([0.0, 0.0, 700.0], (m, 1)), "flight": flight,
+        "residual": residual, "ground": ground, "flight": flight,
         "saturated": np.full(m, 5.1),
     }  # fmt: skip
     groups = {
@@ -77,7 +80,8 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.residual_in_flight_max == 0.0
     assert figure.flight_seconds == pytest.approx(0.2)
     assert figure.saturated == pytest.approx(0.1)
-    assert figure.ground_force_mean == pytest.approx(1.0)
+    assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
+    assert figure.grounded == pytest.approx(1.0 - 30 / 380)
     assert len(summary.lines()) == 5
 
 
