@@ -111,6 +111,10 @@ class Certify:
     """Judge the flights of this motion file instead of a field."""
     out: Path = Path("runs/certificate")
     """Folder for the certificate of a field; one that is there already is taken if nothing has changed."""
+    delay: float = 0.0
+    """Of the motors' torques, for a field [s]."""
+    hand_push: float = 1.0
+    """Largest force of the hand for which the distance from the curve is bounded [N]."""
     json: bool = False
     """Print the certificate as JSON."""
 
@@ -119,7 +123,10 @@ class Certify:
         from experiments.ballistics import certify_file
         from experiments.certify import certify_into
 
-        certificate = certify_into(self.config, self.out) if self.clip is None else certify_file(self.clip).certificate
+        if self.clip is not None:
+            certificate = certify_file(self.clip).certificate
+        else:
+            certificate = certify_into(self.config, self.out, self.delay, push=self.hand_push)
         if self.json:
             print(json.dumps(certificate.to_json(), indent=2))
             return 0
