@@ -13,6 +13,7 @@ from controllers.haptic_map.evaluate import evaluate_map
 from sim.compiled import entry_point
 from sim.errors import SimError
 from sim.native import mj_differentiate_pos
+from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
 
 Array = npt.NDArray[np.float64]
 
@@ -32,6 +33,8 @@ class CompiledReference(NamedTuple):
         The haptic map and its state (the lap).
     hand : Array
         Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
+    orientation, turning : Array
+        Smoothed orientation R_H of the stylus (wxyz), shape (4,), and in its own frame ω and α, shape (2, 3).
     started : Array
         0 until the hand has been seen, shape (1,).
     pose, velocity, acceleration : Array
@@ -45,6 +48,8 @@ class CompiledReference(NamedTuple):
     params: Array
     memory: Array
     hand: Array
+    orientation: Array
+    turning: Array
     started: Array
     pose: Array
     velocity: Array
@@ -58,36 +63,17 @@ class CompiledReference(NamedTuple):
 
 
 @njit
-def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -> None:
-    r"""Critically damped tracking filter of second degree (fading memory; Morrison 1969).
-
-    Predict with constant acceleration, then correct position, velocity and acceleration by the residual r with
-    1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and (1 − θ)³/T². A hand at constant acceleration is followed without lag.
-    """
-    g = 1.0 - smoothing**3
-    h = 1.5 * (1.0 - smoothing) ** 2 * (1.0 + smoothing) / period
-    k = (1.0 - smoothing) ** 3 / period**2
-    for i in range(3):
-        predicted = hand[0, i] + period * hand[1, i] + 0.5 * period**2 * hand[2, i]
-        speed = hand[1, i] + period * hand[2, i]
-        residual = measured[i] - predicted
-        hand[0, i] = predicted + g * residual
-        hand[1, i] = speed + h * residual
-        hand[2, i] += k * residual
-
-
-@njit
 def update_reference(reference: CompiledReference, stylus: Array) -> None:
     r"""Advance the reference by one period.
 
-    With x(s) = p + s ṗ + ½ s² p̈ the smoothed motion of the hand, the velocity and acceleration of h∘x are central
-    differences on the figure's configuration manifold over ±T:
+    With p(s) = p + s ṗ + ½ s² p̈ and R(s) = R exp(s ω + ½ s² α) the smoothed motion x of the stylus, velocity and
+    acceleration of h∘x are central differences on the figure's configuration manifold over ±T:
     v = ½ ((q₊ ⊖ q) − (q₋ ⊖ q)) / T and a = ((q₊ ⊖ q) + (q₋ ⊖ q)) / T².
 
     Parameters
     ----------
     reference : CompiledReference
-        Updated: hand, memory, pose (75), velocity (57), acceleration (57).
+        Updated: the stylus's motion, memory, pose (75), velocity (57), acceleration (57).
     stylus : Array
         Measured position in H and orientation wxyz, shape (7,).
     """
@@ -95,10 +81,11 @@ def update_reference(reference: CompiledReference, stylus: Array) -> None:
     if reference.started[0] == 0.0:
         reference.started[0] = 1.0
         hand[0, :] = stylus[:3]
+        reference.orientation[:] = stylus[3:]
     else:
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
-    x[3:] = stylus[3:]
-    x[:3] = hand[0]
+        smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
+    x[:3], x[3:] = hand[0], reference.orientation
     evaluate_map(reference.kind, reference.params, x, reference.memory, reference.pose)
     for sign, pose, difference in (
         (-1.0, reference.before, reference.to_before),
@@ -106,6 +93,7 @@ def update_reference(reference: CompiledReference, stylus: Array) -> None:
     ):
         for i in range(3):
             x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+        x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
         reference.scratch_memory[:] = reference.memory
         evaluate_map(reference.kind, reference.params, x, reference.scratch_memory, pose)
         mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
@@ -158,7 +146,8 @@ def make_reference(
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
-        kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), started=np.zeros(1), pose=np.zeros(nq),
-        velocity=np.zeros(nv), acceleration=np.zeros(nv), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
+        kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), orientation=np.array([1.0, 0.0, 0.0, 0.0]),
+        turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq), velocity=np.zeros(nv),
+        acceleration=np.zeros(nv), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
         before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

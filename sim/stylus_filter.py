@@ -1,0 +1,79 @@
+r"""The tracking filter between stylus and figure: critically damped, of second degree, for position and orientation.
+
+A fading memory (Morrison 1969, *Introduction to Sequential Smoothing and Prediction*): predict with constant
+acceleration over the period T, then correct by the residual r with 1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and (1 − θ)³/T².
+What moves, or turns about a fixed axis, with constant acceleration is followed without lag.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.rotations import exponential, logarithm, multiply, relative
+
+Array = npt.NDArray[np.float64]
+
+
+@njit
+def filter_gains(smoothing: float, period: float) -> tuple[float, float, float]:
+    """What of a residual corrects the value, its rate [1/s] and its second derivative [1/s²]."""
+    rest = 1.0 - smoothing
+    return 1.0 - smoothing**3, 1.5 * rest**2 * (1.0 + smoothing) / period, rest**3 / period**2
+
+
+@njit
+def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -> None:
+    """Advance position, velocity and acceleration, rows of `hand` (3, 3), by one period to a measured position (3,)."""
+    g, h, k = filter_gains(smoothing, period)
+    for i in range(3):
+        predicted = hand[0, i] + period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+        speed = hand[1, i] + period * hand[2, i]
+        residual = measured[i] - predicted
+        hand[0, i] = predicted + g * residual
+        hand[1, i] = speed + h * residual
+        hand[2, i] += k * residual
+
+
+@njit
+def turned_on(q: Array, turning: Array, s: float) -> tuple[float, float, float, float]:
+    """Orientation R·exp(s ω + ½ s² α) after s seconds of the turning (ω, α), shape (2, 3), in the frame of R."""
+    a, b = s, 0.5 * s**2
+    turn = exponential(
+        a * turning[0, 0] + b * turning[1, 0],
+        a * turning[0, 1] + b * turning[1, 1],
+        a * turning[0, 2] + b * turning[1, 2],
+    )
+    return multiply(q[0], q[1], q[2], q[3], turn[0], turn[1], turn[2], turn[3])
+
+
+@njit
+def smooth_turn(q: Array, turning: Array, measured: Array, smoothing: float, period: float) -> None:
+    r"""Advance orientation and turning by one period to a measured orientation; the residual is a rotation vector.
+
+    .. math:: r = \log(\hat R^{-1} R_{measured}), \qquad R = \hat R \exp(g\,r)
+
+    A stylus that keeps its orientation is told to the last bit, for its residual is exactly zero.
+
+    Parameters
+    ----------
+    q : Array
+        R_H, unit quaternion wxyz, shape (4,); updated.
+    turning : Array
+        ω [rad/s] and α [rad/s²] in the frame of R, shape (2, 3); updated.
+    measured : Array
+        Unit quaternion of either sign, shape (4,).
+    smoothing, period : float
+        θ and T [s].
+    """
+    g, h, k = filter_gains(smoothing, period)
+    w, x, y, z = turned_on(q, turning, period)
+    sign = 1.0 if w * measured[0] + x * measured[1] + y * measured[2] + z * measured[3] >= 0.0 else -1.0
+    # The small difference first, not the product of two like quaternions: it is zero exactly, and loses no digits.
+    rest = (sign * measured[0] - w, sign * measured[1] - x, sign * measured[2] - y, sign * measured[3] - z)
+    scalar, a, b, c = relative(w, x, y, z, rest[0], rest[1], rest[2], rest[3])
+    r = logarithm(1.0 + scalar, a, b, c)
+    correction = exponential(g * r[0], g * r[1], g * r[2])
+    q[0], q[1], q[2], q[3] = multiply(w, x, y, z, correction[0], correction[1], correction[2], correction[3])
+    for i in range(3):
+        turning[0, i] += period * turning[1, i] + h * r[i]
+        turning[1, i] += k * r[i]
