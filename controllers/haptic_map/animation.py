@@ -7,7 +7,8 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.blending import fresh_lap, packed_blend
+from controllers.haptic_map.blending import packed_blend
+from controllers.haptic_map.combination import fresh_lap
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop, checked_clip, closed_loop
 from controllers.state import Array, Pose

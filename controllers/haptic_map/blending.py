@@ -1,12 +1,4 @@
-r"""Blends of animations: one pose, and its derivative, of aligned loops with weights that may differ from part to part.
-
-.. math:: h = A \cdot \exp\bigl(\tfrac{\theta}{2\pi} \textstyle\sum_i w_i \xi_i\bigr) \cdot \bar{\rho}_w(\theta)
-
-θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
-the ground by its twist ξ (`loops`); the ends of limbs are blended as the root is, and the limbs follow (`limbs`,
-`support`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). Channels are uniform cubic B-splines
-round the lap.
-"""
+"""Blends of aligned loops: their channels as uniform cubic B-splines round the lap, combined with weights."""
 
 from collections.abc import Sequence
 
@@ -14,17 +6,13 @@ import numpy as np
 from numba import njit
 
 from controllers.haptic_map.alignment import aligned_channels
-from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
-from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb, with_ends
+from controllers.haptic_map.combination import combine, figure_channels, figure_size, packed_figure
+from controllers.haptic_map.limbs import Limb, with_ends
 from controllers.haptic_map.loops import Loop
-from controllers.haptic_map.mean import mean_derivative, mean_rotation
 from controllers.haptic_map.splines import basis, basis_slope, control_points
-from controllers.haptic_map.support import lowering
-from controllers.rotations import multiply, relative
 from controllers.state import Array, IntArray
 
-_SAMPLES, _CLIPS, _ROTATIONS, _LIMBS, _GROUPS = range(5)
-_WAYS = 3  # parameters of a blend: θ, and two by which the weights change
+_SAMPLES, _CLIPS, _DRIFTS = range(3)
 
 
 @njit
@@ -48,55 +36,6 @@ def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Arr
 
 
 @njit
-def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
-    """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
-    for i in range(value.shape[0]):
-        q, d = value[i, column : column + 4], slope[i, column : column + 4]
-        scale = 1.0 / np.sqrt(max(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1e-12))
-        for j in range(4):
-            unit[i, j] = scale * q[j]
-        _, x, y, z = relative(unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3], d[0], d[1], d[2], d[3])
-        spin[i, 0], spin[i, 1], spin[i, 2] = 2.0 * scale * x, 2.0 * scale * y, 2.0 * scale * z
-
-
-@njit
-def _mean_position(value: Array, slope: Array, column: int, weights: Array, changes: Array, mean: Array) -> None:
-    """Mean of three channels, rows: value, derivatives by θ and the two ways in which the weights change."""
-    mean[:] = 0.0
-    for i in range(value.shape[0]):
-        for k in range(3):
-            mean[0, k] += weights[i] * value[i, column + k]
-            mean[1, k] += weights[i] * slope[i, column + k]
-            mean[2, k] += changes[0, i] * value[i, column + k]
-            mean[3, k] += changes[1, i] * value[i, column + k]
-
-
-@njit
-def _turn_position(angle: float, turn: Array, x: float, y: float, shift: Array, p: Array) -> None:
-    """Move a position and its derivatives by a displacement of the plane: turn by an angle, then shift by (x, y).
-
-    `turn` (3,) and `shift` (2, 3) hold the derivatives of angle and shift.
-    """
-    c, s = np.cos(angle), np.sin(angle)
-    for k in range(_WAYS):
-        dx, dy = p[1 + k, 0] - turn[k] * p[0, 1], p[1 + k, 1] + turn[k] * p[0, 0]
-        p[1 + k, 0], p[1 + k, 1] = c * dx - s * dy + shift[0, k], s * dx + c * dy + shift[1, k]
-    p[0, 0], p[0, 1] = c * p[0, 0] - s * p[0, 1] + x, s * p[0, 0] + c * p[0, 1] + y
-
-
-@njit
-def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
-    """Turn a rotation about the vertical by an angle with derivatives `turn`; rates are local, shape (3, 3)."""
-    up_x, up_y = 2.0 * (q[1] * q[3] - q[0] * q[2]), 2.0 * (q[2] * q[3] + q[0] * q[1])
-    up_z = 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2])
-    for k in range(_WAYS):
-        rate[0, k] += turn[k] * up_x
-        rate[1, k] += turn[k] * up_y
-        rate[2, k] += turn[k] * up_z
-    q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
-
-
-@njit
 def blend(
     params: Array, angle: float, weights: Array, changes: Array, chain: Array, memory: Array, pose: Array,
     jacobian: Array,
@@ -107,81 +46,16 @@ def blend(
     ----------
     params : Array
         `packed_blend`.
-    angle : float
-        θ in [0, 2π].
-    weights : Array, shape (groups, clips)
-        Not negative, of sum 1; group 0 is the root's.
-    changes : Array, shape (groups, 2, clips)
-        Their derivatives by two parameters.
-    chain : Array, shape (3, 6)
-        Derivatives of θ and those two by the stylus.
-    memory : Array
-        The frame of the lap; updated.
-    pose, jacobian : Array, shapes (nq,), (nv, 6)
-        Written.
+    angle, weights, changes, chain, memory, pose, jacobian
+        As `combine` takes them.
     """
-    samples, clips, rotations = int(params[_SAMPLES]), int(params[_CLIPS]), int(params[_ROTATIONS])
-    limbs = int(params[_LIMBS])
-    drifts = params[_GROUPS + rotations : _GROUPS + rotations + 3 * clips]
-    packed = params[_GROUPS + rotations + 3 * clips :]
-    channels = 3 + 4 * rotations + END * limbs
+    samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
+    drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
+    figure = params[_DRIFTS + 3 * clips :]
+    channels = figure_channels(figure)
     value, slope = np.empty((clips, channels)), np.empty((clips, channels))
-    _interpolate(packed[LIMB * limbs :], samples, clips, angle, value, slope)
-    tangents = _WAYS if jacobian.shape[0] > 0 else 0
-
-    drift, shift, turn = np.zeros((3, 3)), np.empty((2, 3)), np.empty(3)
-    for i in range(clips):
-        for k in range(3):
-            drift[0, k] += weights[0, i] * drifts[3 * i + k]
-            drift[1, k] += changes[0, 0, i] * drifts[3 * i + k]
-            drift[2, k] += changes[0, 1, i] * drifts[3 * i + k]
-    update_lap(memory, angle, drift[0])
-
-    unit, spin = np.empty((clips, 4)), np.empty((clips, 3))
-    q, rates = np.empty((rotations, 4)), np.empty((rotations, 3, 3))
-    for joint in range(rotations):
-        group = int(params[_GROUPS + joint])
-        _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
-        mean_rotation(unit, weights[group], q[joint])
-        if tangents:
-            mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
-    root, end, lower = np.empty((4, 3)), np.empty((4, 3)), np.zeros(4)
-    _mean_position(value, slope, 0, weights[0], changes[0], root)
-    if limbs > 0:
-        clearance = slice(3 + 4 * rotations + END - 1, channels, END)
-        lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)
-    for n in range(limbs):
-        limb = packed[LIMB * n : LIMB * (n + 1)]
-        last, column = int(limb[2]), 3 + 4 * rotations + END * n
-        _mean_position(value, slope, column, weights[0], changes[0], end)
-        for k in range(4):
-            end[k, 2] -= lower[k]
-        lag = value[0, column + 3]
-        x, y = drift_motion(drift, lag, 2.0 * np.pi * slope[0, column + 3], shift, turn)
-        _turn_position(lag * drift[0, 2], turn, x, y, shift, end)
-        _turn_rotation(lag * drift[0, 2], turn, q[last], rates[last])
-        place_limb(limb, q, rates, root, end, tangents)
-
-    # The root is in the frame of the drift, and that in the frame of the lap.
-    s = angle / (2.0 * np.pi)
-    x, y = drift_motion(drift, s, 1.0, shift, turn)
-    _turn_position(s * drift[0, 2], turn, x, y, shift, root)
-    _turn_rotation(s * drift[0, 2] + memory[LAP_HEADING], turn, q[0], rates[0])
-    shift[:], turn[:] = 0.0, 0.0
-    _turn_position(memory[LAP_HEADING], turn, memory[LAP_X], memory[LAP_Y], shift, root)
-    pose[0], pose[1], pose[2] = root[0, 0], root[0, 1], root[0, 2]
-    for joint in range(rotations):
-        for j in range(4):
-            pose[3 + 4 * joint + j] = q[joint, j]
-    if tangents:
-        for j in range(jacobian.shape[1]):
-            for i in range(3):
-                jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
-            for joint in range(rotations):
-                for i in range(3):
-                    rate = rates[joint, i]
-                    total = rate[0] * chain[0, j] + rate[1] * chain[1, j] + rate[2] * chain[2, j]
-                    jacobian[3 + 3 * joint + i, j] = total
+    _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
+    combine(figure, value, slope, drifts, angle, weights, changes, chain, memory, pose, jacobian)
 
 
 def _closing_signs(channels: Array, rotations: int) -> Array:
@@ -216,12 +90,4 @@ def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Seque
     channels = with_ends(aligned_channels(loops, samples), drifts, limbs)
     rotations = len(groups)
     rows = control_points(channels, _closing_signs(channels, rotations)).ravel()
-    header = [samples, len(loops), rotations, len(limbs), *groups]
-    return np.concatenate([header, drifts.ravel(), *(limb.packed() for limb in limbs), rows])
-
-
-def fresh_lap() -> Array:
-    """Memory of a blend at the start of a run."""
-    memory = np.zeros(MEMORY)
-    memory[LAST_ANGLE] = np.nan
-    return memory
+    return np.concatenate([[samples, len(loops)], drifts.ravel(), packed_figure(groups, limbs), rows])

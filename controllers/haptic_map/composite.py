@@ -23,9 +23,9 @@ def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     chain = np.empty((3, 6))
     radius, angle = cylinder(x, chain)
     a, slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
-    weights, changes = np.zeros((2, _CLIPS)), np.zeros((2, 2, _CLIPS))
+    weights, changes = np.zeros((2, _CLIPS)), np.zeros((2, 3, _CLIPS))
     weights[0, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - a, a
-    changes[1, 0, 1], changes[1, 0, 2] = -slope, slope
+    changes[1, 1, 1], changes[1, 1, 2] = -slope, slope
     blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
 
 

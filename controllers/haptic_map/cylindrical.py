@@ -24,11 +24,11 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     radius, angle = cylinder(x, chain)
     a, a_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     b, b_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX])
-    weights, changes = np.empty((1, _CLIPS)), np.empty((1, 2, _CLIPS))
+    weights, changes = np.empty((1, _CLIPS)), np.zeros((1, 3, _CLIPS))
     for i in range(_CLIPS):
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
-        weights[0, i], changes[0, 0, i], changes[0, 1, i] = w_r * w_z, d_r * w_z, w_r * d_z
+        weights[0, i], changes[0, 1, i], changes[0, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
     blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
 
 

@@ -47,26 +47,28 @@ def drift_motion(drift: Array, s: float, pace: float, local: Array, turn: Array)
 
     Parameters
     ----------
-    drift : Array, shape (3, 3)
-        ξ = (v_x, v_y, ω), and its derivatives by two parameters.
+    drift : Array, shape (4, 3)
+        ξ = (v_x, v_y, ω), and its derivatives by θ and two other parameters.
     s : float
         Share of the lap.
     pace : float
         2π ds/dθ.
     local : Array, shape (2, 3)
-        Written: derivatives of the translation by θ and the two parameters.
+        Written: derivatives of the translation by the three.
     turn : Array, shape (3,)
         Written: derivatives of the angle s ω by the same.
     """
     angle = s * drift[0, 2]
     q_s, q_c, d_s, d_c = sine_quotients(angle)
     cosine, sine, rate = np.cos(angle), np.sin(angle), pace / (2.0 * np.pi)
-    turn[0] = rate * drift[0, 2]
-    local[0, 0] = rate * (cosine * drift[0, 0] - sine * drift[0, 1])
-    local[1, 0] = rate * (sine * drift[0, 0] + cosine * drift[0, 1])
-    for k in range(1, 3):
-        turn[k] = s * drift[k, 2]
+    for k in range(3):
+        turn[k] = s * drift[1 + k, 2]
         e_s, e_c = d_s * turn[k], d_c * turn[k]
-        local[0, k] = s * (q_s * drift[k, 0] - q_c * drift[k, 1] + e_s * drift[0, 0] - e_c * drift[0, 1])
-        local[1, k] = s * (q_c * drift[k, 0] + q_s * drift[k, 1] + e_c * drift[0, 0] + e_s * drift[0, 1])
+        v_x, v_y = drift[1 + k, 0], drift[1 + k, 1]
+        local[0, k] = s * (q_s * v_x - q_c * v_y + e_s * drift[0, 0] - e_c * drift[0, 1])
+        local[1, k] = s * (q_c * v_x + q_s * v_y + e_c * drift[0, 0] + e_s * drift[0, 1])
+    # By θ there is also the way along the drift.
+    turn[0] += rate * drift[0, 2]
+    local[0, 0] += rate * (cosine * drift[0, 0] - sine * drift[0, 1])
+    local[1, 0] += rate * (sine * drift[0, 0] + cosine * drift[0, 1])
     return s * (q_s * drift[0, 0] - q_c * drift[0, 1]), s * (q_c * drift[0, 0] + q_s * drift[0, 1])

@@ -153,8 +153,8 @@ def mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q:
     spin : Array, shape (m, 3)
         ω_i, local angular velocities of the rotations with respect to one parameter.
     changes : Array, shape (k, m)
-        Derivatives of the weights with respect to k other parameters.
-    tangent : Array, shape (3, 1 + k)
+        Derivatives of the weights with respect to k parameters, that of the spins first.
+    tangent : Array, shape (3, k)
         Written: local angular velocity of the mean with respect to each parameter.
     """
     e = _normal_equations(unit, weights, q)
@@ -168,9 +168,9 @@ def mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q:
         tangent[1, 0] += half * (s * s * b + s * (z * a - x * c) - y * along)
         tangent[2, 0] += half * (s * s * c + s * (x * b - y * a) - z * along)
         for k in range(changes.shape[0]):
-            tangent[0, 1 + k] += changes[k, i] * s * x
-            tangent[1, 1 + k] += changes[k, i] * s * y
-            tangent[2, 1 + k] += changes[k, i] * s * z
+            tangent[0, k] += changes[k, i] * s * x
+            tangent[1, k] += changes[k, i] * s * y
+            tangent[2, k] += changes[k, i] * s * z
     for k in range(tangent.shape[1]):
         x, y, z = _solve(e, 2.0 * tangent[0, k], 2.0 * tangent[1, k], 2.0 * tangent[2, k])
         tangent[0, k], tangent[1, k], tangent[2, k] = x, y, z

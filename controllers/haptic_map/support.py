@@ -47,8 +47,8 @@ def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: 
     ----------
     value, slope : Array, shape (clips, limbs)
         Clearances [m] and their derivatives by θ.
-    weights, changes : Array, shapes (clips,), (2, clips)
-        Of the clips, and their derivatives by two parameters.
+    weights, changes : Array, shapes (clips,), (3, clips)
+        Of the clips, and their derivatives by θ and two other parameters.
     lower : Array, shape (4,)
         Written: c [m] and its derivatives by θ and the two.
     """
@@ -58,13 +58,13 @@ def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: 
         for j in range(limbs):
             mean[j] += weights[i] * value[i, j]
             rates[j, 0] += weights[i] * slope[i, j]
-            rates[j, 1] += changes[0, i] * value[i, j]
-            rates[j, 2] += changes[1, i] * value[i, j]
+            for k in range(3):
+                rates[j, k] += changes[k, i] * value[i, j]
     lower[0] = _raised(mean, rates, lower[1:])
     for i in range(clips):
         own[:, 0] = slope[i]
         height = _raised(value[i], own, change)
         lower[0] -= weights[i] * height
         lower[1] -= weights[i] * change[0]
-        lower[2] -= changes[0, i] * height
-        lower[3] -= changes[1, i] * height
+        for k in range(3):
+            lower[1 + k] -= changes[k, i] * height

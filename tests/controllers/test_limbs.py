@@ -144,7 +144,7 @@ def test_the_end_is_where_it_should_be_or_as_near_as_the_limb_is_long(target, an
 
 
 def test_feet_lifted_in_turn_are_not_both_off_the_ground():
-    weights, changes = np.array([0.5, 0.5]), np.array([[-1.0, 1.0], [0.0, 0.0]])
+    weights, changes = np.array([0.5, 0.5]), np.array([[0.0, 0.0], [-1.0, 1.0], [0.0, 0.0]])
     lower, none = np.empty(4), np.zeros((2, 2))
     lowering(np.array([[0.1, 0.0], [0.0, 0.08]]), none, weights, changes, lower)
     assert 0.03 < lower[0] < 0.04
@@ -160,9 +160,9 @@ def test_the_lowering_changes_as_its_derivatives_say():
     rng = np.random.default_rng(3)
     for _ in range(50):
         value, slope, step, around = rng.uniform(0.0, 0.05, (3, 2)), rng.normal(size=(3, 2)), 1e-6, np.empty((2, 4))
-        weights, changes, lower = rng.dirichlet(np.ones(3)), rng.normal(size=(2, 3)), np.empty(4)
+        weights, changes, lower = rng.dirichlet(np.ones(3)), rng.normal(size=(3, 3)), np.empty(4)
         lowering(value, slope, weights, changes, lower)
-        for way, (d_value, d_weights) in enumerate([(slope, 0.0), (0.0, changes[0]), (0.0, changes[1])]):
+        for way, (d_value, d_weights) in enumerate([(slope, changes[0]), (0.0, changes[1]), (0.0, changes[2])]):
             for sign, out in zip((-step, step), around, strict=True):
                 lowering(value + sign * d_value, slope, weights + sign * d_weights, changes, out)
             assert lower[1 + way] == pytest.approx((around[1, 0] - around[0, 0]) / (2 * step), abs=1e-6)

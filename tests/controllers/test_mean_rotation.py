@@ -64,17 +64,19 @@ def test_half_a_turn_apart_it_follows_the_heavier_and_stays_finite_in_equal_part
 def test_its_derivative_agrees_with_differences(spread):
     for _ in range(20):
         unit, weights = _case(spread)
-        spin, change = RNG.normal(size=(4, 3)), RNG.normal(size=4) * 0.1
-        change -= change.mean()
+        spin, change = RNG.normal(size=(4, 3)), RNG.normal(size=(2, 4)) * 0.1
+        change -= change.mean(axis=1, keepdims=True)
         tangent = np.empty((3, 2))
         q = _mean(unit, weights)
-        mean_derivative(unit, spin, weights, change[None], q, tangent)
+        mean_derivative(unit, spin, weights, change, q, tangent)
         rotations, h = Rotation.from_quat(np.roll(unit, -1, axis=1)), 1e-5
 
         def moved(spun, weighed, rotations=rotations, spin=spin, weights=weights, change=change):
-            q = _mean(wxyz(rotations * Rotation.from_rotvec(spun * spin)), weights + weighed * change)
+            q = _mean(wxyz(rotations * Rotation.from_rotvec(spun * spin)), weights + weighed @ change)
             return Rotation.from_quat(np.roll(q, -1))
 
-        by_spin = (moved(-h, 0.0).inv() * moved(h, 0.0)).as_rotvec() / (2 * h)
-        by_weight = (moved(0.0, -h).inv() * moved(0.0, h)).as_rotvec() / (2 * h)
+        # The first parameter turns the rotations and changes the weights, the second changes the weights alone.
+        first, second = np.array([h, 0.0]), np.array([0.0, h])
+        by_spin = (moved(-h, -first).inv() * moved(h, first)).as_rotvec() / (2 * h)
+        by_weight = (moved(0.0, -second).inv() * moved(0.0, second)).as_rotvec() / (2 * h)
         np.testing.assert_allclose(tangent, np.column_stack([by_spin, by_weight]), atol=2e-7)
