@@ -62,3 +62,37 @@ def logarithm(w: float, x: float, y: float, z: float) -> tuple[float, float, flo
     angle = 2.0 * np.arctan2(sine, np.fabs(w))
     scale = np.copysign(angle / sine, w)
     return scale * x, scale * y, scale * z
+
+
+@njit
+def angular_velocity(x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Local angular velocity of exp(v) as v changes: ω = J_r(v) v̇; in the frame that is not turned it is J_r(−v) v̇.
+
+    J_r(v) v̇ = v̇ − (1 − cos α)/α² v × v̇ + (α − sin α)/α³ v × (v × v̇), α = |v| (Chirikjian 2012, section 10.6).
+    """
+    angle = np.sqrt(x * x + y * y + z * z + 1e-60)
+    first = 2.0 * (np.sin(0.5 * angle) / angle) ** 2
+    # Small angles lose digits here, and the factor v × (v × v̇) makes up for them.
+    second = (angle - np.sin(angle)) / (angle * angle * angle)
+    cx, cy, cz = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
+    return (
+        dx - first * cx + second * (y * cz - z * cy),
+        dy - first * cy + second * (z * cx - x * cz),
+        dz - first * cz + second * (x * cy - y * cx),
+    )
+
+
+@njit
+def rotation_vector_rate(x: float, y: float, z: float, a: float, b: float, c: float) -> tuple[float, float, float]:
+    """Rate of a rotation vector v, |v| ≤ π, whose rotation turns with the local angular velocity ω: v̇ = J_r(v)⁻¹ ω.
+
+    J_r(v)⁻¹ ω = ω + v × ω / 2 + (1 − (α/2) cot(α/2))/α² v × (v × ω); for an ω that is not local it is J_r(−v)⁻¹ ω.
+    """
+    half = 0.5 * np.sqrt(x * x + y * y + z * z + 1e-60)
+    second = 0.25 * (1.0 - half * np.cos(half) / np.sin(half)) / (half * half)
+    cx, cy, cz = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a + 0.5 * cx + second * (y * cz - z * cy),
+        b + 0.5 * cy + second * (z * cx - x * cz),
+        c + 0.5 * cz + second * (x * cy - y * cx),
+    )

@@ -5,7 +5,27 @@ from numba import njit
 
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
+from controllers.haptic_map.expressive import EXPRESSIVE, base_kind, base_params, express
 from controllers.state import Array
+
+
+@njit
+def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """A map that wraps no other."""
+    if kind == CYLINDRICAL:
+        cylindrical_map(params, x, memory, pose, jacobian)
+    elif kind == COMPOSITE:
+        composite_map(params, x, memory, pose, jacobian)
+
+
+@njit
+def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
+    if kind == EXPRESSIVE:
+        _evaluate_one(base_kind(params), base_params(params), x, memory, pose, jacobian)
+        express(params, x, pose, jacobian)
+    else:
+        _evaluate_one(kind, params, x, memory, pose, jacobian)
 
 
 @njit
@@ -21,16 +41,4 @@ def evaluate_map(kind: int, params: Array, x: Array, memory: Array, pose: Array)
     pose : Array, shape (nq,)
         Written.
     """
-    if kind == CYLINDRICAL:
-        cylindrical_map(params, x, memory, pose, np.empty((0, 6)))
-    elif kind == COMPOSITE:
-        composite_map(params, x, memory, pose, np.empty((0, 6)))
-
-
-@njit
-def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
-    if kind == CYLINDRICAL:
-        cylindrical_map(params, x, memory, pose, jacobian)
-    elif kind == COMPOSITE:
-        composite_map(params, x, memory, pose, jacobian)
+    evaluate_map_jacobian(kind, params, x, memory, pose, np.empty((0, 6)))

@@ -1,0 +1,222 @@
+"""Expression: how the stylus is turned turns joints of any map's figure, such as gaze and lean (C is SE(3), not R³)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.cylinder import blend_weight
+from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
+from controllers.state import Array, Pose
+
+EXPRESSIVE = 6
+FADE_FROM = 2.0 * np.pi / 3.0  # angle of the stylus from which its turn fades, to nothing at half a turn [rad]
+_KIND, _JOINTS, _ROWS = range(3)
+_JOINT, _GAIN, _LOW, _HIGH, _ROW = 0, 1, 4, 7, 10
+_ROUNDING = 0.02  # of a room: with less than this left it shrinks to nothing without a corner [rad]
+
+
+@njit
+def base_kind(params: Array) -> int:
+    """Kind of the map that is wrapped."""
+    return int(params[_KIND])
+
+
+@njit
+def base_params(params: Array) -> Array:
+    """Parameters of the map that is wrapped."""
+    return params[_ROWS + _ROW * int(params[_JOINTS]) :]
+
+
+@njit
+def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
+    """Turn r of the stylus, F(|log R|) log R, for a stylus pose (7,); and ∂r/∂ω_H, shape (3, 3)."""
+    a, b, c = logarithm(x[3], x[4], x[5], x[6])
+    angle = np.sqrt(a * a + b * b + c * c)
+    faded, slope = blend_weight(angle, FADE_FROM, np.pi)
+    turn[0], turn[1], turn[2] = a, b, c
+    unit = np.eye(3)
+    for k in range(3):
+        rate = rotation_vector_rate(-a, -b, -c, unit[k, 0], unit[k, 1], unit[k, 2])
+        # The angle grows by the share of ω about the axis; where it does not matter the slope is zero.
+        fading = slope * turn[k] / max(angle, FADE_FROM)
+        for i in range(3):
+            rates[i, k] = (1.0 - faded) * rate[i] - fading * turn[i]
+    for i in range(3):
+        turn[i] *= 1.0 - faded
+
+
+@njit
+def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float, float, float]:
+    r"""Turn f that a joint's room lets through, and its derivatives by what is wanted and by where the joint is.
+
+    .. math:: f = y\,(1 + (y/R)^4)^{-1/4}
+
+    Parameters
+    ----------
+    wanted, there : float
+        Turn y that is wanted, and what the joint has already [rad].
+    low, high : float
+        Ends of its range: R is about the distance to the one in the direction of y, and stays positive [rad].
+    """
+    side = 1.0 if wanted >= 0.0 else -1.0
+    left = (high - there if side > 0.0 else there - low) - _ROUNDING
+    root = np.sqrt(left * left + _ROUNDING * _ROUNDING)
+    room = 0.5 * (left + root)
+    u = wanted / room
+    u4 = u * u * u * u
+    passed = (1.0 + u4) ** -0.25
+    by_wanted = passed / (1.0 + u4)
+    return wanted * passed, by_wanted, -side * u * u4 * by_wanted * 0.5 * (1.0 + left / root)
+
+
+@njit
+def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array) -> None:
+    """Turn one joint, its quaternion (4,) and, unless it has no rows, its derivative (3, 6)."""
+    v = logarithm(q[0], q[1], q[2], q[3])
+    e, by_turn, by_there = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        gain = row[_GAIN + i]
+        e[i], slope, by_there[i] = yielded(gain * turn[i], v[i], row[_LOW + i], row[_HIGH + i])
+        by_turn[i] = slope * gain
+    w, x, y, z = exponential(e[0], e[1], e[2])
+    q[0], q[1], q[2], q[3] = multiply(q[0], q[1], q[2], q[3], w, x, y, z)
+    for k in range(jacobian.shape[1] if jacobian.shape[0] > 0 else 0):
+        a, b, c = jacobian[0, k], jacobian[1, k], jacobian[2, k]
+        d = rotation_vector_rate(v[0], v[1], v[2], a, b, c)
+        dx, dy, dz = by_there[0] * d[0], by_there[1] * d[1], by_there[2] * d[2]
+        if k >= 3:
+            dx += by_turn[0] * rates[0, k - 3]
+            dy += by_turn[1] * rates[1, k - 3]
+            dz += by_turn[2] * rates[2, k - 3]
+        own = angular_velocity(e[0], e[1], e[2], dx, dy, dz)
+        carried = rotate(w, -x, -y, -z, a, b, c)
+        for i in range(3):
+            jacobian[i, k] = own[i] + carried[i]
+
+
+@njit
+def express(params: Array, x: Array, pose: Array, jacobian: Array) -> None:
+    """Turn the joints of a base map's pose, and of its derivative unless that has no rows, as the stylus is turned.
+
+    Parameters
+    ----------
+    params : Array
+        Of an `Expressive`.
+    x : Array, shape (7,)
+        Stylus pose.
+    pose, jacobian : Array, shapes (nq,), (nv, 6)
+        The base map's; updated.
+    """
+    turn, rates = np.empty(3), np.empty((3, 3))
+    stylus_turn(x, turn, rates)
+    for n in range(int(params[_JOINTS])):
+        row = params[_ROWS + _ROW * n : _ROWS + _ROW * (n + 1)]
+        joint = int(row[_JOINT])
+        first = 3 + 3 * joint if jacobian.shape[0] > 0 else 0
+        rows = jacobian[first : first + 3]
+        _turn_joint(row, turn, rates, pose[3 + 4 * joint : 7 + 4 * joint], rows)
+
+
+@dataclass(frozen=True)
+class ExpressiveJoint:
+    """A joint that turns with the stylus.
+
+    Parameters
+    ----------
+    joint : int
+        Joint k has the numbers 3 + 4k to 6 + 4k of a pose; the root, 0, is not to be turned.
+    gain : (float, float, float)
+        Turn about the axes x, y, z of the joint's own frame for each turn of the stylus about those of H [rad/rad].
+    low, high : (float, float, float)
+        Range of the joint's rotation vector [rad].
+    """
+
+    joint: int
+    gain: tuple[float, float, float]
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+class Expressive(HapticMap):
+    r"""A map whose figure also expresses how the stylus is turned: gaze and lean.
+
+    .. math:: q_k(p, R) = q_k(p) \otimes \exp e_k, \qquad e_{k,i} = f(g_{k,i}\, r_i;\, R_{k,i}), \qquad r = F \log R
+
+    q_k is the base map's rotation of joint k, r the turn of the stylus from upright: the rotation vector of R about
+    the axes of H, roll, pitch and yaw. f(y; R) = y (1 + (y/R)⁴)^(−1/4) lets small turns through as they are and
+    never as much as the room R that the pose has left to the end of the joint's range, component by component of its
+    rotation vector. All other joints and the root are the base map's, and all of it is for an upright stylus.
+
+    F is 1 up to a turn of 120° and eases to 0 at 180°: a half turn to the left is one to the right, so any continuous
+    map must forget there which way it went. h is C² in R everywhere, and in the base's pose but where a joint that is
+    turned is half a turn from rest.
+
+    Parameters
+    ----------
+    base : HapticMap
+        Of poses that are root position, root quaternion, then joint quaternions (wxyz).
+    joints : sequence of ExpressiveJoint
+        At least one.
+
+    Raises
+    ------
+    ParameterError
+        If the base has not such poses or these joints, or wraps a map itself; or a gain is not finite, a range empty.
+    """
+
+    def __init__(self, base: HapticMap, joints: Sequence[ExpressiveJoint]) -> None:
+        kind, params, _ = base.compiled()
+        last = (base.nq - 7) // 4
+        if base.nq != 7 + 4 * last or base.nv != 6 + 3 * last:
+            raise ParameterError(
+                f"expression turns joints of poses with 7 + 4 n numbers and 6 + 3 n of a tangent; "
+                f"the base map has {base.nq} and {base.nv}"
+            )
+        if kind == EXPRESSIVE:
+            raise ParameterError("the base of an expressive map is one itself; give all joints to one of them")
+        if not joints:
+            raise ParameterError("expression needs at least one joint that turns with the stylus")
+        rows = [_checked_row(joint, last) for joint in joints]
+        self.base = base
+        self._params = np.concatenate([[kind, len(rows)], *rows, params])
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self.base.nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent."""
+        return self.base.nv
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run."""
+        return CompiledMap(EXPRESSIVE, self._params, self.base.compiled().memory)
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the base map."""
+        pose = self.base.pose(x, memory)
+        express(self._params, np.asarray(x, dtype=np.float64), pose, np.empty((0, STYLUS_TANGENT)))
+        return pose
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in the base map."""
+        pose, jacobian = self.base.pose(x, None if memory is None else memory.copy()), self.base.jacobian(x, memory)
+        express(self._params, np.asarray(x, dtype=np.float64), pose, jacobian)
+        return jacobian
+
+
+def _checked_row(joint: ExpressiveJoint, last: int) -> Array:
+    if not 1 <= joint.joint <= last:
+        raise ParameterError(f"the poses have joints 1 to {last}, expression wants to turn {joint.joint}")
+    gain, low, high = (np.asarray(numbers, dtype=np.float64) for numbers in (joint.gain, joint.low, joint.high))
+    if gain.shape != (3,) or not np.isfinite(gain).all():
+        raise ParameterError(f"gains of joint {joint.joint} must be three finite numbers, got {joint.gain}")
+    if low.shape != (3,) or high.shape != (3,) or not (low < high).all():
+        raise ParameterError(f"the range of joint {joint.joint} must be three intervals, got {joint.low}, {joint.high}")
+    return np.concatenate([[joint.joint], gain, low, high])
