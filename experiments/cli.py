@@ -17,7 +17,7 @@ from typing import Annotated  # noqa: E402
 import tyro  # noqa: E402
 
 from controllers.errors import ControllerError  # noqa: E402
-from experiments.wiring import RunConfig  # noqa: E402
+from experiments.config import ArmConfig, RunConfig  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from sim.errors import SimError  # noqa: E402
 
@@ -156,6 +156,24 @@ class Repair:
 
 
 @dataclass(frozen=True)
+class TeleArm:
+    """Let the field lead a robot arm of seven joints instead of the figure, and write what happened into a folder."""
+
+    config: tyro.conf.OmitArgPrefixes[ArmConfig] = field(default_factory=ArmConfig)
+    out: Path = Path("runs/arm")
+    """Folder to write."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.robot_arm import run_arm
+
+        run_arm(self.config, self.out, self.overwrite)
+        return 0
+
+
+@dataclass(frozen=True)
 class Report:
     """Draw the figures and the page of a run again, from its recording."""
 
@@ -220,6 +238,7 @@ Command = (
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
+    | Annotated[TeleArm, tyro.conf.subcommand("arm")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]

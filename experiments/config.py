@@ -101,3 +101,43 @@ class RunConfig:
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
     grabs: tuple[Grab, ...] = ()
+
+
+@dataclass(frozen=True)
+class ArmConfig:
+    """A run of the robot arm: with the seed, all that decides what happens.
+
+    Parameters
+    ----------
+    user : {"relaxed", "push"}
+        A hand that lets go, or one that pushes outwards and inwards once in the second lap.
+    seconds : float
+        Simulated time [s].
+    seed : int
+        Of where exactly the hand lets go of the stylus at the start.
+    stiffness, damping, tube : float
+        k_r [N/m], b_d [N s/m] and ε [m] of FOLLOW.
+    lap, radius : float
+        Time [s] and radius [m] of the curve, a tilted circle.
+    cutoff : float
+        Corner frequency of the velocity filter [Hz].
+    smoothing : float
+        Bandwidth of the filter between stylus and arm [Hz].
+    arm_ticks : int
+        Servo ticks between two updates of the arm's torques.
+    scene : SceneConfig
+        Servo period and physics step.
+    """
+
+    user: Literal["relaxed", "push"] = "push"
+    seconds: float = 12.0
+    seed: int = 1
+    stiffness: float = 300.0
+    damping: float = 8.0
+    tube: float = 0.25
+    lap: float = 4.0
+    radius: float = 0.05
+    cutoff: float = 150.0
+    smoothing: float = 6.0
+    arm_ticks: int = 4
+    scene: SceneConfig = field(default_factory=SceneConfig)

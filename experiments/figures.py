@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
 PALE_TUBE, PALE_USER = "#dbe7f4", "#fbe3cd"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -63,7 +63,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
         "figure": tracking_figure,
     }
     for name, draw in drawings.items():
-        with mpl.rc_context(_STYLE):
+        with mpl.rc_context(STYLE):
             drawing = draw(recording)
             files.append(folder / f"{name}.png")
             drawing.savefig(files[-1], dpi=150)

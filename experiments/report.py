@@ -9,7 +9,7 @@ import mujoco
 
 from sim.recording import Recording
 from sim.viewer.palette import FIELD, USER
-from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
+from sim.viewer.replay_html import FIGURE_TARGET, MAGNIFICATION, SECONDS, Target, drawn_tube, replay_html
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -49,8 +49,9 @@ their true size.</p>
 
 
 def write_report(
-    path: Path, recording: Recording, model: mujoco.MjModel, title: str, lines: Sequence[str], figures: Sequence[Path]
-) -> None:
+    path: Path, recording: Recording, model: mujoco.MjModel, title: str, lines: Sequence[str], figures: Sequence[Path],
+    target: Target = FIGURE_TARGET,
+) -> None:  # fmt: skip
     """Write the report of a run.
 
     Parameters
@@ -67,6 +68,8 @@ def write_report(
         What happened, a sentence each.
     figures : sequence of Path
         PNG files, which are put into the page.
+    target : Target
+        What follows the animation.
 
     Raises
     ------
@@ -86,7 +89,7 @@ def write_report(
         _PAGE.format(
             title=html.escape(title),
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
-            replay=html.escape(replay_html(recording, model)),
+            replay=html.escape(replay_html(recording, model, target)),
             replayed=replayed,
             tube=tube,
             field=FIELD,

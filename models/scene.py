@@ -9,9 +9,12 @@ import numpy.typing as npt
 from models.errors import ModelError
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_spec
 from models.phantom.spec import phantom_spec
+from models.robot_arm.spec import arm_spec
 
 PHANTOM = "phantom/"
 FIGURE = "figure/"
+ROBOT = "robot/"
+PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Device frame to world: the user faces the way the figure does, so right, up and towards the user are −y, z and −x."""
 P_WH: npt.NDArray[np.float64] = np.array([0.2, -1.0, 1.0])
@@ -74,8 +77,8 @@ def _add_table(world: mujoco.MjsBody) -> None:
             world.add_geom(type=box, size=[0.02, 0.02, height], pos=leg, rgba=wood, contype=0, conaffinity=0)
 
 
-def world_spec(config: SceneConfig) -> mujoco.MjSpec:
-    """The world before compilation: floor, table, Phantom (prefix ``phantom/``) and figure (``figure/``)."""
+def _device_spec(config: SceneConfig) -> mujoco.MjSpec:
+    """Floor, table and Phantom (prefix ``phantom/``)."""
     spec = mujoco.MjSpec()
     spec.modelname = "haptic vector fields"
     spec.option.timestep = config.servo_period / config.substeps()
@@ -104,7 +107,13 @@ def world_spec(config: SceneConfig) -> mujoco.MjSpec:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, R_WP.ravel())
     spec.attach(phantom_spec(), prefix=PHANTOM, frame=world.add_frame(pos=P_WH.tolist(), quat=quaternion.tolist()))
-    spec.attach(figure_spec(config.stature, config.mass), prefix=FIGURE, frame=world.add_frame())
+    return spec
+
+
+def world_spec(config: SceneConfig) -> mujoco.MjSpec:
+    """The world before compilation: floor, table, Phantom (prefix ``phantom/``) and figure (``figure/``)."""
+    spec = _device_spec(config)
+    spec.attach(figure_spec(config.stature, config.mass), prefix=FIGURE, frame=spec.worldbody.add_frame())
     return spec
 
 
@@ -117,3 +126,21 @@ def world_model(config: SceneConfig) -> mujoco.MjModel:
         If the rates do not divide, or stature or mass are outside their intervals.
     """
     return world_spec(config).compile()
+
+
+def robot_world_model(config: SceneConfig) -> mujoco.MjModel:
+    """The compiled world with a robot arm (prefix ``robot/``) on a pedestal in the place of the figure.
+
+    Raises
+    ------
+    ModelError
+        If the rates do not divide.
+    """
+    spec = _device_spec(config)
+    height = 0.5 * PEDESTAL
+    pedestal = spec.worldbody.add_body(name=ROBOT + "pedestal", pos=[0.0, 0.0, height])
+    pedestal.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.16, 0.16, height], rgba=[0.55, 0.57, 0.6, 1.0], contype=0, conaffinity=0
+    )
+    spec.attach(arm_spec(), prefix=ROBOT, frame=pedestal.add_frame(pos=[0.0, 0.0, height]))
+    return spec.compile()

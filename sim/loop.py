@@ -16,6 +16,7 @@ from models.scene import FIGURE
 from sim.devices.simulated import read_phantom
 from sim.errors import SimError
 from sim.recorder import Group, Recorder
+from sim.robot import RobotWorld
 from sim.servo import FrameLog, Servo, TickLog, run_block
 from sim.world import World
 
@@ -51,10 +52,11 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
             hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
             user=np.zeros((ticks, 3)), torque=np.zeros((ticks, 3)), trace=np.zeros((ticks, TRACE_SIZE)),
             ctrl=np.zeros((ticks, len(plant.ctrl))), applied=np.zeros((ticks, plant.substeps, 3)),
-            residual=np.zeros((ticks, 6)),
+            residual=np.zeros((ticks, len(servo.figure.applied))),
         ),
         FrameLog(
-            t=np.zeros(frames), qpos=np.zeros((frames, len(plant.qpos))), reference=np.zeros((frames, N_POSE)),
+            t=np.zeros(frames), qpos=np.zeros((frames, len(plant.qpos))),
+            reference=np.zeros((frames, len(servo.reference.pose))),
             report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
         ),
     )  # fmt: skip
@@ -111,7 +113,7 @@ class Loop:
     def __init__(
         self,
         servo: Servo,
-        world: World,
+        world: World | RobotWorld,
         observe: Observer = lambda ticks, frames, n: None,
         block_seconds: float = BLOCK_SECONDS,
         python_laws: Sequence[PythonLaw] = (),

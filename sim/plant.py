@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from models.scene import FIGURE, PHANTOM
+from models.scene import PHANTOM
 from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, true_motion
 from sim.native import mj_step
+from sim.robot import RobotWorld
 from sim.users.arm import Arm, CompiledArm, hand_force
 from sim.world import World
 
@@ -25,7 +26,7 @@ class Plant(NamedTuple):
     qpos, ctrl, applied : Array
         Views of MuJoCo's own memory: state, motor commands, external generalised forces.
     ground : Array
-        View of the constraint force on the root's linear degrees of freedom: the ground's whole push [N], shape (3,).
+        View of the ground's whole push on the figure [N], shape (3,); zero for a body that does not stand on it.
     arm_v : tuple of three ints
         Degrees of freedom of θ1, θ2, θ3.
     substeps : int
@@ -55,15 +56,13 @@ class Hand(NamedTuple):
     force: Array
 
 
-def make_plant(world: World) -> Plant:
+def make_plant(world: World | RobotWorld) -> Plant:
     """Wire up a world; it must outlive the plant, which holds its addresses."""
     model, data = world.model, world.data
-    root = int(model.joint(FIGURE + "root").dofadr[0])
     a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
     return Plant(
         model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
-        ground=data.qfrc_constraint[root : root + 3], arm_v=(a, b, c), substeps=world.config.substeps(),
-        period=world.config.servo_period,
+        ground=world.ground, arm_v=(a, b, c), substeps=world.config.substeps(), period=world.config.servo_period,
     )  # fmt: skip
 
 

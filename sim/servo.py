@@ -6,7 +6,8 @@ Each tick of period T:
 2. `evaluate`: the field's program → wrench, and where on the curve the hand is.
 3. `limit_force`: what the device may be asked for.
 4. `actuate`: τ = Jᵀ F + N → the Phantom's motors.
-5. Every `figure_ticks` ticks: `update_reference` (h and its derivatives along the hand's motion), `figure_torque`.
+5. Every `figure_ticks` ticks: `update_reference` (h and its derivatives along the hand's motion), and `drive`, which
+   sets the torques of the figure that follows it.
 6. For each physics step: the hand's force → external torques on the linkage; `mj_step`.
 
 The loop holds no Python object and not the GIL. The same loop replays recorded controls: steps 1–5 and the hand are
@@ -23,9 +24,9 @@ from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.program import evaluate
 from controllers.safety import limit_force
 from controllers.state import HAND_TIME
+from sim.body import BodyState, drive
 from sim.compiled import entry_point
 from sim.devices.phantom_port import PhantomPort, actuate, has_sensed, sense
-from sim.figure import FigureState, figure_torque
 from sim.plant import Hand, Plant, advance
 from sim.reference import CompiledReference, update_reference
 
@@ -46,14 +47,14 @@ class Field(NamedTuple):
 
 
 class Servo(NamedTuple):
-    """All that the loop works on; the figure is updated every `figure_ticks` ticks."""
+    """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks."""
 
     plant: Plant
     port: PhantomPort
     field: Field
     hand: Hand
     reference: CompiledReference
-    figure: FigureState
+    figure: BodyState
     figure_ticks: int
 
 
@@ -127,7 +128,7 @@ def move_figure(servo: Servo) -> None:
     """Update the animation at the measured stylus, and the torques that follow it."""
     reference = servo.reference
     update_reference(reference, servo.port.hand[1:8])
-    figure_torque(servo.figure, reference.pose, reference.velocity, reference.acceleration)
+    drive(servo.figure, reference.pose, reference.velocity, reference.acceleration)
 
 
 @entry_point

@@ -55,26 +55,42 @@ class World:
         SimError
             If the Phantom cannot reach the point.
         """
-        mujoco.mj_resetData(self.model, self.data)
-        theta = phantom_angles(p_H)
-        qpos = self.data.qpos
-        for name, angle in (
-            ("theta1", theta[0]),
-            ("theta2", theta[1]),
-            ("theta3", theta[2]),
-            ("elbow", theta[2] - theta[1]),
-            ("twin", theta[1] - theta[2]),
-        ):
-            qpos[self.model.joint(PHANTOM + name).qposadr[0]] = angle
+        place_stylus(self.model, self.data, p_H)
         root = int(self.model.joint(FIGURE + "root").qposadr[0])
-        qpos[root : root + N_POSE] = pose
+        self.data.qpos[root : root + N_POSE] = pose
         mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def ground(self) -> Array:
+        """View of the constraint force on the root's linear degrees of freedom: the ground's push [N], shape (3,)."""
+        root = int(self.model.joint(FIGURE + "root").dofadr[0])
+        return self.data.qfrc_constraint[root : root + 3]
 
     def warnings(self) -> dict[str, int]:
         """MuJoCo's warnings since the last reset, by name; empty if there was none."""
         names = [warning.name.removeprefix("mjWARN_").lower() for warning in mujoco.mjtWarning.__members__.values()]
         counts = (int(warning.number) for warning in self.data.warning)
         return {name: count for name, count in zip(names, counts, strict=False) if count}
+
+
+def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array) -> None:
+    """Reset a world that holds the Phantom, with the stylus tip at a point of the hand frame [m], shape (3,).
+
+    Raises
+    ------
+    SimError
+        If the Phantom cannot reach the point.
+    """
+    mujoco.mj_resetData(model, data)
+    theta = phantom_angles(p_H)
+    for name, angle in (
+        ("theta1", theta[0]),
+        ("theta2", theta[1]),
+        ("theta3", theta[2]),
+        ("elbow", theta[2] - theta[1]),
+        ("twin", theta[1] - theta[2]),
+    ):
+        data.qpos[model.joint(PHANTOM + name).qposadr[0]] = angle
 
 
 def phantom_angles(p_H: Array) -> tuple[float, float, float]:

@@ -8,6 +8,7 @@ moves under it.
 
 import contextlib
 import io
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -33,17 +34,41 @@ TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
 
-def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
+class Target(NamedTuple):
+    """What follows the animation.
+
+    Attributes
+    ----------
+    prefix : str
+        Of its bodies and joints in the world.
+    name, animation : str
+        What the labels call it and what it follows.
+    height : float
+        Of the labels [m].
+    """
+
+    prefix: str
+    name: str
+    animation: str
+    height: float
+
+
+FIGURE_TARGET = Target("figure/", "physical figure", "animation h(p)", 2.0)
+
+
+def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FIGURE_TARGET) -> str:
     """The page.
 
     Parameters
     ----------
     recording : Recording
         With arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius`` and ``p_WH``, the hand frame's
-        origin in the world; in group ``frames`` the channels t, qpos (nq) and reference (75); in group ``ticks`` the
-        channels t, p, force and user (3 each, hand frame).
+        origin in the world; in group ``frames`` the channels t, qpos (nq) and reference (75, or the target's); in group
+        ``ticks`` the channels t, p, force and user (3 each, hand frame).
     model : mujoco.MjModel
-        The world that was recorded: bodies named ``phantom/…`` and ``figure/…``.
+        The world that was recorded: bodies named ``phantom/…`` and those of the target.
+    target : Target
+        What follows the animation.
 
     Returns
     -------
@@ -59,7 +84,7 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     with contextlib.redirect_stdout(quiet):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        page = _Stage(server.scene, recording, model).play(server)
+        page = _Stage(server.scene, recording, model, target).play(server)
     finally:
         with contextlib.redirect_stdout(quiet):
             server.stop()
@@ -102,15 +127,17 @@ class _Actor:
 class _Stage:
     """Everything that is drawn, and how it moves."""
 
-    def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel):
+    def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel, target: Target):
         self._scene = scene
         self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
         self._frames = {name: recording.channel("frames", name) for name in ("t", "qpos", "reference")}
         self._data = mujoco.MjData(model)
         self._model = model
-        self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
+        first = next(joint for joint in range(model.njnt) if model.joint(joint).name.startswith(target.prefix))
+        self._root = int(model.jnt_qposadr[first])
+        self._travels = model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
         self._p_WH = recording.array("p_WH")
-        figure = body_shapes(model, "figure/")
+        figure = body_shapes(model, target.prefix)
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
         self._ghost = _Actor(scene, "ghost", figure, 1.0, ghost=True)
@@ -125,8 +152,9 @@ class _Stage:
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
-        self._label("figure", "physical figure", np.array([0.0, 0.0, 2.0]))
-        self._label("ghost", "animation h(p)", GHOST_AT + np.array([0.0, 0.0, 2.0]))
+        above = np.array([0.0, 0.0, target.height])
+        self._label("figure", target.name, above)
+        self._label("ghost", target.animation, GHOST_AT + above)
 
     def _label(self, name: str, text: str, position: Array) -> None:
         self._scene.add_label(
@@ -163,7 +191,8 @@ class _Stage:
         n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
         shown = times[0] + np.arange(n) / FPS
         ticks, frames = (np.minimum(np.searchsorted(t, shown), len(t) - 1) for t in (times, frame_times))
-        followed = _followed(np.array([self._frames["reference"][int(k)][:2] for k in frames]))
+        roots = np.array([self._frames["reference"][int(k)][:2] for k in frames])
+        followed = _followed(roots) if self._travels else np.zeros_like(roots)
         piece = int(TRAIL_SECONDS * FPS)
         for i in range(n):
             self._show(int(ticks[i]), int(frames[i]), followed[i])

@@ -1,0 +1,298 @@
+r"""A map that is not of a human: the stylus leads the tool of a robot arm of seven joints.
+
+The tool's pose is the stylus's, moved, scaled and kept within a domain (`saturation`):
+
+.. math:: p_T = p_0 + \kappa\, f(p_H), \qquad R_T = \exp f(\log R_H)\; R_0
+
+The joints follow by closed-form inverse kinematics of a spherical shoulder (axes z, y, z), an elbow (y) and a spherical
+wrist (z, y, z). With x from shoulder to wrist, of length D, azimuth a and angle e from the vertical, l the lengths of
+upper arm and forearm,
+
+.. math:: \cos q_4 = \frac{D^2 - l_1^2 - l_2^2}{2 l_1 l_2}, \quad
+          \beta = \operatorname{atan2}(l_2 \sin q_4,\, l_1 + l_2 \cos q_4), \quad
+          R_{03} = R_z(a)\,R_y(e)\,R_z(\psi)\,R_y(-\beta)
+
+and the angles of shoulder and wrist are those of R_03 and R_04ᵀ R_T. The redundant degree of freedom is the arm angle ψ
+(Kreutz-Delgado, Long & Seraji 1992), the turn of the elbow about x away from the vertical plane; it is kept constant,
+so that a closed path of the tool is a closed path of the joints. h_* follows the same steps.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.saturation import saturate_vector
+from controllers.rotations import exponential, logarithm, multiply, rotate
+from controllers.state import Array, Pose
+
+ROBOT_ARM = 4
+JOINTS = 7
+_HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 4, 6, 8, 12, 16, 17
+
+_FAR, _NEARLY_BACK = 1e3, 3.1  # [m], [rad] where a saturated stylus is on the edge of its domain
+_LEAST_BEND = np.radians(8.0)  # of the joints at whose zero shoulder, elbow or wrist are singular
+
+_Vector = tuple[float, float, float]
+_Quaternion = tuple[float, float, float, float]
+
+
+@njit
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def _about_y(angle: float) -> _Quaternion:
+    return np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0
+
+
+@njit
+def _about_z(angle: float) -> _Quaternion:
+    return np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
+
+
+@njit
+def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    return multiply(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+
+
+@njit
+def _turned(q: _Quaternion, v: _Vector) -> _Vector:
+    return rotate(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
+
+
+@njit
+def _wrapped(angle: float) -> float:
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+@njit
+def _zyz(q: _Quaternion, sign: float) -> _Vector:
+    """Angles of R_z(a) R_y(b) R_z(c), b of a given sign; at b = 0 only a + c is defined."""
+    w, x, y, z = q
+    total, difference = np.arctan2(z, w), np.arctan2(-sign * x, sign * y)
+    b = 2.0 * np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
+    return _wrapped(total + difference), sign * b, _wrapped(total - difference)
+
+
+@njit
+def _zyz_rates(a: float, b: float, omega: _Vector) -> _Vector:
+    """Rates of the three angles for an angular velocity in the frame in which the first turns."""
+    sine, cosine = np.sin(a), np.cos(a)
+    rate_c = (cosine * omega[0] + sine * omega[1]) / np.copysign(max(abs(np.sin(b)), 1e-9), b)
+    return omega[2] - np.cos(b) * rate_c, cosine * omega[1] - sine * omega[0], rate_c
+
+
+@njit
+def _left_jacobian(r: Array, inverse: bool, v: _Vector) -> _Vector:
+    """J(r) v or J(r)⁻¹ v, where the angular velocity of exp(r) is J(r) ṙ."""
+    square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    angle = np.sqrt(square)
+    if inverse:
+        first = -0.5
+        half = 0.5 * angle
+        second = (1.0 - half / np.tan(half)) / square if angle > 1e-2 else 1.0 / 12.0 + square / 720.0
+    else:
+        first = (1.0 - np.cos(angle)) / square if angle > 1e-2 else 0.5 - square / 24.0
+        second = (1.0 - np.sin(angle) / angle) / square if angle > 1e-2 else 1.0 / 6.0 - square / 120.0
+    axis = r[0], r[1], r[2]
+    once = _cross(axis, v)
+    twice = _cross(axis, once)
+    return (
+        v[0] + first * once[0] + second * twice[0],
+        v[1] + first * once[1] + second * twice[1],
+        v[2] + first * once[2] + second * twice[2],
+    )
+
+
+@njit
+def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `RobotArm`: h(x), and h_*(x) unless `jacobian` has no rows."""
+    place, place_slope = x[:3].copy(), np.empty((3, 3))
+    saturate_vector(place, params[_REACH], params[_REACH + 1], place_slope)
+    stylus, turn_slope = np.empty(3), np.empty((3, 3))
+    stylus[0], stylus[1], stylus[2] = logarithm(x[3], x[4], x[5], x[6])
+    turn = stylus.copy()
+    saturate_vector(turn, params[_TURN], params[_TURN + 1], turn_slope)
+    led = exponential(turn[0], turn[1], turn[2])
+    home = params[_ORIENTATION], params[_ORIENTATION + 1], params[_ORIENTATION + 2], params[_ORIENTATION + 3]
+    tool = _product(led, home)
+    base, upper, fore, hand = params[_LENGTHS], params[_LENGTHS + 1], params[_LENGTHS + 2], params[_LENGTHS + 3]
+    lever = _turned(tool, (0.0, 0.0, hand))
+
+    scale = params[_SCALE]
+    px = params[_HOME] + scale * place[0] - lever[0]
+    py = params[_HOME + 1] + scale * place[1] - lever[1]
+    pz = params[_HOME + 2] + scale * place[2] - lever[2] - base
+    flat2 = px * px + py * py
+    flat, square = np.sqrt(flat2), flat2 + pz * pz
+    azimuth, elevation = np.arctan2(py, px), np.arctan2(flat, pz)
+    cosine = (square - upper * upper - fore * fore) / (2.0 * upper * fore)
+    # Out of reach the arm is stretched; `RobotArm` refuses a domain where that happens.
+    cosine = min(1.0, max(-1.0, cosine))
+    sine = np.sqrt(1.0 - cosine * cosine)
+    elbow = np.arctan2(sine, cosine)
+    beta = np.arctan2(fore * sine, upper + fore * cosine)
+    to_wrist = _product(_about_z(azimuth), _about_y(elevation))
+    plane = _product(to_wrist, _about_z(params[_ARM_ANGLE]))
+    shoulder = _product(plane, _about_y(-beta))
+    arm = _product(shoulder, _about_y(elbow))
+    wrist = _product((arm[0], -arm[1], -arm[2], -arm[3]), tool)
+    pose[0], pose[1], pose[2] = _zyz(shoulder, 1.0)
+    pose[3] = elbow
+    pose[4], pose[5], pose[6] = _zyz(wrist, -1.0)
+
+    y_elevation, y_beta = _turned(_about_z(azimuth), (0.0, 1.0, 0.0)), _turned(plane, (0.0, 1.0, 0.0))
+    y_elbow = _turned(shoulder, (0.0, 1.0, 0.0))
+    for j in range(STYLUS_TANGENT if jacobian.shape[0] > 0 else 0):
+        v, w_tool = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if j < 3:
+            v = scale * place_slope[0, j], scale * place_slope[1, j], scale * place_slope[2, j]
+        else:
+            unit = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
+            rate = _left_jacobian(stylus, True, unit)
+            led_rate = (
+                turn_slope[0, 0] * rate[0] + turn_slope[0, 1] * rate[1] + turn_slope[0, 2] * rate[2],
+                turn_slope[1, 0] * rate[0] + turn_slope[1, 1] * rate[1] + turn_slope[1, 2] * rate[2],
+                turn_slope[2, 0] * rate[0] + turn_slope[2, 1] * rate[1] + turn_slope[2, 2] * rate[2],
+            )
+            w_tool = _left_jacobian(turn, False, led_rate)
+            swing = _cross(w_tool, lever)
+            v = -swing[0], -swing[1], -swing[2]
+        rate_azimuth = (px * v[1] - py * v[0]) / flat2
+        rate_flat = (px * v[0] + py * v[1]) / flat
+        rate_elevation = (pz * rate_flat - flat * v[2]) / square
+        rate_cosine = (px * v[0] + py * v[1] + pz * v[2]) / (upper * fore)
+        rate_elbow = -rate_cosine / max(sine, 1e-9)
+        # β = atan2(s, c) with s² + c² = D²: β' = (c s' − s c')/D².
+        along = upper + fore * cosine
+        rate_beta = (along * fore * cosine * rate_elbow - fore * sine * fore * rate_cosine) / square
+        w_shoulder = (
+            rate_elevation * y_elevation[0] - rate_beta * y_beta[0],
+            rate_elevation * y_elevation[1] - rate_beta * y_beta[1],
+            rate_azimuth + rate_elevation * y_elevation[2] - rate_beta * y_beta[2],
+        )
+        w_wrist = (
+            w_tool[0] - w_shoulder[0] - rate_elbow * y_elbow[0],
+            w_tool[1] - w_shoulder[1] - rate_elbow * y_elbow[1],
+            w_tool[2] - w_shoulder[2] - rate_elbow * y_elbow[2],
+        )
+        jacobian[0, j], jacobian[1, j], jacobian[2, j] = _zyz_rates(pose[0], pose[1], w_shoulder)
+        jacobian[3, j] = rate_elbow
+        in_arm = _turned((arm[0], -arm[1], -arm[2], -arm[3]), w_wrist)
+        jacobian[4, j], jacobian[5, j], jacobian[6, j] = _zyz_rates(pose[4], pose[5], in_arm)
+
+
+class RobotArm(HapticMap):
+    """The stylus leads the tool of a robot arm.
+
+    A configuration is the seven joint angles [rad], a tangent their rates [rad/s]. Stylus positions are kept within a
+    ball about the origin of H and its rotations from upright within a cone, smoothly (C²): beyond, the arm stays at the
+    edge. A stylus turned by exactly half a turn may be led to either side: h jumps there.
+
+    Parameters
+    ----------
+    lengths : sequence of four floats
+        Base to shoulder, to elbow, to wrist, to tool [m].
+    limits : Array, shape (7, 2)
+        Least and greatest joint angles [rad].
+    home : Array-like, shape (3,)
+        p_0, the tool's position in the frame of the arm's base when the stylus is at the origin of H [m].
+    orientation : Array-like, shape (4,)
+        R_0, the tool's orientation in that frame for an upright stylus, quaternion wxyz; its z axis is the tool's.
+    scale : float
+        κ, tool's motion over the stylus's.
+    reach : tuple of two floats
+        Stylus distance up to which the tool follows exactly, and beyond which it never goes [m].
+    turn : tuple of two floats
+        Likewise of the stylus's rotation from upright [rad].
+    arm_angle : float
+        ψ [rad].
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval, or somewhere in the domain the arm does not reach, its wrist or shoulder is
+        straight, or a joint is beyond its limits; the message has the place.
+    """
+
+    def __init__(
+        self,
+        lengths: Sequence[float],
+        limits: Array,
+        home: npt.ArrayLike,
+        orientation: npt.ArrayLike,
+        scale: float,
+        reach: tuple[float, float],
+        turn: tuple[float, float],
+        arm_angle: float,
+    ) -> None:
+        q = np.asarray(orientation, dtype=float)
+        numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
+        self._params = np.array(numbers, dtype=float)
+        if self._params.shape != (_SIZE,) or not np.isfinite(self._params).all():
+            raise ParameterError(f"a robot arm's map has {_SIZE} finite numbers, got {numbers}")
+        if not (scale > 0.0 and 0.0 < reach[0] < reach[1] and 0.0 < turn[0] < turn[1] < np.pi):
+            raise ParameterError(
+                f"scale {scale}, reach {reach} m, turn {turn} rad; expected positive numbers, intervals that increase"
+            )
+        self._check_domain(np.asarray(limits, dtype=float))
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration: seven."""
+        return JOINTS
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent: seven."""
+        return JOINTS
+
+    @cached_property
+    def _compiled(self) -> CompiledMap:
+        return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it; it keeps no memory."""
+        return self._compiled
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Joint angles h(x) [rad], shape (7,), of a stylus pose (7,)."""
+        pose = np.empty(JOINTS)
+        robot_arm_map(self._params, _stylus(x), np.zeros(0), pose, np.empty((0, STYLUS_TANGENT)))
+        return pose
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (7, 6): columns linear, then angular velocity in H."""
+        jacobian = np.empty((JOINTS, STYLUS_TANGENT))
+        robot_arm_map(self._params, _stylus(x), np.zeros(0), np.empty(JOINTS), jacobian)
+        return jacobian
+
+    def _check_domain(self, limits: Array) -> None:
+        """Refuse a domain in whose ball and cone the arm does not work, on a grid of directions and sizes."""
+        directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
+        directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
+        for place in _FAR * directions:
+            for turned in _NEARLY_BACK * directions:
+                x = np.concatenate([place, exponential(*turned)])
+                q = self.pose(x)
+                straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
+                if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
+                    raise ParameterError(
+                        f"the arm cannot follow a stylus at {np.round(1e3 * place)} mm turned by "
+                        f"{np.round(np.degrees(turned))}°: joint angles {np.round(np.degrees(q))}°; expected "
+                        f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
+                        f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
+                    )
+
+
+def _stylus(x: Array) -> Array:
+    stylus = np.asarray(x, dtype=np.float64)
+    if stylus.shape != (STYLUS,):
+        raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
+    return stylus

@@ -1,0 +1,1 @@
+"""A seven-joint robot arm of spherical shoulder, elbow and spherical wrist."""
