@@ -1,7 +1,6 @@
 """Telerobotics: the same field and the same loop lead a robot arm of seven joints instead of a human figure."""
 
 import json
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -49,6 +48,7 @@ REACH = (0.07, 0.1)  # [m]
 TURN = (np.radians(15.0), np.radians(25.0))
 ARM_ANGLE = np.radians(30.0)
 RATE = 60.0  # of the arm's computed torque [1/s]
+FIGURE = "arm.png"
 _TARGET = Target(ROBOT, "robot arm", "h(p, R)", 1.6)
 
 
@@ -215,12 +215,12 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
         "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
     }  # fmt: skip
     with Recorder(out / RECORDING, asdict(config), config.seed, arm_groups(servo), static) as recorder:
-        begin = time.perf_counter()
-        Loop(servo, world, record_arm(recorder, servo, world)).run(config.seconds)
-        wall = time.perf_counter() - begin
+        loop, first = Loop(servo, world, record_arm(recorder, servo, world)), servo.plant.period * config.arm_ticks
+        loop.run(first)
+        times = loop.run(config.seconds - first)
         recorder.flush()
         with Recording(out / RECORDING) as recording:
-            summary = arm_summary(recording, world.arm, config, wall)
+            summary = arm_summary(recording, world.arm, config, times.real_time_factor)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     (out / SUMMARY).write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
     with Recording(out / RECORDING) as recording:
@@ -235,10 +235,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     return summary
 
 
-FIGURE = "arm.png"
-
-
-def arm_summary(recording: Recording, arm: mujoco.MjModel, config: ArmConfig, wall: float) -> ArmSummary:
+def arm_summary(recording: Recording, arm: mujoco.MjModel, config: ArmConfig, speed: float) -> ArmSummary:
     """Measure a recording made with `arm_groups`."""
     t, distance, phase = (recording.channel("ticks", name)[:] for name in ("t", "distance", "phase"))
     work = np.linalg.norm(recording.channel("ticks", "user")[:], axis=1) > 1e-3
@@ -262,7 +259,7 @@ def arm_summary(recording: Recording, arm: mujoco.MjModel, config: ArmConfig, wa
         joints_rms_deg=float(np.degrees(np.sqrt(np.mean((joints - reference) ** 2)))),
         torque_share=float((torque / arm.actuator_ctrlrange[:, 1]).max()),
         nearest_limit_deg=float(np.degrees(room.min())),
-        real_time_factor=config.seconds / wall,
+        real_time_factor=speed,
     )
 
 
@@ -273,9 +270,9 @@ def arm_figure(recording: Recording) -> Figure:
     ticks, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     path, error = figure.subplots(1, 2, width_ratios=(1, 1.6))
-    path.plot(curve[:, 1], curve[:, 2], color=CURVE, ls=(0, (4, 3)), lw=0.8, label="curve, scaled")
-    path.plot(tool[:, 1], tool[:, 2], color=FIELD, label="tool")
-    path.set(xlabel="y [m]", ylabel="z [m]", title="tool, from the front", aspect="equal")
+    path.plot(1e3 * tool[:, 1], 1e3 * tool[:, 2], color=FIELD, label="tool")
+    path.plot(1e3 * curve[:, 1], 1e3 * curve[:, 2], color=CURVE, ls=(0, (4, 3)), lw=0.8, label="curve, scaled")
+    path.set(xlabel="y [mm]", ylabel="z [mm]", title="tool, from the front", aspect="equal")
     path.legend()
     error.plot(t, 1e3 * np.linalg.norm(tool - led, axis=1), color=FIELD, label="tool from where it is led [mm]")
     error.plot(ticks, np.linalg.norm(user, axis=1), color=USER, label="force of the hand [N]")
