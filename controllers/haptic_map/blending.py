@@ -7,7 +7,8 @@ from numba import njit
 
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.combination import combine, figure_channels, figure_size, packed_figure
-from controllers.haptic_map.limbs import Limb, with_ends
+from controllers.haptic_map.limb_ends import with_ends
+from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.state import Array, IntArray

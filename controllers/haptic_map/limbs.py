@@ -11,21 +11,14 @@ With c = (D² − A)/√(B² + C²), the cosine of the flexion asked for, and c�
 f is the arc cosine, levelled off near ±1 with two continuous derivatives. A limb asked to be longer than it is stays
 short, by a millimetre for a human leg, and moves smoothly; and δ is zero where nothing is to be corrected, however
 straight: a clip alone is left as it is.
-
-A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
-drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while
-it moves; λ is common to all clips, and of no consequence unless some clip turns.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.loops import plane_exponential, turned, yawed
 from controllers.rotations import multiply, rotate
 from controllers.state import Array, Vec3
 
@@ -33,7 +26,6 @@ LIMB = 18  # numbers of a packed limb
 END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
 
 _STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
-_SOFTNESS = 0.003  # [m] of the minimum of heights
 _SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
 _SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
 
@@ -82,86 +74,6 @@ class Limb:
         axis = np.asarray(self.axis, dtype=np.float64)
         unit = axis / max(float(np.linalg.norm(axis)), 1e-300)
         return np.concatenate([self.joints, np.ravel(self.offsets), unit, np.mean(self.points, axis=0)])
-
-
-def _end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
-    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq), and height (n, m)."""
-    n, m, _ = channels.shape
-    place, turn = channels[..., :3].reshape(-1, 3), _rotations(channels, 0)
-    for joint, offset in zip(limb.joints, limb.offsets, strict=True):
-        place = place + turn.apply(offset)
-        turn = turn * _rotations(channels, joint)
-    points = np.stack([place + turn.apply(point) for point in limb.points])
-    quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
-    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
-    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
-    # A soft minimum: heel and toe take turns without a kink.
-    height = -_SOFTNESS * np.log(np.exp(-points[..., 2] / _SOFTNESS).sum(axis=0))
-    return points.mean(axis=0).reshape(n, m, 3), quaternions, height.reshape(n, m)
-
-
-def _rotations(channels: Array, joint: int) -> Rotation:
-    return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
-
-
-def _lag(places: Array, drifts: Array) -> Array:
-    """λ at each sample (n,): the share of the lap's movement that an end has done, less the share of the lap."""
-    n = len(places)
-    weights = np.abs(drifts[:, 2])
-    if not weights.any():
-        return np.zeros(n)
-    rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]
-    across = np.stack([-places[..., 1], places[..., 0]], axis=-1)
-    # Over the ground an end moves with the drift of its clip, and in its frame.
-    square = ((rate + drifts[:, :2] + drifts[:, 2:] * across) ** 2).sum(axis=2)
-    pace = square / np.maximum(square.mean(axis=0), 1e-12)
-    pace = pace @ weights / weights.sum()
-    lag = (np.cumsum(pace) - 0.5 * pace - np.arange(n) - 0.5) / n
-    return lag - lag.mean()
-
-
-def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
-    """Channels in which limbs are given by their ends.
-
-    Parameters
-    ----------
-    channels : Array, shape (n, m, nq)
-        Remainders of m aligned loops at equal steps of the lap (see `alignment`).
-    drifts : Array, shape (m, 3)
-        Their drifts ξ.
-    limbs : sequence of Limb
-
-    Returns
-    -------
-    Array, shape (n, m, nq + 5 limbs)
-        Each limb's last joint has the end's orientation instead of its own; appended are, limb by limb, the end's
-        position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
-
-    Raises
-    ------
-    ParameterError
-        If a limb has a joint that the poses do not have.
-    """
-    result, places, heights, lags = channels.copy(), [], [], []
-    joints = (channels.shape[2] - 7) // 4
-    for limb in limbs:
-        if max(limb.joints) > joints:
-            raise ParameterError(f"the poses have {joints} joints, a limb wants {limb.joints}")
-        place, quaternions, height = _end_poses(channels, limb)
-        lag = _lag(place, drifts)
-        shift, angle = plane_exponential(lag[:, None, None] * drifts)
-        place[..., :2] = turned(-angle, place[..., :2] - shift)
-        column = 3 + 4 * limb.joints[2]
-        result[..., column : column + 4] = yawed(-angle, quaternions)
-        places.append(place)
-        heights.append(height)
-        lags.append(np.broadcast_to(lag[:, None], height.shape))
-    ground = min((float(height.min()) for height in heights), default=0.0)
-    ends = [
-        np.concatenate([place, lag[..., None], height[..., None] - ground], axis=2)
-        for place, lag, height in zip(places, lags, heights, strict=True)
-    ]
-    return np.concatenate([result, *ends], axis=2)
 
 
 @njit

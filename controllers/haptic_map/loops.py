@@ -147,7 +147,7 @@ def checked_clip(poses: Array, fps: float, name: str) -> Array:
     return array
 
 
-def _drift(poses: Array) -> Array:
+def drift_of(poses: Array) -> Array:
     """ξ of a clip from its first and last frame and the turns between."""
     first, last = poses[0], poses[-1]
     w = float(last[3:7] @ first[3:7])
@@ -166,13 +166,25 @@ def _drift(poses: Array) -> Array:
     return np.append(np.linalg.solve(columns.T, step), angle)
 
 
-def _remainder(poses: Array, s: Array, drift: Array) -> Array:
+def remainder(poses: Array, s: Array, drift: Array) -> Array:
     """ρ and the joints: the poses with the root moved by exp(−s ξ)."""
     rest = poses.copy()
     shift, angle = plane_exponential(s[:, None] * drift)
     rest[:, :2] = turned(-angle, poses[:, :2] - shift)
     rest[:, 3:7] = yawed(-angle, poses[:, 3:7])
     return rest
+
+
+def placed_at_origin(poses: Array, s: Array) -> Array:
+    """Poses (n, nq) moved over the ground such that the remainder at phases s (n,) is at the origin, facing +x."""
+    placed = poses.copy()
+    placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
+    w, _, _, z = remainder(placed, s, drift_of(placed))[:, 3:7].T
+    # Mean heading by the doubled half angle, which does not know the sign of a quaternion.
+    heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
+    placed[:, :2] = turned(np.array(-heading), placed[:, :2])
+    placed[:, 3:7] = yawed(np.full(len(s), -heading), placed[:, 3:7])
+    return placed
 
 
 def closed_loop(poses: Array, fps: float) -> Loop:
@@ -182,15 +194,9 @@ def closed_loop(poses: Array, fps: float) -> Loop:
     way to each other by quintics, so that value, slope and second derivative meet.
     """
     s = np.linspace(0.0, 1.0, len(poses))
-    placed = poses.copy()
-    placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
-    w, _, _, z = _remainder(placed, s, _drift(placed))[:, 3:7].T
-    # Mean heading by the doubled half angle, which does not know the sign of a quaternion.
-    heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
-    placed[:, :2] = turned(np.array(-heading), placed[:, :2])
-    placed[:, 3:7] = yawed(np.full(len(s), -heading), placed[:, 3:7])
-    drift = _drift(placed)
-    rest = _remainder(placed, s, drift)
+    placed = placed_at_origin(poses, s)
+    drift = drift_of(placed)
+    rest = remainder(placed, s, drift)
     splines: list[CubicSpline] = []
     gap = 0.0
     for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:

@@ -1,0 +1,134 @@
+r"""Clips in which a limb is given by its end: where it is, how it is turned, and how high above the ground.
+
+A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
+drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while
+it moves; λ is common to all clips, and of no consequence unless some clip turns.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.limbs import Limb
+from controllers.haptic_map.loops import plane_exponential, turned, yawed
+from controllers.state import Array
+
+_SOFTNESS = 0.003  # [m] of the minimum of heights
+
+
+def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
+    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq), and height (n, m)."""
+    n, m, numbers = channels.shape
+    if max(limb.joints) > (numbers - 7) // 4:
+        raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb wants {limb.joints}")
+    place, turn = channels[..., :3].reshape(-1, 3), _rotations(channels, 0)
+    for joint, offset in zip(limb.joints, limb.offsets, strict=True):
+        place = place + turn.apply(offset)
+        turn = turn * _rotations(channels, joint)
+    points = np.stack([place + turn.apply(point) for point in limb.points])
+    quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
+    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
+    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
+    # A soft minimum: heel and toe take turns without a kink.
+    height = -_SOFTNESS * np.log(np.exp(-points[..., 2] / _SOFTNESS).sum(axis=0))
+    return points.mean(axis=0).reshape(n, m, 3), quaternions, height.reshape(n, m)
+
+
+def _rotations(channels: Array, joint: int) -> Rotation:
+    return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
+
+
+def end_lag(places: Array, drifts: Array) -> Array:
+    """λ of an end at equal steps of the lap: the share of the lap's movement that it has done, less that of the lap.
+
+    Parameters
+    ----------
+    places : Array, shape (n, m, 3)
+        Of the end in the remainders of m clips [m].
+    drifts : Array, shape (m, 3)
+        Their ξ.
+
+    Returns
+    -------
+    Array, shape (n,)
+    """
+    n = len(places)
+    weights = np.abs(drifts[:, 2])
+    if not weights.any():
+        return np.zeros(n)
+    rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]
+    across = np.stack([-places[..., 1], places[..., 0]], axis=-1)
+    # Over the ground an end moves with the drift of its clip, and in its frame.
+    square = ((rate + drifts[:, :2] + drifts[:, 2:] * across) ** 2).sum(axis=2)
+    pace = square / np.maximum(square.mean(axis=0), 1e-12)
+    pace = pace @ weights / weights.sum()
+    lag = (np.cumsum(pace) - 0.5 * pace - np.arange(n) - 0.5) / n
+    return lag - lag.mean()
+
+
+def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tuple[Array, Array]:
+    """Orientation and channels of a limb's end.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq)
+        Remainders of m clips at n phases.
+    drifts : Array, shape (m, 3)
+        Their ξ.
+    limb : Limb
+    lag : Array, shape (n,)
+        λ at the phases.
+
+    Returns
+    -------
+    quaternions : Array, shape (n, m, 4)
+        Of the end, in the frame that moves by exp(λ ξ).
+    ends : Array, shape (n, m, 5)
+        Its position in that frame, λ, and the height of its lowest point.
+
+    Raises
+    ------
+    ParameterError
+        If the limb has a joint that the poses do not have.
+    """
+    place, quaternions, height = end_poses(channels, limb)
+    shift, angle = plane_exponential(lag[:, None, None] * drifts)
+    place[..., :2] = turned(-angle, place[..., :2] - shift)
+    lags = np.broadcast_to(lag[:, None], height.shape)
+    return yawed(-angle, quaternions), np.concatenate([place, lags[..., None], height[..., None]], axis=2)
+
+
+def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
+    """Channels in which limbs are given by their ends.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq)
+        Remainders of m aligned loops at equal steps of the lap (see `alignment`).
+    drifts : Array, shape (m, 3)
+        Their drifts ξ.
+    limbs : sequence of Limb
+
+    Returns
+    -------
+    Array, shape (n, m, nq + 5 limbs)
+        Each limb's last joint has the end's orientation instead of its own; appended are, limb by limb, the end's
+        position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
+
+    Raises
+    ------
+    ParameterError
+        If a limb has a joint that the poses do not have.
+    """
+    result, ends = channels.copy(), list[Array]()
+    for limb in limbs:
+        quaternions, end = end_channels(channels, drifts, limb, end_lag(end_poses(channels, limb)[0], drifts))
+        column = 3 + 4 * limb.joints[2]
+        result[..., column : column + 4] = quaternions
+        ends.append(end)
+    ground = min((float(end[..., 4].min()) for end in ends), default=0.0)
+    for end in ends:
+        end[..., 4] -= ground
+    return np.concatenate([result, *ends], axis=2)
