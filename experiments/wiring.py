@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
@@ -50,7 +50,7 @@ class Session:
     remarks: tuple[str, ...]
     curve: Trajectory
     field: Field
-    haptic_map: AnimationMap
+    haptic_map: ClipMap
     world: World
     figure: Figure
     servo: Servo
@@ -162,7 +162,7 @@ def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
     )
 
 
-def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> AnimationMap:
+def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMap:
     motions = [(clip.poses, clip.fps) for clip in clips]
     radii = (config.radius - config.reach, config.radius + config.reach)
     legs = figure_legs(figure)

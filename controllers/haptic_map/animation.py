@@ -16,8 +16,74 @@ from controllers.state import Array, Pose
 Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
 
 
-class AnimationMap(HapticMap):
-    """A map whose poses are blends of clips.
+class ClipMap(HapticMap):
+    """A map whose poses are made of clips by a kernel, and whose memory is the frame of the lap.
+
+    Parameters
+    ----------
+    kind : int
+        Which kernel (see `evaluate`).
+    kernel : Kernel
+        It: (params, x, memory, pose, jacobian).
+    params : Array
+        What it reads.
+    nq : int
+        Numbers of a pose: root position, root quaternion, then joint quaternions (wxyz).
+    drifts : Array, shape (m, 3)
+        ξ of each clip (see `loops`).
+    durations : sequence of float
+        Of each clip [s].
+    """
+
+    def __init__(
+        self, kind: int, kernel: Kernel, params: Array, nq: int, drifts: Array, durations: Sequence[float]
+    ) -> None:
+        self._kind, self._kernel, self._params, self._nq = kind, kernel, params, nq
+        self._lap_seconds, self._travels = float(np.mean(durations)), bool(drifts.any())
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self._nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
+        return 6 + 3 * ((self._nq - 7) // 4)
+
+    @property
+    def lap_seconds(self) -> float:
+        """Time of a lap at which the clips run, on average, at their own pace [s]."""
+        return self._lap_seconds
+
+    @property
+    def travels(self) -> bool:
+        """Whether a lap moves or turns the figure, so that h depends on the laps done."""
+        return self._travels
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run."""
+        return CompiledMap(self._kind, self._params, fresh_lap())
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
+        return self._evaluate(x, memory, 0)[0]
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
+        return self._evaluate(x, memory, self.nv)[1]
+
+    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
+        stylus = np.asarray(x, dtype=np.float64)
+        if stylus.shape != (STYLUS,):
+            raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
+        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
+        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
+        return pose, jacobian
+
+
+class AnimationMap(ClipMap):
+    """A map whose poses are blends of clips that were closed and aligned.
 
     Parameters
     ----------
@@ -54,52 +120,12 @@ class AnimationMap(HapticMap):
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         self.loops: list[Loop] = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
-        self._nq = poses[0].shape[1]
-        groups = np.zeros((self._nq - 3) // 4, dtype=np.int64)
+        groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):
                 raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group wants {joint}")
             groups[joint] = 1
         samples = int(np.clip(max(len(clip) for clip in poses) - 1, 64, 2048))
-        self._params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
-        self._kind, self._kernel = kind, kernel
-
-    @property
-    def nq(self) -> int:
-        """Numbers of a configuration."""
-        return self._nq
-
-    @property
-    def nv(self) -> int:
-        """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
-        return 6 + 3 * ((self._nq - 7) // 4)
-
-    @property
-    def lap_seconds(self) -> float:
-        """Time of a lap at which the clips run, on average, at their own pace [s]."""
-        return float(np.mean([loop.duration for loop in self.loops]))
-
-    @property
-    def travels(self) -> bool:
-        """Whether a lap moves or turns the figure, so that h depends on the laps done."""
-        return any(bool(loop.drift.any()) for loop in self.loops)
-
-    def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
-        return CompiledMap(self._kind, self._params, fresh_lap())
-
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
-        return self._evaluate(x, memory, 0)[0]
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
-        return self._evaluate(x, memory, self.nv)[1]
-
-    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
-        stylus = np.asarray(x, dtype=np.float64)
-        if stylus.shape != (STYLUS,):
-            raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
-        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        self._kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
-        return pose, jacobian
+        params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
+        drifts = np.stack([loop.drift for loop in self.loops])
+        super().__init__(kind, kernel, params, poses[0].shape[1], drifts, [loop.duration for loop in self.loops])

@@ -6,6 +6,7 @@ from numba import njit
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_kind, base_params, express
+from controllers.haptic_map.lifted import LIFTED, lifted_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
 from controllers.state import Array
 
@@ -17,6 +18,8 @@ def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array
         cylindrical_map(params, x, memory, pose, jacobian)
     elif kind == COMPOSITE:
         composite_map(params, x, memory, pose, jacobian)
+    elif kind == LIFTED:
+        lifted_map(params, x, memory, pose, jacobian)
     elif kind == ROBOT_ARM:
         robot_arm_map(params, x, memory, pose, jacobian)
 

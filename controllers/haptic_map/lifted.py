@@ -1,0 +1,298 @@
+"""The lifted map: every clip is a curve of its own, and the stylus is where it is among them (section 8.1)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from scipy.interpolate import CubicSpline
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.combination import combine, figure_channels, packed_figure
+from controllers.haptic_map.cylinder import clamped, cylinder
+from controllers.haptic_map.frames import (
+    CLOSES,
+    PlacedClip,
+    checked_angles,
+    closing_gap,
+    interpolate_frames,
+    lap_spline,
+    packed_frames,
+)
+from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
+from controllers.haptic_map.limbs import END, Limb
+from controllers.haptic_map.loops import checked_clip
+from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
+from controllers.haptic_map.splines import basis, basis_slope, control_points
+from controllers.state import Array, IntArray
+
+LIFTED = 3
+
+_LEAST_ROWS, _LEAST_RADIUS, _LEAST_DISTANCE = 8, 2e-3, 2e-4
+_LAGS = 128  # samples of λ round the lap
+_R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _FIGURE = range(11)
+
+
+@njit
+def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array, slope: Array) -> None:
+    """Write λ of each limb, which is common to all clips, into the channels of the first."""
+    s = angle * _LAGS / (2.0 * np.pi)
+    row = min(int(s), _LAGS - 1)
+    b0, b1, b2, b3 = basis(s - row)
+    c0, c1, c2, c3 = basis_slope(s - row)
+    for n in range(limbs):
+        v0, v1 = control[row * limbs + n], control[(row + 1) * limbs + n]
+        v2, v3 = control[(row + 2) * limbs + n], control[(row + 3) * limbs + n]
+        k = channels - END * (limbs - n) + 3
+        value[0, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
+        slope[0, k] = _LAGS / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+
+
+@njit
+def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, changes: Array) -> tuple[float, int]:
+    """Angle of the hand and number of clips near, their numbers, weights and the derivatives of these (3, m)."""
+    radius, angle = cylinder(x, chain)
+    r, r_slope = clamped(radius, params[_R_LOW], params[_R_HIGH], params[_MARGIN])
+    z, z_slope = clamped(x[2], params[_Z_LOW], params[_Z_HIGH], params[_MARGIN])
+    for k in range(6):
+        chain[1, k] *= r_slope
+        chain[2, k] *= z_slope
+    total = near.shape[0]
+    sites, slopes = np.empty((total, SITE)), np.empty((total, SITE))
+    neighbours = params[int(params[_NEAR_AT]) :]
+    count = near_clips(neighbours, angle, r, z, near, sites, slopes)
+    near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
+    return angle, count
+
+
+@njit
+def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Lifted`: h(x), and h_*(x) unless `jacobian` has no rows."""
+    total, chain = int(params[_CLIPS]), np.empty((3, 6))
+    near, w, changes = np.empty(total, dtype=np.int64), np.empty((1, total)), np.empty((1, 3, total))
+    angle, count = _weigh(params, x, chain, near, w[0], changes[0])
+    figure = params[_FIGURE:]
+    channels = figure_channels(figure)
+    value, slope, drifts = np.empty((count, channels)), np.empty((count, channels)), np.empty((count, 3))
+    frames = params[int(params[_FRAMES_AT]) :]
+    for i in range(count):
+        interpolate_frames(frames, near[i], angle, value[i], slope[i])
+        for k in range(3):
+            drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
+    _lags(params[int(params[_LAG_AT]) :], int(figure[1]), angle, channels, value, slope)
+    combine(figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], chain, memory, pose, jacobian)
+
+
+class Lifted(ClipMap):
+    r"""Clips α_i as curves α̃_i round the z axis of H, and one smooth map with h∘α̃_i = α_i at every frame.
+
+    .. math:: \tilde\alpha_i(t_k) = (r_i(\theta)\cos\theta,\; r_i(\theta)\sin\theta,\; z_i(\theta)),
+              \qquad \theta = \theta_i(t_k)
+
+    θ = atan2(y, x) is the phase, and in the half plane (r, z) at θ the clips have their sites q_i = (r_i, z_i):
+    periodic C² splines of θ. The pose is the mean of the clips that are near, with the weights of `neighbours`; each
+    contributes its own at θ by splines with a knot at every frame (`frames`). On its curve a clip is alone, and exact
+    up to the displacement over the ground by which it was moved to the origin (`placed`). What is blended, how, and
+    the lap's frame A are told in `combination`; a closed clip whose angles begin at θ₀ > 0 has its frames beyond 2π
+    in the next lap.
+
+    h is C² but on the axis r = 0, where the phase is not defined. Beyond the box round all sites r and z are clamped
+    to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
+
+    Parameters
+    ----------
+    clips : sequence of (Array, float)
+        Poses (n, nq) and frames per second, as in `Cylindrical`.
+    closed : sequence of bool
+        Whether a clip's last frame is its first again, moved over the ground.
+    angles : sequence of Array
+        θ_i(t_k) [rad], shape (n,), increasing: from some θ₀ in [0, 2π) once round for a closed clip, within [0, 2π]
+        for an open one, which leaves a gap.
+    sites : Array, shape (rows, m, 2)
+        (r_i, z_i) [m] at `rows` equal steps of a lap.
+    limbs : sequence of Limb
+        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+    names : sequence of str, optional
+        Of the clips; by default their numbers.
+    margin : float
+        Of the clamping [m].
+
+    Raises
+    ------
+    ParameterError
+        If clips, angles, sites and names do not fit each other, a clip does not close that should, a site comes to
+        the axis, or two come together.
+    """
+
+    def __init__(
+        self,
+        clips: Sequence[tuple[Array, float]],
+        closed: Sequence[bool],
+        angles: Sequence[Array],
+        sites: Array,
+        limbs: Sequence[Limb] = (),
+        names: Sequence[str] = (),
+        margin: float = 4e-3,
+    ) -> None:
+        m = len(clips)
+        self.names = tuple(names) or tuple(str(i) for i in range(m))
+        if m < 1 or {len(closed), len(angles), len(self.names)} != {m} or len(set(self.names)) != m:
+            raise ParameterError(
+                f"a lifted map takes one or more clips, each with closed, angles and a name of its own; got {m} clips, "
+                f"{len(closed)} closed, {len(angles)} angles, the names {', '.join(self.names)}"
+            )
+        self.fps = tuple(float(fps) for _, fps in clips)
+        self.poses = tuple(checked_clip(p, fps, f"clip {n}") for n, (p, fps) in zip(self.names, clips, strict=True))
+        if len({poses.shape[1] for poses in self.poses}) != 1:
+            raise ParameterError(f"all clips must have poses of one size, got {[p.shape[1] for p in self.poses]}")
+        self._clips = tuple(self._placed(i, angles[i], bool(closed[i])) for i in range(m))
+        self.limbs, self.margin = tuple(limbs), _checked_margin(margin)
+        self.sites = _checked_sites(sites, self.names, self.margin)
+        super().__init__(
+            LIFTED, lifted_map, self._packed(), self.poses[0].shape[1], self._drifts,
+            [clip.duration for clip in self._clips],
+        )  # fmt: skip
+
+    def _placed(self, i: int, angles: Array, closed: bool) -> PlacedClip:
+        name, poses = f"clip {self.names[i]}", self.poses[i]
+        checked = checked_angles(angles, len(poses), closed, name)
+        gap = closing_gap(poses) if closed else 0.0
+        if gap > CLOSES:
+            raise ParameterError(
+                f"{name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
+                "give it as open, or cut it where it repeats"
+            )
+        return PlacedClip.of(poses, self.fps[i], checked, closed)
+
+    @property
+    def _drifts(self) -> Array:
+        return np.stack([clip.drift for clip in self._clips])
+
+    @property
+    def closed(self) -> tuple[bool, ...]:
+        """Whether each clip closes."""
+        return tuple(clip.closed for clip in self._clips)
+
+    @property
+    def angles(self) -> tuple[Array, ...]:
+        """θ_i(t_k) of each clip [rad]."""
+        return tuple(clip.angles for clip in self._clips)
+
+    @property
+    def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Intervals of r and z [m] that hold all sites; beyond them the stylus is clamped."""
+        low, high = _box(self.sites)
+        return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+
+    def placed(self, i: int) -> Array:
+        """Poses of clip i (n, nq) where they were moved to: what h gives along its curve from the first lap on."""
+        return self._clips[i].poses.copy()
+
+    def site(self, i: int, angles: Array) -> Array:
+        """q_i = (r, z) [m] of curve i at angles (...), shape (..., 2)."""
+        around = np.concatenate([self.sites[:, i], self.sites[:1, i]])
+        spline = CubicSpline(np.linspace(0.0, 2.0 * np.pi, len(around)), around, bc_type="periodic")
+        return spline(np.mod(angles, 2.0 * np.pi))
+
+    def curve(self, i: int) -> Trajectory:
+        """α̃_i, timed by the clip, periodic if it closes; exact at the frames."""
+        angles = self.angles[i]
+        q = self.site(i, angles)
+        points = np.column_stack([q[:, 0] * np.cos(angles), q[:, 0] * np.sin(angles), q[:, 1]])
+        if self.closed[i]:
+            points[-1] = points[0]
+        return Trajectory(np.arange(len(points)) / self.fps[i], points, periodic=self.closed[i])
+
+    def weights(self, x: Array) -> Array:
+        """Weights w_i (m,) of the clips at a stylus pose (7,); of sum 1."""
+        m = len(self.poses)
+        near, w, changes, result = np.empty(m, dtype=np.int64), np.empty(m), np.empty((3, m)), np.zeros(m)
+        _, count = _weigh(self._params, np.asarray(x, dtype=np.float64), np.empty((3, 6)), near, w, changes)
+        result[near[:count]] = w[:count]
+        return result
+
+    def _packed(self) -> Array:
+        drifts, rotations = self._drifts, (self.poses[0].shape[1] - 3) // 4
+        lags = self._common_lags(rotations)
+        phases = np.linspace(0.0, 2.0 * np.pi, _LAGS + 1)
+        lag_at = CubicSpline(phases, np.concatenate([lags, lags[:1]]), bc_type="periodic")
+        channels: list[Array] = []
+        for clip, drift in zip(self._clips, drifts, strict=True):
+            result, ends = clip.remainder[:, None], list[Array]()
+            rest, lag = result.copy(), lag_at(np.mod(clip.angles, 2.0 * np.pi))
+            for n, limb in enumerate(self.limbs):
+                quaternions, end = end_channels(rest, drift[None], limb, lag[:, n])
+                result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
+                ends.append(end)
+            channels.append(np.concatenate([result, *ends], axis=2)[:, 0])
+        first = 3 + 4 * rotations
+        ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if self.limbs), default=0.0)
+        for c in channels:
+            c[:, first + END - 1 :: END] -= ground
+        splines = [
+            lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(self._clips, channels, strict=True)
+        ]
+        low, high = _box(self.sites)
+        half = 0.5 * self.margin
+        blocks = [
+            packed_figure(np.zeros(rotations, dtype=np.int64), self.limbs),
+            control_points(lags, np.ones(lags.shape[1:])).ravel(),
+            drifts.ravel(),
+            packed_frames(splines),
+            packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
+        ]
+        at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
+        return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self.poses), *at], *blocks])
+
+    def _common_lags(self, rotations: int) -> Array:
+        """λ of each limb at equal steps of the lap, shape (_LAGS, limbs), from all clips."""
+        if not self._drifts[:, 2].any() or not self.limbs:
+            return np.zeros((_LAGS, len(self.limbs)))
+        phases = np.arange(_LAGS) * 2.0 * np.pi / _LAGS
+        channels = np.empty((_LAGS, len(self.poses), 3 + 4 * rotations))
+        for i, clip in enumerate(self._clips):
+            packed = packed_frames([lap_spline(clip.angles, clip.remainder, rotations, clip.closed)])
+            for phase, value in zip(phases, channels[:, i], strict=True):
+                interpolate_frames(packed, 0, phase, value, np.empty_like(value))
+        return np.stack([end_lag(end_poses(channels, limb)[0], self._drifts) for limb in self.limbs], axis=1)
+
+
+def _box(sites: Array) -> tuple[Array, Array]:
+    """Least and largest (r, z) of what the control points of sites hold: no curve leaves it, between rows either."""
+    control = control_points(sites, np.ones(sites.shape[1:]))
+    return control.min(axis=(0, 1)), control.max(axis=(0, 1))
+
+
+def _checked_margin(margin: float) -> float:
+    if not (np.isfinite(margin) and margin >= 1e-4):
+        raise ParameterError(f"the margin of a lifted map must be 1e-4 m or more and finite, got {margin}")
+    return float(margin)
+
+
+def _checked_sites(sites: Array, names: tuple[str, ...], margin: float) -> Array:
+    array = np.array(sites, dtype=np.float64)
+    if array.ndim != 3 or len(array) < _LEAST_ROWS or array.shape[1:] != (len(names), 2):
+        raise ParameterError(
+            f"sites must have shape (rows ≥ {_LEAST_ROWS}, {len(names)} clips, 2: r and z), got {array.shape}"
+        )
+    if not np.isfinite(array).all():
+        raise ParameterError(f"sites must be finite; at row {int(np.argwhere(~np.isfinite(array))[0][0])} one is not")
+    least = float(_box(array)[0][0])
+    if least < _LEAST_RADIUS + margin:
+        raise ParameterError(
+            f"a curve comes to {1e3 * least:.2f} mm from the axis, where the phase is not defined; expected "
+            f"{1e3 * (_LEAST_RADIUS + margin):.2f} mm or more"
+        )
+    rows = CubicSpline(np.arange(len(array) + 1), np.concatenate([array, array[:1]]), bc_type="periodic")
+    places = rows(np.arange(4 * len(array)) / 4.0)
+    for i in range(len(names) - 1):
+        distance = np.linalg.norm(places[:, i + 1 :] - places[:, i : i + 1], axis=2)
+        if distance.min() < _LEAST_DISTANCE:
+            row, j = np.unravel_index(int(distance.argmin()), distance.shape)
+            raise ParameterError(
+                f"the curves of clips {names[i]} and {names[i + 1 + int(j)]} come to {1e3 * distance.min():.3f} mm of "
+                f"each other at {2.0 * np.pi * float(row) / len(places):.2f} rad; "
+                f"expected {1e3 * _LEAST_DISTANCE} mm or more"
+            )
+    return array
