@@ -28,7 +28,7 @@ Positional = tyro.conf.Positional
 class Run:
     """Run a hand, a field, a map and a figure, and write what happened into a folder."""
 
-    config: tyro.conf.OmitArgPrefixes[RunConfig] = field(default_factory=RunConfig)
+    config: tyro.conf.OmitArgPrefixes[RunConfig]
     out: Path = Path("runs/run")
     """Folder to write."""
     overwrite: bool = False
@@ -106,7 +106,7 @@ class Track:
 class Certify:
     """Say what is certain of the field of a run, or of the flights of a clip: certified, refuted or unknown."""
 
-    config: tyro.conf.OmitArgPrefixes[RunConfig] = field(default_factory=RunConfig)
+    config: tyro.conf.OmitArgPrefixes[RunConfig]
     clip: Path | None = None
     """Judge the flights of this motion file instead of a field."""
     out: Path = Path("runs/certificate")

@@ -7,6 +7,7 @@ from models.scene import SceneConfig
 from sim.users.intent import Grab, Push
 
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
+MAP_CLIPS = {"composite": ("squat_dance", "angry", "cheer"), "rivers": ("squat_dance", "cheer", "angry")}
 STRETCHING = ("stretch", "stretch-then-follow")
 
 
@@ -19,11 +20,12 @@ class RunConfig:
     clips : tuple of str
         Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
         or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
-        upper body inside, upper body outside.
+        upper body inside, upper body outside; for the rivers' map one for each of the three rivers.
     mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow"}
         Field of force.
-    map : {"cylindrical", "composite"}
-        Haptic map: four clips round a cylinder, or the lower body of one clip and the upper body blended between two.
+    map : {"cylindrical", "composite", "rivers"}
+        Haptic map: four clips round a cylinder; the lower body of one clip and the upper body blended between two; or
+        a clip for each river.
     user : {"relaxed", "trace", "push"}
         A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
     seconds : float
@@ -46,6 +48,8 @@ class RunConfig:
         Radius ε of the rivers [m].
     crossing : {"smooth", "discrete", "sum"}
         How crossing rivers share the hand: by its velocity, smoothly or with hysteresis, or not at all.
+    blend : float
+        In which one river's clip goes over into another's [s]; 0: the figure jumps.
     seek : float
         k_f, with which stretchy tubes draw the hand to the curve [N/m].
     rubber : float
@@ -74,9 +78,9 @@ class RunConfig:
         What it takes hold of; in the modes that stretch, by default, a tour of what can be done.
     """
 
-    clips: tuple[str, ...] = FIGURE_CLIPS
+    clips: tuple[str, ...] = ()
     mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
-    map: Literal["cylindrical", "composite"] = "cylindrical"
+    map: Literal["cylindrical", "composite", "rivers"] = "cylindrical"
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1
@@ -88,6 +92,7 @@ class RunConfig:
     bunny_pace: Literal["clock", "wait"] = "wait"
     river_tube: float = 0.015
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
+    blend: float = 0.4
     seek: float = 150.0
     rubber: float = 150.0
     rubber_tube: float = 0.008
@@ -101,6 +106,10 @@ class RunConfig:
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
     grabs: tuple[Grab, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.clips:
+            object.__setattr__(self, "clips", MAP_CLIPS.get(self.map, FIGURE_CLIPS))
 
 
 @dataclass(frozen=True)

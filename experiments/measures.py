@@ -25,12 +25,15 @@ HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
 FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
 TOUCH = 1.0  # [N] from which the ground bears the figure
 BLOCK_FRAMES = 2000  # of the figure, read at a time
-_TICKS = ("t", "p", "nearest", "distance", "phase", "user")
+_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
 
 
 def summarise(
-    recording: Recording, default_poses: Callable[[Array, Array], Array], speed: SpeedSummary, warnings: dict[str, int]
+    recording: Recording,
+    default_poses: Callable[[Array, Array, Array], Array],
+    speed: SpeedSummary,
+    warnings: dict[str, int],
 ) -> RunSummary:
     """Measure a run, in memory that does not grow with it.
 
@@ -40,7 +43,8 @@ def summarise(
         With the channels of `sim.loop.groups`, and arrays ``curve_span`` (start and end of the phase), ``curve_closed``
         and ``body_weight``.
     default_poses : callable
-        Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,); called in order of time.
+        Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,) on rivers (k,); called
+        in order of time.
     speed, warnings
         Taken over.
     """
@@ -54,9 +58,8 @@ def summarise(
         frames = {name: channel[start : start + BLOCK_FRAMES] for name, channel in recording.groups["frames"].items()
                   if name in _FRAMES}  # fmt: skip
         pushed = path.add(ticks)
-        animation.add(
-            frames, default_poses(ticks["nearest"][::per_frame], ticks["phase"][::per_frame]), pushed[::per_frame]
-        )
+        default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
+        animation.add(frames, default, pushed[::per_frame])
         figure.add(frames)
     return RunSummary(path.summary(), animation.summary(), figure.summary(), speed, warnings)
 

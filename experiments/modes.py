@@ -60,12 +60,23 @@ def law(config: RunConfig, curve: Trajectory) -> Field:
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
-def _rivers(config: RunConfig, curve: Trajectory) -> Field:
+def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
+    """The rivers of the mode of that name (`river_bundle`) with a configuration's gains.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is out of its interval.
+    """
     if config.damping <= 0.0 or config.stiffness <= 0.0:
         raise ParameterError(
             f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"
         )
-    bundle = river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
+    return river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
+
+
+def _rivers(config: RunConfig, curve: Trajectory) -> Field:
+    bundle = default_rivers(config, curve)
     if config.crossing == "sum":
         return bundle
     pace = curve.length / curve.duration

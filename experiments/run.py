@@ -15,6 +15,7 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config import STRETCHING, RunConfig
 from experiments.measures import BLOCK_FRAMES, summarise
@@ -30,7 +31,7 @@ from sim.errors import SimError
 from sim.loop import BLOCK_SECONDS, Loop, groups, record_into
 from sim.recorder import Recorder
 from sim.recording import Recording
-from sim.reference import poses_along
+from sim.reference import make_reference, poses_along, reference_along
 from sim.servo import FrameLog, TickLog
 from sim.users.intent import Grab, Push
 from sim.viewer.page import LivePage, NullPage, Page
@@ -193,11 +194,16 @@ def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     return replace(summary, stretch=stretch_summary(session.field, memory))
 
 
-def default_poses(session: Session) -> Callable[[Array, Array], Array]:
-    """The animation of the curve as it was given: the map at nearest points (k, 3) of phases (k,), lap after lap."""
+def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
+    """The animation of the curve as it was given: the map at nearest points (k, 3) of phases (k,) on rivers (k,).
+
+    Called with rows in the order of time, `stride` figure updates apart.
+    """
+    if session.config.map == "rivers":
+        return _clips_of_rivers(session, stride)
     kind, params, memory = session.haptic_map.compiled()
 
-    def poses_at(nearest: Array, phases: Array) -> Array:
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.
         points = session.curve.point(phases) if session.config.mode in STRETCHING else nearest
         poses = np.empty((len(points), session.haptic_map.nq))
@@ -207,22 +213,38 @@ def default_poses(session: Session) -> Callable[[Array, Array], Array]:
     return poses_at
 
 
+def _clips_of_rivers(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
+    """Likewise where rivers play clips, which go over into each other as they did for the figure."""
+    period = stride * session.servo.figure_ticks * session.servo.plant.period
+    compiled, config = session.haptic_map.compiled(), session.config
+    reference = make_reference(session.world.figure, compiled, period, config.smoothing, config.blend)
+
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
+        traces = np.zeros((len(nearest), TRACE_SIZE))
+        traces[:, TRACE_PHASE], traces[:, TRACE_RIVER] = phases, rivers
+        poses = np.empty((len(nearest), session.haptic_map.nq))
+        reference_along(reference, stylus_path(nearest), traces, poses)
+        return poses
+
+    return poses_at
+
+
 def _write_animations(out: Path, session: Session) -> None:
     """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
     with Recording(out / RECORDING) as recording:
         reference = recording.channel("frames", "reference")
-        nearest, phase = recording.channel("ticks", "nearest"), recording.channel("ticks", "phase")
+        on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))
         fps = recording.rates["frames"] / stride
         n = -(-len(reference) // stride)
         per_frame = stride * session.servo.figure_ticks
-        poses_at = default_poses(session)
+        poses_at = default_poses(session, stride)
         starts = range(0, n, BLOCK_FRAMES)
         blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
         write_bvh_blocks(
             out / EDITED, n, fps, (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
         )
-        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(nearest[rows], phase[rows]) for rows in blocks))
+        write_bvh_blocks(out / DEFAULT, n, fps, (poses_at(*(c[rows] for c in on_curve)) for rows in blocks))
 
 
 def write_report_of(folder: Path) -> None:

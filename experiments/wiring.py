@@ -10,13 +10,15 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.higher_order import HigherOrder
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
+from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
 from experiments.config import STRETCHING, RunConfig
-from experiments.modes import Field, law
+from experiments.modes import Field, default_rivers, law
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
 from models.errors import ModelError
@@ -70,7 +72,16 @@ class Session:
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),
+            **self._rivers(),
         }
+
+    def _rivers(self) -> dict[str, npt.ArrayLike | str]:
+        """Names and curves of the rivers of a field that gives the hand to one of them."""
+        if not isinstance(self.field, HigherOrder):
+            return {}
+        bundle, share = self.field.bundle, np.linspace(0.0, 1.0, 241)
+        curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
+        return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
 
 
 def load_clips(names: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
@@ -105,7 +116,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     """
     most = 4 if config.map == "cylindrical" else 3
     if not 1 <= len(clips) <= most:
-        raise ParameterError(f"the {config.map} map blends 1 to {most} clips, got {len(clips)}; name them with --clips")
+        raise ParameterError(f"the {config.map} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
     if config.figure_ticks < 1:
         raise ParameterError(
             f"figure_ticks is {config.figure_ticks}; expected 1 or more servo ticks between two updates"
@@ -123,10 +134,10 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
-    haptic_map = _haptic_map(config, clips, world.figure)
+    haptic_map = _haptic_map(config, clips, curve, world.figure)
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
-    reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing)
+    reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend)
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     poses = np.empty((1, haptic_map.nq))
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
@@ -162,13 +173,21 @@ def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
     )
 
 
-def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMap:
+def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], curve: Trajectory, figure: mujoco.MjModel) -> ClipMap:
     motions = [(clip.poses, clip.fps) for clip in clips]
     radii = (config.radius - config.reach, config.radius + config.reach)
     legs = figure_legs(figure)
     if config.map == "cylindrical":
         corners = [motions[i % len(motions)] for i in range(4)]
         return Cylindrical(corners, radii, (-config.reach, config.reach), legs)
+    if config.map == "rivers":
+        if config.mode != "rivers" or config.crossing == "sum":
+            raise ParameterError(
+                "the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river"
+            )
+        curves = [river.curve for river in default_rivers(config, curve).rivers]
+        motions = [motions[i % len(motions)] for i in range(len(curves))]
+        return RiverClips(curves, motions, config.river_tube, legs)
     lower, red, blue = (motions[i % len(motions)] for i in range(3))
     upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
     return Composite(lower, red, blue, sorted(upper), radii, legs)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.instructions import EXTERNAL, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
+from controllers.fields.instructions import EXTERNAL, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
@@ -69,7 +69,7 @@ def groups(servo: Servo) -> dict[str, Group]:
         1.0 / plant.period,
         {
             "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
-            "force": (3,), "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (),
+            "force": (3,), "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "river": (),
             "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, 3), "residual": (6,),
         },
     )  # fmt: skip
@@ -193,8 +193,8 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
         "switch": hand[:, 14],
         "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
         "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
-        "distance": trace[:, TRACE_DISTANCE], "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n],
-        "residual": ticks.residual[:n],
+        "distance": trace[:, TRACE_DISTANCE], "river": trace[:, TRACE_RIVER],
+        "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
     }  # fmt: skip
 
 

@@ -1,4 +1,7 @@
-"""From the stylus to what the figure should do: pose, velocity and acceleration of h along the hand's motion."""
+"""From the stylus to what the figure should do: pose, velocity and acceleration of h along the hand's motion.
+
+Where rivers play clips of their own, a change of river is a change of motion: the figure goes on from where it is.
+"""
 
 import math
 from typing import NamedTuple
@@ -8,12 +11,17 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.inertialization import stopping_way
+from controllers.haptic_map.river_clips import RIVER_CLIPS, change_clip, heading_between, place_clip, takes_over
+from controllers.rotations import rotate
 from sim.compiled import entry_point
 from sim.errors import SimError
 from sim.native import mj_differentiate_pos
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
+from sim.transition import Transition, carry_offset, make_transition, note_change
 
 Array = npt.NDArray[np.float64]
 
@@ -39,6 +47,8 @@ class CompiledReference(NamedTuple):
         0 until the hand has been seen, shape (1,).
     pose, velocity, acceleration : Array
         What the figure should do, shapes (75,), (57,), (57,).
+    transition : Transition
+        From clip to clip, where rivers play clips of their own.
     """
 
     figure_model: int
@@ -54,6 +64,7 @@ class CompiledReference(NamedTuple):
     pose: Array
     velocity: Array
     acceleration: Array
+    transition: Transition
     scratch_memory: Array
     scratch_x: Array
     before: Array
@@ -63,7 +74,59 @@ class CompiledReference(NamedTuple):
 
 
 @njit
-def update_reference(reference: CompiledReference, stylus: Array) -> None:
+def _look_around(reference: CompiledReference) -> None:
+    """Poses of the map along the stylus's motion: now, a period before and a period after; the memory is now's."""
+    hand, period, x = reference.hand, reference.period, reference.scratch_x
+    x[:3], x[3:] = hand[0], reference.orientation
+    evaluate_map(reference.kind, reference.params, x, reference.memory, reference.pose)
+    for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
+        for i in range(3):
+            x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
+        x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
+        reference.scratch_memory[:] = reference.memory
+        evaluate_map(reference.kind, reference.params, x, reference.scratch_memory, pose)
+
+
+@njit
+def _carry(reference: CompiledReference) -> None:
+    """Add what is left of a transition to the three poses."""
+    carry_offset(reference.transition, 0.0, reference.pose)
+    carry_offset(reference.transition, -reference.period, reference.before)
+    carry_offset(reference.transition, reference.period, reference.after)
+
+
+@njit
+def _change_river(reference: CompiledReference, river: float, phase: float) -> None:
+    """Let another river's clip go on from what is shown: where the figure stands, with an offset that decays.
+
+    The clip begins ahead of the figure by the way on which its speed over the ground, and about the vertical, comes to
+    that of the clip; so it neither turns back nor is pulled there.
+    """
+    transition, memory, period = reference.transition, reference.memory, reference.period
+    shown, change, seconds = transition.shown, transition.change, transition.seconds
+    _look_around(reference)
+    _carry(reference)
+    shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
+    change_clip(memory, river, phase)
+    _look_around(reference)
+    pose = reference.pose
+    place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
+    _look_around(reference)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after)
+    way = np.zeros(3)
+    for i in range(2):
+        way[i] = stopping_way(change[1, i], change[2, i], seconds)
+    _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
+    _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
+    way[2] = stopping_way(spin, twist, seconds)
+    place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
+    _look_around(reference)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after)
+    transition.since[0] = 0.0
+
+
+@njit
+def update_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
     r"""Advance the reference by one period.
 
     With p(s) = p + s ṗ + ½ s² p̈ and R(s) = R exp(s ω + ½ s² α) the smoothed motion x of the stylus, velocity and
@@ -76,8 +139,10 @@ def update_reference(reference: CompiledReference, stylus: Array) -> None:
         Updated: the stylus's motion, memory, pose (75), velocity (57), acceleration (57).
     stylus : Array
         Measured position in H and orientation wxyz, shape (7,).
+    trace : Array
+        Of the field (see `controllers.fields.instructions`): which river has the hand, and where on it the hand is.
     """
-    hand, period, x = reference.hand, reference.period, reference.scratch_x
+    hand, period = reference.hand, reference.period
     if reference.started[0] == 0.0:
         reference.started[0] = 1.0
         hand[0, :] = stylus[:3]
@@ -85,17 +150,12 @@ def update_reference(reference: CompiledReference, stylus: Array) -> None:
     else:
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
-    x[:3], x[3:] = hand[0], reference.orientation
-    evaluate_map(reference.kind, reference.params, x, reference.memory, reference.pose)
-    for sign, pose, difference in (
-        (-1.0, reference.before, reference.to_before),
-        (1.0, reference.after, reference.to_after),
-    ):
-        for i in range(3):
-            x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
-        x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
-        reference.scratch_memory[:] = reference.memory
-        evaluate_map(reference.kind, reference.params, x, reference.scratch_memory, pose)
+    reference.transition.since[0] += period
+    if reference.kind == RIVER_CLIPS and takes_over(reference.params, reference.memory, trace[TRACE_RIVER]):
+        _change_river(reference, trace[TRACE_RIVER], trace[TRACE_PHASE])
+    _look_around(reference)
+    _carry(reference)
+    for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):
         mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
     for i in range(reference.velocity.shape[0]):
         reference.velocity[i] = 0.5 * (reference.to_after[i] - reference.to_before[i]) / period
@@ -119,8 +179,26 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
         evaluate_map(kind, params, points[i], memory, poses[i])
 
 
+@entry_point
+def reference_along(reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
+    """Let a reference go along a path of the stylus, period by period.
+
+    Parameters
+    ----------
+    reference : CompiledReference
+        Updated.
+    points, traces : Array
+        What `update_reference` takes, row by row, shapes (n, 7) and (n, 8).
+    poses : Array
+        Set, shape (n, 75).
+    """
+    for i in range(points.shape[0]):
+        update_reference(reference, points[i], traces[i])
+        poses[i] = reference.pose
+
+
 def make_reference(
-    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float
+    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float, blend: float = 0.0
 ) -> CompiledReference:
     """The reference of a run, before its first update.
 
@@ -134,20 +212,24 @@ def make_reference(
         T, between two updates [s].
     bandwidth : float
         Of the tracking filter, ω/2π [Hz].
+    blend : float
+        In which one clip goes over into another [s]; 0: the figure jumps.
 
     Raises
     ------
     SimError
-        If the bandwidth is not positive, or too high for the period.
+        If the bandwidth is not positive, or too high for the period; or the blend time negative or not finite.
     """
     if not 0.0 < bandwidth < 0.5 / period:
         raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
+    if not 0.0 <= blend < math.inf:
+        raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
     kind, params, memory = compiled
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
         kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), orientation=np.array([1.0, 0.0, 0.0, 0.0]),
         turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq), velocity=np.zeros(nv),
-        acceleration=np.zeros(nv), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
-        before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+        acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend), scratch_memory=memory.copy(),
+        scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

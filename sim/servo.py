@@ -127,7 +127,7 @@ def field_force(servo: Servo) -> None:
 def move_figure(servo: Servo) -> None:
     """Update the animation at the measured stylus, and the torques that follow it."""
     reference = servo.reference
-    update_reference(reference, servo.port.hand[1:8])
+    update_reference(reference, servo.port.hand[1:8], servo.field.memory[:TRACE_SIZE])
     drive(servo.figure, reference.pose, reference.velocity, reference.acceleration)
 
 

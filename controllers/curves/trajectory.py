@@ -89,6 +89,20 @@ def curve_velocity(blob: Array, at: int, t: float) -> tuple[float, float, float]
     return piece_velocity(blob, at + int(blob[at + COEFFICIENTS]) + piece * PIECE, u)
 
 
+@njit
+def curve_acceleration(blob: Array, at: int, t: float) -> tuple[float, float, float]:
+    """φ̈(t) [m/s²] of the curve packed at ``blob[at:]``."""
+    t = wrap_phase(blob, at, t)
+    piece = find_piece(blob, at, t)
+    u = t - blob[at + int(blob[at + BREAKS]) + piece]
+    row = at + int(blob[at + COEFFICIENTS]) + piece * PIECE
+    return (
+        2.0 * blob[row + 14] + 6.0 * u * blob[row + 21],
+        2.0 * blob[row + 15] + 6.0 * u * blob[row + 22],
+        2.0 * blob[row + 16] + 6.0 * u * blob[row + 23],
+    )
+
+
 def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
     array = np.array(values, dtype=np.float64)
     if array.shape != shape:

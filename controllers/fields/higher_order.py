@@ -15,7 +15,6 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
 from controllers.fields.instructions import (
     HIGHER_ORDER,
-    TRACE_DISTANCE,
     TRACE_RIVER,
     Program,
     checked,
@@ -186,7 +185,7 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
     first, last = 0, int(params[at + _RIVERS])
     if shown >= 0:
         first, last = int(table[shown, _RIVER]), int(table[shown, _RIVER]) + 1
-    before = memory[TRACE_DISTANCE]
+    memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
     for river in range(first, last):
         block = at + int(params[at + _HEADER + river])
         curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
@@ -195,8 +194,6 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
         else:
             phase, distance = closest_phase(params, curve, p[0], p[1], p[2], np.nan)
         leave_trace(params, curve, memory, phase, distance, phase)
-    if memory[TRACE_DISTANCE] < before:
-        memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
 
 
 @dataclass(frozen=True, eq=False)

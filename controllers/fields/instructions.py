@@ -5,7 +5,7 @@ A row of ``ops`` is ``[opcode, parameters at, memory at, curve at]``; the last i
 blends of fields are instructions too. The first `TRACE_SIZE` numbers of the memory tell of the last evaluation, for
 the record: ``[t*, c (3), d, row, attractor, river]``: phase, point and distance of the nearest curve, the row of its
 law, and the phase of the point that attracts (t* itself, or the bunny's). With no curve near, d is infinite. The
-last is the number of the river that has the hand, in a field of higher order: −1 for none.
+last is the number of the river that has the hand, in a field of higher order: −1 for none, and without such a field.
 """
 
 from collections.abc import Callable, Sequence
@@ -96,7 +96,7 @@ class Program:
         """One law of force: its opcode, parameters, initial memory and curve."""
         blob = np.zeros(0) if curve is None else curve.packed()
         trace = np.zeros(TRACE_SIZE)
-        trace[TRACE_DISTANCE] = np.inf
+        trace[TRACE_DISTANCE], trace[TRACE_RIVER] = np.inf, -1.0
         ops = np.array([[opcode, 0, TRACE_SIZE, len(params)]], dtype=np.int64)
         return Program(ops, np.concatenate([params, blob]), np.concatenate([trace, memory]), python_laws)
 

@@ -112,7 +112,7 @@ class AnimationMap(ClipMap):
         kind: int,
         kernel: Kernel,
         clips: Sequence[tuple[Array, float]],
-        numbers: Sequence[float],
+        numbers: Sequence[float] | Array,
         second_group: Sequence[int],
         limbs: Sequence[Limb],
     ) -> None:

@@ -7,6 +7,7 @@ from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_kind, base_params, express
 from controllers.haptic_map.lifted import LIFTED, lifted_map
+from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
 from controllers.state import Array
 
@@ -22,6 +23,8 @@ def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array
         lifted_map(params, x, memory, pose, jacobian)
     elif kind == ROBOT_ARM:
         robot_arm_map(params, x, memory, pose, jacobian)
+    elif kind == RIVER_CLIPS:
+        river_clips_map(params, x, memory, pose, jacobian)
 
 
 @njit

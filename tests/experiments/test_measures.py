@@ -32,7 +32,15 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     flight = np.zeros(m)
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
-    ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
+    ticks = {
+        "t": t,
+        "p": p,
+        "nearest": nearest,
+        "distance": distance,
+        "phase": phase,
+        "user": user,
+        "river": np.full(N, -1.0),
+    }
     ground = np.tile([0.0, 0.0, 700.0], (m, 1))
     ground[100:120] = 0.0  # in flight
     ground[200:230] = 0.0  # and when it should stand
@@ -56,7 +64,7 @@ def summary_of(path: Path, root_error: np.ndarray | None = None) -> RunSummary:
     error = np.full(N // EVERY, 0.03) if root_error is None else root_error
     with recording_of(path, error) as recording:
         return summarise(
-            recording, lambda points, phases: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {}
+            recording, lambda points, phases, rivers: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {}
         )
 
 

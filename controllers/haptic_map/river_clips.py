@@ -1,0 +1,158 @@
+"""Every river plays a clip of its own: which one has the hand is the motion, where on it the hand is the frame."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.branches import BRANCHES, branches
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import (
+    END,
+    START,
+    Trajectory,
+    curve_acceleration,
+    curve_point,
+    curve_velocity,
+    wrap_phase,
+)
+from controllers.errors import ParameterError
+from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.blending import blend
+from controllers.haptic_map.combination import fresh_lap
+from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
+from controllers.haptic_map.limbs import Limb
+from controllers.rotations import multiply
+from controllers.state import Array, Pose
+
+RIVER_CLIPS = 5
+# The memory: the lap of the clip that plays, then its river and the last phase on it.
+RIVER, PHASE, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2
+# Parameters: a header, offsets of the packed curves, the curves, and the blend.
+_RIVERS, _TUBE, _BLEND, _CURVES = range(4)
+_NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
+
+
+@njit
+def _phase_near(params: Array, curve: int, x: Array, last: float) -> float:
+    """Phase of the curve's point nearest to the stylus; where it passes twice, of the branch that goes on."""
+    found = np.empty((BRANCHES, 2))
+    start, end = params[curve + START], params[curve + END]
+    best, nearest = np.nan, _NEIGHBOUR * (end - start)
+    for k in range(branches(params, curve, x[0], x[1], x[2], params[_TUBE], found)):
+        away = abs(found[k, 0] - last)
+        away = min(away, end - start - away)
+        if away < nearest:
+            best, nearest = found[k, 0], away
+    if np.isnan(best):
+        best, _ = closest_phase(params, curve, x[0], x[1], x[2], last)
+    return wrap_phase(params, curve, best)
+
+
+@njit
+def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian: Array) -> None:
+    """Kernel of `RiverClips`: h(x), and h_*(x) unless `jacobian` has no rows."""
+    river, rivers = int(memory[RIVER]), int(params[_RIVERS])
+    curve = int(params[_CURVES + river])
+    phase = _phase_near(params, curve, x, memory[PHASE])
+    memory[PHASE] = phase
+    pace = 2.0 * np.pi / (params[curve + END] - params[curve + START])
+    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    bend = curve_acceleration(params, curve, phase)
+    # The nearest point stays nearest: (φ − p)·φ̇ = 0 gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
+    slope = 0.0
+    for i in range(3):
+        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
+    chain = np.zeros((3, 6))
+    for i in range(3):
+        chain[0, i] = pace * along[i] / slope if slope > 0.0 else 0.0
+    weights, changes = np.zeros((1, rivers)), np.zeros((1, 3, rivers))
+    weights[0, river] = 1.0
+    angle = pace * (phase - params[curve + START])
+    blend(params[int(params[_BLEND]) :], angle, weights, changes, chain, memory, pose, jacobian)
+
+
+@njit
+def takes_over(params: Array, memory: Array, river: float) -> bool:
+    """Whether a river, by its number in the trace of the field, is another than the one whose clip plays; −1 is not."""
+    return 0.0 <= river < params[_RIVERS] and river != memory[RIVER]
+
+
+@njit
+def change_clip(memory: Array, river: float, phase: float) -> None:
+    """Let the clip of another river play, from a phase on, in the frame of the lap that is."""
+    memory[RIVER], memory[PHASE], memory[LAST_ANGLE] = river, phase, np.nan
+
+
+@njit
+def heading_between(pose: Pose, other: Pose) -> float:
+    """Angle about the vertical [rad] by which a root must turn to face as another one does: the twist of q' q⁻¹."""
+    w, _, _, z = multiply(other[3], other[4], other[5], other[6], pose[3], -pose[4], -pose[5], -pose[6])
+    return 2.0 * np.arctan2(z, w) if w >= 0.0 else 2.0 * np.arctan2(-z, -w)
+
+
+@njit
+def place_clip(memory: Array, pose: Pose, x: float, y: float, turn: float) -> None:
+    """Move the lap's frame such that the figure, now in a pose, stands at (x, y) [m], turned by an angle [rad]."""
+    cosine, sine = np.cos(turn), np.sin(turn)
+    away_x, away_y = memory[LAP_X] - pose[0], memory[LAP_Y] - pose[1]
+    memory[LAP_X] = x + cosine * away_x - sine * away_y
+    memory[LAP_Y] = y + sine * away_x + cosine * away_y
+    memory[LAP_HEADING] += turn
+
+
+class RiverClips(AnimationMap):
+    r"""One clip for each river of a bundle.
+
+    .. math:: h(p, i) = A\,\rho_i\bigl(2\pi\,(t^*_i - t_0)/(t_1 - t_0)\bigr)
+
+    i is the river that has the hand, a number that the field leaves in its trace; t*_i the phase of its curve nearest
+    to the stylus (of the branch that goes on, where the curve passes twice); a lap of the river is a lap of its clip.
+    Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
+    as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
+    jumps: who shows it goes on from where the figure stands (`place_clip`), with the offset decaying
+    (`inertialization`). h does not depend on the stylus's orientation.
+
+    Parameters
+    ----------
+    curves : sequence of Trajectory
+        Of the rivers, periodic, in H.
+    clips : sequence of (Array, float)
+        As many: poses (n, nq) and frames per second. Clips that do not close are closed (`closed_loop`).
+    tube : float
+        Distance from a curve [m] within which a branch is followed; beyond it the nearest point of all counts.
+    limbs : sequence of Limb
+        Limbs whose ends are placed: feet that stand (see `limbs`).
+
+    Raises
+    ------
+    ParameterError
+        If there are not as many clips as curves, a curve is open, the tube is not positive, or a clip is not as the
+        others.
+    """
+
+    def __init__(
+        self,
+        curves: Sequence[Trajectory],
+        clips: Sequence[tuple[Array, float]],
+        tube: float,
+        limbs: Sequence[Limb] = (),
+    ) -> None:
+        if len(clips) != len(curves) or not curves:
+            raise ParameterError(
+                f"a map of rivers wants a clip for each; got {len(clips)} clips and {len(curves)} rivers"
+            )
+        opened = [i for i, curve in enumerate(curves) if not curve.periodic]
+        if opened:
+            raise ParameterError(f"a river that plays a clip must be a closed curve; river {opened[0]} is open")
+        if not tube > 0.0:
+            raise ParameterError(f"the tube of a map of rivers must be positive, got {tube} m")
+        packed = [curve.packed() for curve in curves]
+        offsets = np.cumsum([_CURVES + len(curves), *(len(blob) for blob in packed)])
+        header = np.concatenate(([len(curves), tube, offsets[-1]], offsets[:-1], *packed))
+        super().__init__(RIVER_CLIPS, river_clips_map, clips, header, (), limbs)
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run: the first river has the hand."""
+        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), [0.0, np.nan]]))
