@@ -1,8 +1,8 @@
 """Certificates of a run's field: what is known of its stability, passivity and energy before it is felt."""
 
 import json
+from collections.abc import Mapping
 from html import escape
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +10,25 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.certificates.device import Device, Sampling
+from controllers.certificates.device import Device
 from controllers.certificates.energy import energy
-from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.hand import HandRange
+from controllers.certificates.laws import FOLLOW_LAW, LAWS
 from controllers.certificates.passivity import passivity
-from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of
-from controllers.certificates.stability import HandRange, River, boundary, stability
-from controllers.curves.trajectory import Trajectory
-from controllers.errors import ParameterError
+from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
+from controllers.certificates.stability import River, boundary, stability
 from controllers.safety import ForceLimiter
+from experiments.certified_field import (
+    certificate_inputs,
+    certified_curve,
+    certified_laws,
+    certified_sampling,
+    read_certificate,
+)
 from experiments.config import RunConfig
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
-from sim.compiled import source_hash
 from sim.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -47,47 +52,32 @@ def phantom_device() -> Device:
     )  # fmt: skip
 
 
-def certified_river(config: RunConfig, delay: float = 0.0) -> River:
-    """The river of a run, as it is certified: its curve, gains and clock, with a delay of the torques [s].
+def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
+    """The laws of a run as they are certified, with a delay of the torques [s]; named as in `certified_laws`.
 
-    Near a bunny that pulls along the curve the field is FOLLOW's, to first order; one that pulls to itself is taken to
-    run at the clock's pace.
+    A bunny is taken to run at the clock's pace.
 
     Raises
     ------
     ParameterError
-        If there is no certificate for the run's mode.
+        If there is no certificate for the run's mode, or a number is out of its interval.
     """
-    if config.mode not in ("follow", "bunny"):
-        raise ParameterError(f"no certificate is known for mode {config.mode!r}; there are those of follow and bunny")
-    curve = Trajectory.circle(config.radius, config.lap)
-    law, width = FOLLOW_LAW, config.tube
-    if config.mode == "bunny":
-        law, width = (BUNNY_LAW, config.bunny_width) if config.bunny_attraction == "point" else (FOLLOW_LAW, np.inf)
-    sampling = Sampling(config.scene.servo_period, delay, config.cutoff)
-    return River(law, config.stiffness, config.damping, width, curve, phantom_device(), sampling)
-
-
-def certificate_inputs(river: River, hands: HandRange, push: float) -> dict[str, object]:
-    """All that the verdicts depend on, for `hash_of`: the device is in its parameters and in the sources."""
+    curve, device, sampling = certified_curve(config), phantom_device(), certified_sampling(config, delay)
     return {
-        "law": "follow" if river.law is FOLLOW_LAW else "bunny",
-        "gains": [river.k_r, river.b_d, river.width],
-        "curve": river.curve.packed(),
-        "sampling": river.sampling,
-        "device": PREMIUM_1_5,
-        "hands": hands,
-        "push": push,
-        "code": [source_hash(), version("casadi")],
+        name: River(LAWS[law], stiffness, damping, width, curve, device, sampling)
+        for name, (law, stiffness, damping, width) in certified_laws(config).items()
     }
 
 
-def certify(river: River, hands: HandRange, push: float) -> Certificate:
+def certify(rivers: Mapping[str, River], hands: HandRange, push: float) -> dict[str, Verdict]:
     """Stability with hands within intervals, passivity, and the bound for a push [N]; energy is FOLLOW's alone."""
-    verdicts: dict[str, Verdict] = {"stability": stability(river, hands.hands()), "passivity": passivity(river)}
-    if river.law is FOLLOW_LAW:
-        verdicts["energy"] = energy(river, push, ForceLimiter(river.sampling.period).peak)
-    return Certificate(verdicts, hash_of(certificate_inputs(river, hands, push)))
+    verdicts: dict[str, Verdict] = {}
+    for name, river in rivers.items():
+        verdicts["stability" + name] = stability(river, hands.hands())
+        verdicts["passivity" + name] = passivity(river)
+        if river.law is FOLLOW_LAW:
+            verdicts["energy" + name] = energy(river, push, ForceLimiter(river.sampling.period).peak)
+    return verdicts
 
 
 def certify_into(
@@ -113,35 +103,23 @@ def certify_into(
     ControllerError, SimError
         If a number is out of its interval, or the curve is out of the workspace.
     """
-    river, hands = certified_river(config, delay), hands or HandRange()
+    hands = hands or HandRange()
+    inputs = certificate_inputs(config, delay, hands, push)
     file = out / CERTIFICATE
     if file.exists() and (out / PAGE).exists():
         try:
             held = read_certificate(file)
-            held.check(certificate_inputs(river, hands, push))
+            held.check(inputs)
             return held
         except CertificateError:
             pass  # of another river, or of none: certified anew
-    certificate = certify(river, hands, push)
+    rivers = certified_rivers(config, delay)
+    certificate = Certificate(certify(rivers, hands, push), hash_of(inputs), hashes_of(inputs))
     out.mkdir(parents=True, exist_ok=True)
-    stability_figure(river, certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
+    stability_figure(rivers[""], certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
     (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
     file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return certificate
-
-
-def read_certificate(file: Path) -> Certificate:
-    """Certificate of a file.
-
-    Raises
-    ------
-    CertificateError
-        If it holds none.
-    """
-    try:
-        return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
-    except (ValueError, RecursionError) as error:
-        raise CertificateError(f"{file}: {error}") from None
 
 
 def stability_figure(river: River, verdict: Verdict) -> Figure:

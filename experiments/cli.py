@@ -16,6 +16,7 @@ from typing import Annotated  # noqa: E402
 
 import tyro  # noqa: E402
 
+from controllers.certificates.hand import NO_HANDS, HandRange  # noqa: E402
 from controllers.errors import ControllerError  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
 from models.errors import ModelError  # noqa: E402
@@ -115,23 +116,46 @@ class Certify:
     """Of the motors' torques, for a field [s]."""
     hand_push: float = 1.0
     """Largest force of the hand for which the distance from the curve is bounded [N]."""
+    hand: HandRange = field(default_factory=HandRange)
+    no_hand: bool = False
+    """Certify for nobody's hand on the stylus."""
+    verify: Path | None = None
+    """Only check that this certificate.json is of the same field, hands and code; exit code 1 if it is not."""
     json: bool = False
     """Print the certificate as JSON."""
 
     def __call__(self) -> int:
-        """Certify."""
-        from experiments.ballistics import certify_file
-        from experiments.certify import certify_into
-
+        """Certify, or verify."""
+        hands = NO_HANDS if self.no_hand else self.hand
+        if self.verify is not None:
+            return self._verify(self.verify, hands)
         if self.clip is not None:
+            from experiments.ballistics import certify_file
+
             certificate = certify_file(self.clip).certificate
         else:
-            certificate = certify_into(self.config, self.out, self.delay, push=self.hand_push)
+            from experiments.certify import certify_into
+
+            certificate = certify_into(self.config, self.out, self.delay, hands, self.hand_push)
         if self.json:
             print(json.dumps(certificate.to_json(), indent=2))
             return 0
         for name, verdict in certificate.verdicts.items():
             print(f"{name}: {verdict.verdict}; {verdict.reason}")
+        return 0
+
+    def _verify(self, file: Path, hands: HandRange) -> int:
+        from controllers.certificates.report import CertificateError
+        from experiments.certified_field import verify_certificate
+
+        try:
+            certificate = verify_certificate(file, self.config, self.delay, hands, self.hand_push)
+        except CertificateError as error:
+            print(f"hvf: {error}", file=sys.stderr)
+            return 1
+        print(f"{file}: of this field, these hands and this code")
+        for name, verdict in certificate.verdicts.items():
+            print(f"{name}: {verdict.verdict}")
         return 0
 
 

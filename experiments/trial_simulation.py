@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.certificates.device import HandImpedance, Sampling
+from controllers.certificates.hand import HandImpedance
 from controllers.certificates.laws import FOLLOW_LAW
 from controllers.certificates.linear_loop import linearise
 from controllers.certificates.sampled_loop import SampledLoop
+from controllers.certificates.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.program import evaluate

@@ -1,15 +1,12 @@
-"""What a certificate knows of a device, a hand and a clock; the device's kernels are handed over by who knows it."""
+"""What a certificate knows of a device; its kernels are handed over by who knows it."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import casadi
-import numpy as np
 
-from controllers.errors import ParameterError
-from controllers.state import Array, Vec3
+from controllers.state import Vec3
 
 casadi.GlobalOptions.setNumpyMode(1)
 
@@ -52,86 +49,6 @@ class Device:
     coulomb: Triple
     encoder_step: Triple
     peak_torque: Triple
-
-
-@dataclass(frozen=True)
-class HandImpedance:
-    """Hand on the stylus tip: F = −m v̇ − b (v − v_d) − k (p − p_d), about a motion (p_d, v_d) of its own.
-
-    Parameters
-    ----------
-    mass, damping, stiffness : float
-        m [kg], b [N s/m], k [N/m]; all zero: no hand.
-
-    Raises
-    ------
-    ParameterError
-        If one is negative or not finite.
-    """
-
-    mass: float = 0.0
-    damping: float = 0.0
-    stiffness: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("mass", "damping", "stiffness"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
-
-    def numbers(self) -> Array:
-        """[m, b, k]."""
-        return np.array([self.mass, self.damping, self.stiffness])
-
-
-NO_HAND = HandImpedance()
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """Clock of the servo: how often it samples, how late its torques come, and how it filters velocities.
-
-    Parameters
-    ----------
-    period : float
-        T [s].
-    delay : float
-        From a sample to its torque [s]; need not be a multiple of T.
-    cutoff : float
-        Corner frequency of the velocity filter [Hz].
-
-    Raises
-    ------
-    ParameterError
-        If the period or the cutoff is not positive, the delay negative, or one of them not finite.
-    """
-
-    period: float
-    delay: float = 0.0
-    cutoff: float = 150.0
-
-    def __post_init__(self) -> None:
-        values = (self.period, self.delay, self.cutoff)
-        if not all(math.isfinite(value) for value in values) or self.period <= 0.0 or self.cutoff <= 0.0:
-            raise ParameterError(f"period and cutoff of a loop must be positive and finite, got {self}")
-        if self.delay < 0.0:
-            raise ParameterError(f"the delay of a loop must be at least 0 s, got {self.delay}")
-
-    @property
-    def keep(self) -> float:
-        """Share s of the old rate that the velocity filter keeps: e^{−2π f T}."""
-        return math.exp(-2.0 * math.pi * self.cutoff * self.period)
-
-    @property
-    def whole_delay(self) -> int:
-        """Whole periods in the delay."""
-        return int(self.delay / self.period + 1e-9)
-
-    @property
-    def rest_delay(self) -> float:
-        """What is left of the delay [s]; nothing if it is a whole number of periods."""
-        rest = self.delay - self.whole_delay * self.period
-        return rest if rest > 1e-9 * self.period else 0.0
 
 
 def vector(scalars: Any) -> Symbol:

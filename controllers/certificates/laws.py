@@ -10,6 +10,7 @@ from controllers.curves.trajectory import PIECE, piece_point, piece_velocity
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force
 from controllers.fields.river import window
+from controllers.fields.stretchy_tubes import stretch_force
 
 
 class Law(NamedTuple):
@@ -22,16 +23,24 @@ class Law(NamedTuple):
         1/ε² or 1/δ². Linear in k_r and b_d.
     slides : bool
         Whether the attracting point slides along the curve with the hand, so that a shift along it is neutral.
+    carries : bool
+        Whether the hand is driven along the curve, or comes to rest on it.
     """
 
     force: Callable[..., Symbol]
     slides: bool
+    carries: bool
+
+
+def _nearest(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
+    """t* as a function of p: one Newton step from the nearest phase u has its value and its derivative."""
+    slope = casadi.dot(vector(piece_point.py_func(piece, 0, u)) - p, vector(piece_velocity.py_func(piece, 0, u)))
+    return u - slope / casadi.jacobian(slope, u)
 
 
 def _follow(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-    """FOLLOW with t* a function of p: one Newton step from the nearest phase has its value and its derivative."""
-    slope = casadi.dot(vector(piece_point.py_func(piece, 0, u)) - p, vector(piece_velocity.py_func(piece, 0, u)))
-    nearest = u - slope / casadi.jacobian(slope, u)
+    """FOLLOW, attracted by the nearest point."""
+    nearest = _nearest(p, piece, u)
     p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
     w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
     return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
@@ -44,8 +53,23 @@ def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Sym
     return pull * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
 
 
-FOLLOW_LAW = Law(_follow, slides=True)
-BUNNY_LAW = Law(_bunny, slides=False)
+def _seek(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_f: Symbol, b: Symbol, width: Symbol) -> Symbol:
+    """Stretchy tubes with the switch open: attracted by the nearest point, and slowed down."""
+    target = piece_point.py_func(piece, 0, _nearest(p, piece, u))
+    return vector([stretch_force.py_func(p[i], v[i], target[i], k_f, b) for i in range(3)])
+
+
+def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol, width: Symbol) -> Symbol:
+    """Stretchy tubes that are held: attracted by the point that was taken hold of, wherever the curve goes."""
+    target = piece_point.py_func(piece, 0, u)
+    return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
+
+
+FOLLOW_LAW = Law(_follow, slides=True, carries=True)
+BUNNY_LAW = Law(_bunny, slides=False, carries=True)
+SEEK_LAW = Law(_seek, slides=True, carries=False)
+HOLD_LAW = Law(_hold, slides=False, carries=False)
+LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
 
 
 def torque_function(device: Device, law: Law) -> Any:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.certificates.device import Device, HandImpedance, kinematics_function, plant_function
+from controllers.certificates.device import Device, kinematics_function, plant_function
+from controllers.certificates.hand import HandImpedance
 from controllers.certificates.laws import Law, torque_function
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError

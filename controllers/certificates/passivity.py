@@ -12,10 +12,11 @@ the tip in the directions across the curve; both conditions are for one axis, ta
 
 import numpy as np
 
-from controllers.certificates.device import HandImpedance, Sampling
+from controllers.certificates.hand import HandImpedance
 from controllers.certificates.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.report import Verdict
 from controllers.certificates.sampled_loop import SampledLoop
+from controllers.certificates.sampling import Sampling
 from controllers.certificates.stability import River
 from controllers.state import Array
 

@@ -68,14 +68,18 @@ class Certificate:
         Such as ``stability``, ``passivity``, ``ballistic``.
     inputs : str
         `hash_of` gains, curve, device, period, hand, clip: whatever the verdicts depend on, the code included.
+    parts : mapping of str to str
+        `hashes_of` the inputs one by one, so that a change can be named.
     """
 
     verdicts: Mapping[str, Verdict]
     inputs: str
+    parts: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def to_json(self) -> dict[str, Json]:
-        """The certificate as JSON takes it: ``inputs`` and one entry a verdict. Numbers not finite become null."""
-        return {"inputs": self.inputs} | {name: _json(verdict) for name, verdict in self.verdicts.items()}
+        """The certificate as JSON takes it: ``inputs``, ``parts`` and an entry a verdict. Not finite becomes null."""
+        hashes: dict[str, Json] = {"inputs": self.inputs, "parts": {**self.parts}}
+        return hashes | {name: _json(verdict) for name, verdict in self.verdicts.items()}
 
     @staticmethod
     def from_json(values: object) -> "Certificate":
@@ -88,7 +92,7 @@ class Certificate:
         """
         try:
             entries = dict(cast(Mapping[str, dict[str, object]], values))
-            inputs = entries.pop("inputs")
+            inputs, parts = entries.pop("inputs"), entries.pop("parts", {})
             verdicts: dict[str, Verdict] = {}
             for name, entry in entries.items():
                 assumptions = tuple(cast(Sequence[str], entry["assumptions"]))
@@ -100,7 +104,7 @@ class Certificate:
             ) from None
         if not isinstance(inputs, str):
             raise CertificateError(f"not a certificate: 'inputs' is {inputs!r}; expected a hash")
-        return Certificate(verdicts, inputs)
+        return Certificate(verdicts, inputs, cast(Mapping[str, str], parts))
 
     def check(self, inputs: object) -> None:
         """Whether this certificate is of these inputs.
@@ -111,8 +115,12 @@ class Certificate:
             If any of them has changed.
         """
         found = hash_of(inputs)
-        if found != self.inputs:
-            raise CertificateError(f"the certificate is of inputs {self.inputs}, these are {found}; certify again")
+        if found == self.inputs:
+            return
+        now = hashes_of(cast(Mapping[str, object], inputs)) if self.parts and isinstance(inputs, Mapping) else {}
+        changed = [name for name in (*self.parts, *now) if self.parts.get(name) != now.get(name)]
+        told = f"; changed: {', '.join(dict.fromkeys(changed))}" if now else ""
+        raise CertificateError(f"the certificate is of inputs {self.inputs}, these are {found}{told}; certify again")
 
 
 def hash_of(inputs: object) -> str:
@@ -129,6 +137,11 @@ def hash_of(inputs: object) -> str:
         If there is something else among them, whose text need not be its value.
     """
     return hashlib.sha256(_canonical(inputs)).hexdigest()[:16]
+
+
+def hashes_of(inputs: Mapping[str, object]) -> dict[str, str]:
+    """`hash_of` each of some inputs, by their names."""
+    return {name: hash_of(value) for name, value in inputs.items()}
 
 
 def _canonical(value: object) -> bytes:

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import expm
 
-from controllers.certificates.device import Sampling
 from controllers.certificates.linear_loop import LinearLoop
+from controllers.certificates.sampling import Sampling
 from controllers.state import Array
 
 PLANT, KEPT = 6, 12  # numbers of (θ, θ̇), and of the state without delayed torques

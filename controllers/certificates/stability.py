@@ -1,18 +1,19 @@
 """Stability of a river under its clock: critical gains and delay, Floquet multipliers, and the verdict."""
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from controllers.certificates.device import NO_HAND, Device, HandImpedance, Sampling
+from controllers.certificates.device import Device
+from controllers.certificates.hand import NO_HAND, HandImpedance
 from controllers.certificates.laws import Law
 from controllers.certificates.linear_loop import LinearLoop, linearise
 from controllers.certificates.report import Verdict
 from controllers.certificates.sampled_loop import SampledLoop
+from controllers.certificates.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
@@ -50,21 +51,6 @@ class River(NamedTuple):
         times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * self.phases()
         standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
         return linearise(self.device, self.law, standing, places, hand, self.width)
-
-
-@dataclass(frozen=True)
-class HandRange:
-    """Intervals of a hand's mass [kg], damping [N s/m] and stiffness [N/m]."""
-
-    mass: tuple[float, float] = (0.0, 0.3)
-    damping: tuple[float, float] = (0.0, 8.0)
-    stiffness: tuple[float, float] = (0.0, 500.0)
-
-    def hands(self) -> list[HandImpedance]:
-        """No hand, the corners and the middle."""
-        corners = [HandImpedance(*c) for c in itertools.product(self.mass, self.damping, self.stiffness)]
-        middle = HandImpedance(*(0.5 * (low + high) for low, high in (self.mass, self.damping, self.stiffness)))
-        return list(dict.fromkeys([NO_HAND, *corners, middle]))
 
 
 def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
@@ -129,8 +115,8 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on the river's linear stability along its curve, for every one of some hands.
 
     Certified: at every phase on a grid and with every hand, k_r stays below what is critical there by more than the
-    critical value changes to the neighbouring phase; and on a closed curve the Floquet multipliers of the lap lie
-    inside the unit circle. The margin is (critical k_r)/k_r − 1.
+    critical value changes to the neighbouring phase; and where the hand is carried round a closed curve, the Floquet
+    multipliers of the lap lie inside the unit circle. The margin is (critical k_r)/k_r − 1.
     """
     critical, multipliers = [], []
     worst = (np.inf, NO_HAND, 0)
@@ -140,7 +126,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         if onset.min() < worst[0]:
             worst = (float(onset.min()), hand, int(onset.argmin()))
         critical.append(onset)
-        if river.curve.periodic:
+        if river.curve.periodic and river.law.carries:
             multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
     bare = SampledLoop(river.still(), river.sampling)
     onsets = np.array(critical)

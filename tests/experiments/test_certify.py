@@ -1,23 +1,20 @@
-"""`certify` writes what it finds, finds it again by its hash, and notices every change."""
+"""`certify` writes what it finds, finds it again by its hash, and `--verify` notices every change of an input."""
 
 import json
+import subprocess
+import sys
 import time
 from dataclasses import replace
 
 import pytest
 
-from controllers.certificates.report import Certificate, CertificateError
-from controllers.certificates.stability import HandRange
+from controllers.certificates.hand import HandRange
+from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
-from experiments.certify import (
-    CERTIFICATE,
-    PAGE,
-    PLOT,
-    certificate_inputs,
-    certified_river,
-    certify_into,
-    read_certificate,
-)
+from experiments import certified_field
+from experiments.certified_field import read_certificate, verify_certificate
+from experiments.certify import CERTIFICATE, PAGE, PLOT, certified_rivers, certify_into
+from experiments.cli import main
 from experiments.config import RunConfig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
@@ -49,27 +46,81 @@ def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
     assert again.verdicts["stability"].verdict == "certified"
 
 
+FINE_FILTER = replace(RunConfig().scene, servo_period=5e-4)
+
+
 @pytest.mark.parametrize(
-    "change",
-    [{"stiffness": 301.0}, {"damping": 4.1}, {"radius": 0.048}, {"lap": 4.1}, {"cutoff": 149.0}, {"tube": 0.2}],
+    ("change", "said"),
+    [
+        ({"stiffness": 301.0}, "gains"),
+        ({"damping": 4.1}, "gains"),
+        ({"tube": 0.2}, "gains"),
+        ({"mode": "bunny"}, "gains"),
+        ({"radius": 0.048}, "curve"),
+        ({"lap": 4.1}, "curve"),
+        ({"scene": FINE_FILTER}, "period"),
+        ({"cutoff": 149.0}, "filter"),
+    ],
 )
-def test_a_certificate_is_of_one_river_only(folder, change):
-    certificate = Certificate.from_json(json.loads((folder / CERTIFICATE).read_text()))
-    certificate.check(certificate_inputs(certified_river(RunConfig()), HANDS, 1.0))
-    with pytest.raises(CertificateError, match="certify again"):
-        certificate.check(certificate_inputs(certified_river(replace(RunConfig(), **change)), HANDS, 1.0))
-    with pytest.raises(CertificateError, match="certify again"):
-        certificate.check(certificate_inputs(certified_river(RunConfig(), delay=1e-4), HANDS, 1.0))
-    with pytest.raises(CertificateError, match="certify again"):
-        certificate.check(certificate_inputs(certified_river(RunConfig()), HandRange(), 1.0))
+def test_a_certificate_is_of_one_field_only(folder, change, said):
+    file = folder / CERTIFICATE
+    verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+    with pytest.raises(CertificateError, match=f"changed: {said}; certify again"):
+        verify_certificate(file, replace(RunConfig(), **change), 0.0, HANDS, 1.0)
 
 
-def test_the_bunny_is_certified_and_what_is_not_known_is_said():
-    point = certified_river(RunConfig(mode="bunny"))
-    along = certified_river(RunConfig(mode="bunny", bunny_attraction="along"))
+def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
+    file = folder / CERTIFICATE
+    with pytest.raises(CertificateError, match="changed: delay;"):
+        verify_certificate(file, RunConfig(), 1e-4, HANDS, 1.0)
+    with pytest.raises(CertificateError, match="changed: hand, push;"):
+        verify_certificate(file, RunConfig(), 0.0, HandRange(), 2.0)
+
+
+def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
+    file = folder / CERTIFICATE
+    heavier = replace(certified_field.PREMIUM_1_5, m_a=0.021)
+    with monkeypatch.context() as patch:
+        patch.setattr(certified_field, "PREMIUM_1_5", heavier)
+        with pytest.raises(CertificateError, match="changed: device;"):
+            verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+    monkeypatch.setattr(certified_field, "source_hash", lambda: "0")
+    with pytest.raises(CertificateError, match="changed: code;"):
+        verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+
+
+def test_the_command_verifies_without_casadi_and_says_what_changed(folder, capsys):
+    file = str(folder / CERTIFICATE)
+    hands = ["--hand.mass", "0.1", "0.1", "--hand.damping", "2", "2", "--hand.stiffness", "0", "0"]
+    assert main(["certify", "--verify", file, *hands]) == 0
+    assert "stability: certified" in capsys.readouterr().out
+    assert main(["certify", "--verify", file, *hands, "--stiffness", "299", "--delay", "0.001"]) == 1
+    assert "changed: gains, delay; certify again" in capsys.readouterr().err
+    assert main(["certify", "--verify", file, "--no-hand"]) == 1
+    assert "changed: hand;" in capsys.readouterr().err
+    code = f"import sys; from experiments.cli import main; main(['certify', '--verify', {file!r}]); "
+    code += "assert 'casadi' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
+    out = str(tmp_path / "none")
+    assert main(["certify", "--out", out, "--hand.mass", "0.2", "0.1"]) == 2
+    assert "mass of hands lies between 0.2 and 0.1" in capsys.readouterr().err
+    assert main(["certify", "--out", out, "--hand.damping", "-1", "1"]) == 2
+    assert "at least 0" in capsys.readouterr().err
+
+
+def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_is_said():
+    point = certified_rivers(RunConfig(mode="bunny"))[""]
+    along = certified_rivers(RunConfig(mode="bunny", bunny_attraction="along"))[""]
     assert (point.law.slides, along.law.slides) == (False, True)
+    tubes = certified_rivers(RunConfig(mode="stretch-then-follow", seek=140.0, rubber=160.0))
+    assert [(name, river.k_r, river.law.slides) for name, river in tubes.items()] == [
+        ("", 140.0, True), ("_held", 160.0, False), ("_then", 300.0, True),
+    ]  # fmt: skip
     with pytest.raises(ParameterError, match="'rivers'"):
-        certified_river(RunConfig(mode="rivers"))
+        certified_rivers(RunConfig(mode="rivers"))
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])

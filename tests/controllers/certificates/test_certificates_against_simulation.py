@@ -4,12 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.certificates.device import HandImpedance, Sampling
 from controllers.certificates.energy import energy, terminal_speed
+from controllers.certificates.hand import HandImpedance, HandRange
 from controllers.certificates.laws import FOLLOW_LAW
 from controllers.certificates.passivity import passivity
 from controllers.certificates.sampled_loop import SampledLoop
-from controllers.certificates.stability import HandRange, River, stability
+from controllers.certificates.sampling import Sampling
+from controllers.certificates.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify import phantom_device

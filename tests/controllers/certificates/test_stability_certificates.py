@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from controllers.certificates.device import NO_HAND, HandImpedance, Sampling
 from controllers.certificates.energy import distance_bound, energy, peak_gain, terminal_speed
-from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.hand import NO_HAND, HandImpedance, HandRange
+from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW
 from controllers.certificates.linear_loop import linearise
 from controllers.certificates.passivity import damping_needed, passivity
 from controllers.certificates.report import Certificate
 from controllers.certificates.sampled_loop import SampledLoop
+from controllers.certificates.sampling import Sampling
 from controllers.certificates.stability import (
-    HandRange,
     River,
     boundary,
     critical_damping,
@@ -28,7 +28,9 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError, ParameterError
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
-from controllers.state import HandState
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
+from controllers.state import HAND_SWITCH, HandState
 from experiments.certify import phantom_device
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import (
@@ -77,6 +79,53 @@ def test_the_law_is_differentiated_as_the_kernels_run_it(kind):
         np.testing.assert_allclose(
             _difference(lambda x, theta=theta, t=t: _torque(law, theta, x, t), rate), by_omega, atol=1e-7
         )
+
+
+@pytest.mark.parametrize("kind", ["seek", "hold"])
+def test_tubes_are_differentiated_as_the_kernels_run_them(kind):
+    law = StretchyTubes(CIRCLE, 150.0, 180.0)
+    program, k = law.program(), 150.0 if kind == "seek" else 180.0
+    linear = linearise(DEVICE, SEEK_LAW if kind == "seek" else HOLD_LAW, CIRCLE, PHASES, NO_HAND)
+    for i, t in enumerate(PHASES):
+        memory, wrench = program.fresh_memory(), np.zeros(6)
+
+        def feel(p, v, memory, wrench=wrench):
+            hand = HandState.at(p, v, 0.0).vector()
+            hand[HAND_SWITCH] = float(kind == "hold")
+            stretchy_wrench(program.params, 0, memory, TRACE_SIZE, hand, wrench)
+            return wrench[:3].copy()
+
+        feel(CIRCLE.point(t), np.zeros(3), memory)
+
+        def torque(theta, omega, memory=memory, feel=feel):
+            p = np.array(vector_to_hand_frame(forward_kinematics(tuple(theta))))
+            v = np.array(vector_to_hand_frame(tuple(np.array(jacobian(tuple(theta))) @ omega)))
+            pull = joint_torques(tuple(theta), vector_to_device_frame(tuple(feel(p, v, memory.copy()))))
+            return np.array(pull) + gravity_torques(tuple(theta))
+
+        theta, rate = linear.theta[i], linear.rate[i]
+        by_theta = linear.weight_theta[i] + k * linear.unit_theta[0, i] + law.b * linear.unit_theta[1, i]
+        by_omega = k * linear.unit_omega[0, i] + law.b * linear.unit_omega[1, i]
+        np.testing.assert_allclose(
+            _difference(lambda x, rate=rate, torque=torque: torque(x, rate), theta), by_theta, atol=2e-5
+        )
+        np.testing.assert_allclose(
+            _difference(lambda x, theta=theta, torque=torque: torque(theta, x), rate), by_omega, atol=1e-7
+        )
+
+
+def test_rubber_that_is_held_is_certified_and_one_too_stiff_for_its_delay_refuted():
+    hold = RIVER._replace(law=HOLD_LAW, k_r=150.0, b_d=2.0, width=np.inf)
+    good = stability(hold, [NO_HAND, HandImpedance(0.1, 2.0, 200.0)])
+    assert good.verdict == "certified"
+    assert good.figures["multiplier"] is None
+    assert good.margin > 5.0
+    bad = stability(hold._replace(k_r=2500.0, sampling=Sampling(1e-3, 2e-3)), [NO_HAND])
+    assert bad.verdict == "refuted"
+    # A free direction along the curve is no less stable than one that is held: the seeking tube's onset is not lower.
+    seek = stability(hold._replace(law=SEEK_LAW), [NO_HAND])
+    assert seek.verdict == "certified"
+    assert seek.figures["critical_stiffness"].min() >= good.figures["critical_stiffness"].min() * (1.0 - 1e-6)
 
 
 @pytest.mark.parametrize("hand", [NO_HAND, HandImpedance(0.2, 5.0, 400.0)])

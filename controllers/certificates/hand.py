@@ -1,0 +1,81 @@
+"""The hand that certificates allow for: an impedance on the stylus, and intervals of it."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+
+@dataclass(frozen=True)
+class HandImpedance:
+    """Hand on the stylus tip: F = −m v̇ − b (v − v_d) − k (p − p_d), about a motion (p_d, v_d) of its own.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : float
+        m [kg], b [N s/m], k [N/m]; all zero: no hand.
+
+    Raises
+    ------
+    ParameterError
+        If one is negative or not finite.
+    """
+
+    mass: float = 0.0
+    damping: float = 0.0
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "damping", "stiffness"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
+
+    def numbers(self) -> Array:
+        """[m, b, k]."""
+        return np.array([self.mass, self.damping, self.stiffness])
+
+
+NO_HAND = HandImpedance()
+
+
+@dataclass(frozen=True)
+class HandRange:
+    """Intervals of the impedance of the hands that may hold the stylus.
+
+    Parameters
+    ----------
+    mass : two floats
+        Least and largest m [kg].
+    damping : two floats
+        Least and largest b [N s/m].
+    stiffness : two floats
+        Least and largest k [N/m].
+    """
+
+    mass: tuple[float, float] = (0.0, 0.3)
+    damping: tuple[float, float] = (0.0, 8.0)
+    stiffness: tuple[float, float] = (0.0, 500.0)
+
+    def hands(self) -> list[HandImpedance]:
+        """No hand, the corners and the middle.
+
+        Raises
+        ------
+        ParameterError
+            If an interval ends before it begins, or a number is negative or not finite.
+        """
+        for name in ("mass", "damping", "stiffness"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ParameterError(f"{name} of hands lies between {low} and {high}: the smaller number comes first")
+        corners = [HandImpedance(*c) for c in itertools.product(self.mass, self.damping, self.stiffness)]
+        middle = HandImpedance(*(0.5 * (low + high) for low, high in (self.mass, self.damping, self.stiffness)))
+        return list(dict.fromkeys([NO_HAND, *corners, middle]))
+
+
+NO_HANDS = HandRange((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))

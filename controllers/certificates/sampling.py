@@ -1,0 +1,53 @@
+"""The clock of a servo."""
+
+import math
+from dataclasses import dataclass
+
+from controllers.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Clock of the servo: how often it samples, how late its torques come, and how it filters velocities.
+
+    Parameters
+    ----------
+    period : float
+        T [s].
+    delay : float
+        From a sample to its torque [s]; need not be a multiple of T.
+    cutoff : float
+        Corner frequency of the velocity filter [Hz].
+
+    Raises
+    ------
+    ParameterError
+        If the period or the cutoff is not positive, the delay negative, or one of them not finite.
+    """
+
+    period: float
+    delay: float = 0.0
+    cutoff: float = 150.0
+
+    def __post_init__(self) -> None:
+        values = (self.period, self.delay, self.cutoff)
+        if not all(math.isfinite(value) for value in values) or self.period <= 0.0 or self.cutoff <= 0.0:
+            raise ParameterError(f"period and cutoff of a loop must be positive and finite, got {self}")
+        if self.delay < 0.0:
+            raise ParameterError(f"the delay of a loop must be at least 0 s, got {self.delay}")
+
+    @property
+    def keep(self) -> float:
+        """Share s of the old rate that the velocity filter keeps: e^{−2π f T}."""
+        return math.exp(-2.0 * math.pi * self.cutoff * self.period)
+
+    @property
+    def whole_delay(self) -> int:
+        """Whole periods in the delay."""
+        return int(self.delay / self.period + 1e-9)
+
+    @property
+    def rest_delay(self) -> float:
+        """What is left of the delay [s]; nothing if it is a whole number of periods."""
+        rest = self.delay - self.whole_delay * self.period
+        return rest if rest > 1e-9 * self.period else 0.0

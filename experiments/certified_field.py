@@ -1,0 +1,144 @@
+"""What a certificate of a field is of: laws and gains, curve, clock, device, hands and code; and whether it still is.
+
+Nothing here needs CasADi, so a stored certificate is checked without starting it.
+"""
+
+import hashlib
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+from controllers.certificates.hand import HandRange
+from controllers.certificates.report import Certificate, CertificateError
+from controllers.certificates.sampling import Sampling
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config import RunConfig
+from models.phantom.parameters import PREMIUM_1_5
+from sim.compiled import source_hash
+
+CERTIFIED_MODES = ("follow", "bunny", "stretch", "stretch-then-follow")
+
+
+class CertifiedLaw(NamedTuple):
+    """A law of force that a run uses: its name among `controllers.certificates.laws.LAWS`, and its gains.
+
+    Attributes
+    ----------
+    law : str
+        Name.
+    stiffness, damping : float
+        [N/m], [N s/m].
+    width : float
+        ε or δ [m]; infinite if the law has none.
+    """
+
+    law: str
+    stiffness: float
+    damping: float
+    width: float
+
+
+def certified_laws(config: RunConfig) -> dict[str, CertifiedLaw]:
+    """The laws that a run uses, by what is added to the names of their verdicts; that of the run's start by "".
+
+    Near a bunny that pulls along the curve the field is FOLLOW's, to first order. Stretchy tubes seek with the switch
+    open and hold with it closed; a bent curve that is performed afterwards is certified as it was before.
+
+    Raises
+    ------
+    ParameterError
+        If there is no certificate for the run's mode.
+    """
+    follow = CertifiedLaw("follow", config.stiffness, config.damping, config.tube)
+    if config.mode == "follow":
+        return {"": follow}
+    if config.mode == "bunny":
+        along = config.bunny_attraction == "along"
+        width = float("inf") if along else config.bunny_width
+        return {"": CertifiedLaw("follow" if along else "bunny", config.stiffness, config.damping, width)}
+    if config.mode in ("stretch", "stretch-then-follow"):
+        tubes = {
+            "": CertifiedLaw("seek", config.seek, StretchyTubes.b, float("inf")),
+            "_held": CertifiedLaw("hold", config.rubber, StretchyTubes.b, float("inf")),
+        }
+        return tubes | ({"_then": follow} if config.mode == "stretch-then-follow" else {})
+    raise ParameterError(
+        f"no certificate is known for mode {config.mode!r}; there are those of {', '.join(CERTIFIED_MODES)}"
+    )
+
+
+def certified_curve(config: RunConfig) -> Trajectory:
+    """The curve of a run."""
+    return Trajectory.circle(config.radius, config.lap)
+
+
+def certified_sampling(config: RunConfig, delay: float) -> Sampling:
+    """The clock of a run, with a delay of the torques [s]."""
+    return Sampling(config.scene.servo_period, delay, config.cutoff)
+
+
+def certificate_inputs(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
+    """All that the verdicts on a run's field depend on, by name, for `hash_of`.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Of the run.
+    delay : float
+        Of the torques [s].
+    hands : HandRange
+        Intervals of the hand's impedance.
+    push : float
+        Largest force of the hand [N].
+    """
+    sampling, makers = certified_sampling(config, delay), sorted(Path(__file__).parent.glob("certif*.py"))
+    return {
+        "gains": certified_laws(config),
+        "curve": certified_curve(config).packed(),
+        "period": sampling.period,
+        "delay": sampling.delay,
+        "filter": sampling.cutoff,
+        "device": PREMIUM_1_5,
+        "hand": hands,
+        "push": push,
+        "code": [
+            source_hash(),
+            [hashlib.sha256(file.read_bytes()).hexdigest() for file in makers],
+            [version(library) for library in ("casadi", "numpy", "scipy")],
+        ],
+    }
+
+
+def read_certificate(file: Path) -> Certificate:
+    """Certificate of a file.
+
+    Raises
+    ------
+    CertificateError
+        If it holds none.
+    """
+    try:
+        return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
+    except (ValueError, RecursionError) as error:
+        raise CertificateError(f"{file}: {error}") from None
+
+
+def verify_certificate(file: Path, config: RunConfig, delay: float, hands: HandRange, push: float) -> Certificate:
+    """The certificate of a file, if it is of this run's field and of this code.
+
+    Raises
+    ------
+    CertificateError
+        If the file holds none, or any input differs; the message says which.
+    ParameterError
+        If there is no certificate for the run's mode.
+    """
+    certificate = read_certificate(file)
+    try:
+        certificate.check(certificate_inputs(config, delay, hands, push))
+    except CertificateError as error:
+        raise CertificateError(f"{file}: {error}") from None
+    return certificate
