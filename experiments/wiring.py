@@ -17,6 +17,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
+from experiments.balance import balanced
 from experiments.config import STRETCHING, RunConfig
 from experiments.modes import Field, default_rivers, law
 from experiments.stretch import law as stretch_law
@@ -179,7 +180,7 @@ def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], curve: Trajectory, f
     legs = figure_legs(figure)
     if config.map == "cylindrical":
         corners = [motions[i % len(motions)] for i in range(4)]
-        return Cylindrical(corners, radii, (-config.reach, config.reach), legs)
+        return balanced(Cylindrical(corners, radii, (-config.reach, config.reach), legs), figure, config.lap)
     if config.map == "rivers":
         if config.mode != "rivers" or config.crossing == "sum":
             raise ParameterError(

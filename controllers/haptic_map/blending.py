@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.haptic_map.alignment import aligned_channels
-from controllers.haptic_map.combination import combine, figure_channels, figure_size, packed_figure
+from controllers.haptic_map.combination import combine_corrected, figure_channels, figure_size, packed_figure
 from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop
@@ -38,8 +38,8 @@ def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Arr
 
 @njit
 def blend(
-    params: Array, angle: float, weights: Array, changes: Array, chain: Array, memory: Array, pose: Array,
-    jacobian: Array,
+    params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
+    pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
     """Blended pose, and its derivative unless `jacobian` has no rows.
 
@@ -47,8 +47,8 @@ def blend(
     ----------
     params : Array
         `packed_blend`.
-    angle, weights, changes, chain, memory, pose, jacobian
-        As `combine` takes them.
+    angle, weights, changes, correction, chain, memory, pose, jacobian
+        As `combine_corrected` takes them.
     """
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
@@ -56,7 +56,7 @@ def blend(
     channels = figure_channels(figure)
     value, slope = np.empty((clips, channels)), np.empty((clips, channels))
     _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
-    combine(figure, value, slope, drifts, angle, weights, changes, chain, memory, pose, jacobian)
+    combine_corrected(figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, pose, jacobian)
 
 
 def _closing_signs(channels: Array, rotations: int) -> Array:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.haptic_map.inbetween import FOOT, ROOT
 from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
 from controllers.haptic_map.mean import mean_derivative, mean_rotation
@@ -112,7 +113,19 @@ def combine(
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
+    combine_corrected(
+        figure, value, slope, drifts, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian
+    )
+
+
+@njit
+def combine_corrected(
+    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
+    correction: Array, chain: Array, memory: Array, pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
+    """`combine`, with root and ends moved by a correction (see `inbetween`), shape (4, 2 + 4 limbs), or (4, 0)."""
     clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
+    corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
     tangents = _WAYS if jacobian.shape[0] > 0 else 0
 
@@ -134,7 +147,9 @@ def combine(
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
     root, end, lower = np.empty((4, 3)), np.empty((4, 3)), np.zeros(4)
     _mean_position(value, slope, 0, weights[0], changes[0], root)
-    if limbs > 0:
+    if corrected:
+        root[:, :2] += correction[:, :2]
+    elif limbs > 0:
         clearance = slice(3 + 4 * rotations + END - 1, value.shape[1], END)
         lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)
     for n in range(limbs):
@@ -143,10 +158,17 @@ def combine(
         _mean_position(value, slope, column, weights[0], changes[0], end)
         for k in range(4):
             end[k, 2] -= lower[k]
+        heading = 0.0
+        if corrected:
+            at = ROOT + FOOT * n
+            end += correction[:, at : at + 3]
+            heading = correction[0, at + 3]
         lag = value[0, column + 3]
         x, y = drift_motion(drift, lag, 2.0 * np.pi * slope[0, column + 3], shift, turn)
         _turn_position(lag * drift[0, 2], turn, x, y, shift, end)
-        _turn_rotation(lag * drift[0, 2], turn, q[last], rates[last])
+        if corrected:
+            turn += correction[1:, ROOT + FOOT * n + 3]
+        _turn_rotation(lag * drift[0, 2] + heading, turn, q[last], rates[last])
         place_limb(limb, q, rates, root, end, tangents)
 
     # The root is in the frame of the drift, and that in the frame of the lap.

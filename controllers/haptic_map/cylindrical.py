@@ -1,20 +1,27 @@
 """The cylindrical map: an angle is the frame, radius and height blend four clips (Donald & Henle 2000, Fig. 3)."""
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
+from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.blending import blend
-from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder
+from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
+from controllers.haptic_map.footfalls import foot_corrections
+from controllers.haptic_map.inbetween import ROOT, correction, packed_table, table_channels
+from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.state import Array
 
 CYLINDRICAL = 1
 _CLIPS = 4
-_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _BLEND = range(5)
+_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
+_NODES = 9  # of the corrections' table, along each weight
+_ROWS = 512  # of it round the lap, at most
 
 
 @njit
@@ -29,7 +36,15 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
         weights[0, i], changes[0, 1, i], changes[0, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
-    blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
+    size = int(params[_TABLE_SIZE])
+    d = np.empty((4, 0))
+    if size > 0:
+        table = params[_TABLE : _TABLE + size]
+        d = np.empty((4, table_channels(table)))
+        correction(table, angle, a, b, d)
+        d[2] *= a_slope
+        d[3] *= b_slope
+    blend(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
 class Cylindrical(AnimationMap):
@@ -73,4 +88,47 @@ class Cylindrical(AnimationMap):
                 f"the cylindrical map blends {_CLIPS} clips, got {len(clips)}; give one more than once"
             )
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, numbers, (), limbs)
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
+        self._numbers = numbers
+        b, a = np.meshgrid(*[np.linspace(0.0, 1.0, _NODES)] * 2)
+        shares = [(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b]
+        self.mixtures: Array = np.stack(shares, axis=-1).reshape(-1, _CLIPS)
+        self.drifts: Array = np.stack([loop.drift for loop in self.loops])
+        self._nodes = np.stack([a.ravel(), b.ravel()], axis=-1)
+        if limbs:
+            rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
+            channels = with_ends(aligned_channels(self.loops, rows), self.drifts, limbs)
+            self._correct(foot_corrections(channels, self.drifts, limbs, self.mixtures))
+
+    def _correct(self, values: Array) -> None:
+        table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))
+        blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
+        self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
+        self._corrections = values
+
+    def places(self, angles: Array) -> Array:
+        """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
+        r_min, r_max, z_min, z_max = self._numbers
+        share = np.linspace(0.0, 1.0, 2001)
+        weight = [eased(x)[0] for x in share]
+        a, b = np.interp(self._nodes, weight, share).T
+        r, z = r_min + a * (r_max - r_min), z_min + b * (z_max - z_min)
+        x = np.zeros((len(a), len(angles), 7))
+        x[..., 0], x[..., 1] = r[:, None] * np.cos(angles), r[:, None] * np.sin(angles)
+        x[..., 2], x[..., 3] = z[:, None], 1.0
+        return x
+
+    def with_sway(self, sway: Array) -> "Cylindrical":
+        """The same map, its root moved at the mixtures.
+
+        Parameters
+        ----------
+        sway : Array, shape (n, k, 2)
+            At equal steps of the lap [m], in the frame of the lap's drift.
+        """
+        other = copy(self)
+        values = self._corrections.copy()
+        rows = len(values)
+        values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
+        other._correct(values)
+        return other

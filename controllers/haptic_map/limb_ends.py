@@ -27,13 +27,24 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
     for joint, offset in zip(limb.joints, limb.offsets, strict=True):
         place = place + turn.apply(offset)
         turn = turn * _rotations(channels, joint)
-    points = np.stack([place + turn.apply(point) for point in limb.points])
+    height = place[:, 2] + _lowest(turn, limb.points, _SOFTNESS)
+    place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
     dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
     quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
-    # A soft minimum: heel and toe take turns without a kink.
-    height = -_SOFTNESS * np.log(np.exp(-points[..., 2] / _SOFTNESS).sum(axis=0))
-    return points.mean(axis=0).reshape(n, m, 3), quaternions, height.reshape(n, m)
+    return place.reshape(n, m, 3), quaternions, height.reshape(n, m)
+
+
+def _lowest(turn: Rotation, points: Array, softness: float) -> Array:
+    """Height of the lowest of points over the origin of their frame, turned; a soft minimum: no kinks."""
+    heights = np.stack([turn.apply(point)[..., 2] for point in points])
+    return -softness * np.log(np.exp(-heights / softness).sum(axis=0))
+
+
+def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
+    """Height of a limb's lowest point over the centre of its points, with the end's orientations (..., 4)."""
+    turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
+    return _lowest(turn, limb.points - limb.points.mean(axis=0), softness).reshape(quaternions.shape[:-1])
 
 
 def _rotations(channels: Array, joint: int) -> Rotation:

@@ -1,0 +1,161 @@
+r"""Feet of a blend that step one at a time, and move only while they are lifted.
+
+A mean of clips that step at different times moves both feet at once, hardly lifted. So at every mixture of the clips
+the path of each foot over the lap is made again from what the mean asks for:
+
+- Clearance. With the clearances h̄_j of the blended feet and F = Σ w_i min_j h_ij, the height at which the clips
+  themselves fly, foot j is held at F + A(ĥ_j), ĥ_j = h̄_j − min_k h̄_k: the lower foot stands. A(h) = h + c h/(h + h_c)
+  lifts a foot that makes a small share of a step enough for it to clear the ground.
+- Place and heading. The foot moves as far as it is free, g = S((ĥ + F)/h_0), and catches up with the mean then:
+
+.. math:: p' = g\, \dot{\bar p} + \kappa\, g\, (\bar p - p) .
+
+  Integrated forwards round the lap this holds a foot where it last stood; integrated backwards, where it will stand
+  next; their average does both by halves, and is as fixed while g = 0.
+
+What is found at a mixture is lessened by the average of what is found for its clips alone, which so remain as they are.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controllers.haptic_map.inbetween import FOOT, ROOT
+from controllers.haptic_map.limb_ends import lowest_point
+from controllers.haptic_map.limbs import END, Limb
+from controllers.haptic_map.loops import plane_exponential, turned
+from controllers.state import Array
+
+_SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
+_FREE = 0.004  # h_0 [m], where the foot is lifted so high
+_SHARE_FREE = 0.2  # and as a share of the largest lift of the lap
+_LIFTED = 0.002  # [m] a foot that is never lifted more is not held
+_RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
+_CATCH_UP = 8.0  # κ ∫ g over a lap, at least
+_LAPS = 4  # until the path repeats
+
+
+def _step(x: Array) -> Array:
+    """C² step from 0 to 1 on [0, 1]."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+
+
+def _raise(lift: Array) -> Array:
+    return _RAISE * lift / (lift + _RAISE_FROM)
+
+
+def _mean_rotations(quaternions: Array, weights: Array) -> Array:
+    """Chordal means (n, k, 4) of rotations (n, m, 4) with weights (k, m); signs continuous along n."""
+    moment = np.einsum("km,nmx,nmy->nkxy", weights, quaternions, quaternions)
+    mean = np.linalg.eigh(moment)[1][..., -1]
+    dots = np.einsum("nkx,nkx->nk", mean[:-1], mean[1:])
+    mean[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[..., None]
+    return mean
+
+
+def _gap(moves: Array, free: Array, hold: Array, turn: Array) -> Array:
+    """How far the mean is ahead of the foot, forwards and backwards on average, at each sample.
+
+    Parameters
+    ----------
+    moves : Array, shape (n, k, J, 3)
+        Of the mean over the ground (x, y, heading) from each sample to the next.
+    free, hold : Array, shape (n, k, J)
+        g, and exp(−κ g Δs).
+    turn : Array, shape (k,)
+        Angle by which the lap turns [rad].
+    """
+    n = len(moves)
+    ahead, behind = np.empty_like(moves), np.empty_like(moves)
+    gap, back = np.zeros_like(moves[0]), np.zeros_like(moves[0])
+    blocked, held, angle = (
+        (1.0 - free)[..., None] * moves,
+        hold[..., None],
+        np.broadcast_to(turn[:, None], gap.shape[:2]),
+    )
+    for _ in range(_LAPS):
+        for k in range(n):
+            ahead[k] = gap
+            gap = held[k] * gap + blocked[k]
+        for k in range(n - 1, -1, -1):
+            if k == n - 1:
+                back[..., :2] = turned(angle, back[..., :2])
+            back = held[k] * back - blocked[k]
+            behind[k] = back
+        gap[..., :2] = turned(-angle, gap[..., :2])
+    return 0.5 * (ahead + behind)
+
+
+def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
+    """Corrections of a blend's ends at mixtures of its clips.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq + 5 limbs)
+        Of the clips at equal steps of the lap (`with_ends`).
+    drifts : Array, shape (m, 3)
+        Their drifts ξ.
+    limbs : sequence of Limb
+    weights : Array, shape (k, m)
+        Of the clips in each mixture.
+
+    Returns
+    -------
+    Array, shape (n, k, 2 + 4 limbs)
+        Channels of `inbetween`: those of the root zero.
+    """
+    clips = channels.shape[1]
+    everything = np.concatenate([weights, np.eye(clips)])
+    found = _found(channels, drifts, limbs, everything)
+    own = found[:, len(weights) :]
+    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", weights, own)
+
+
+def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
+    n, first = len(channels), channels.shape[2] - END * len(limbs)
+    ends = channels[..., first:].reshape(n, channels.shape[1], len(limbs), END)
+    s = np.arange(n + 1) / n
+    drift = weights @ drifts
+    columns = [3 + 4 * limb.joints[2] for limb in limbs]
+    soles = np.stack(
+        [lowest_point(channels[..., at : at + 4], limb, _SOFTNESS) for limb, at in zip(limbs, columns, strict=True)],
+        axis=2,
+    )
+    own = ends[..., 2] + soles
+    ground, least = own.min(), own.min(axis=2, keepdims=True)
+    flight = np.einsum("km,nmj->nkj", weights, least - ground)
+    own_raise = np.einsum("km,nmj->nkj", weights, _raise(own - least))
+    mean = np.einsum("km,nmjc->nkjc", weights, ends)
+    clearance, moves, angles = [], [], []
+    for j, limb in enumerate(limbs):
+        turn = _mean_rotations(channels[:, :, columns[j] : columns[j] + 4], weights)
+        clearance.append(mean[:, :, j, 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
+        lag = np.append(ends[:, 0, j, 3], ends[0, 0, j, 3])
+        shift, angle = plane_exponential((s + lag)[:, None, None] * drift)
+        place = np.concatenate([mean[:, :, j, :2], mean[:1, :, j, :2]])
+        heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
+        closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
+        place = np.concatenate(
+            [turned(angle, place) + shift, (np.concatenate([heading, closing]) + angle)[..., None]], axis=-1
+        )
+        moves.append(np.diff(place, axis=0))
+        angles.append(angle[:-1])
+    height = np.stack(clearance, axis=2)
+    lift = height - height.min(axis=2, keepdims=True)
+    raised = np.maximum(0.0, _raise(lift) - own_raise)
+    up = flight + lift + raised
+    highest = up.max(axis=0)
+    free = _step(up / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest), 1e-6))
+    # A foot that the clips do not lift is left to the mean.
+    held = _step(highest / _LIFTED)
+    free = 1.0 - held * (1.0 - free)
+    rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
+    gap = _gap(np.stack(moves, axis=2), free, np.exp(-rate * free / n), drift[:, 2])
+    result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))
+    for j in range(len(limbs)):
+        at = ROOT + FOOT * j
+        result[..., at : at + 2] = turned(-angles[j], -gap[:, :, j, :2])
+        result[..., at + 2] = (up - height)[..., j]
+        result[..., at + 3] = -gap[:, :, j, 2]
+    return result
