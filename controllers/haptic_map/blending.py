@@ -38,8 +38,8 @@ def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Arr
 
 @njit
 def blend(
-    params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
-    pose: Array, jacobian: Array,
+    params: Array, angle: float, weights: Array, changes: Array, chain: Array, memory: Array, pose: Array,
+    jacobian: Array,
 ) -> None:  # fmt: skip
     """Blended pose, and its derivative unless `jacobian` has no rows.
 
@@ -47,9 +47,18 @@ def blend(
     ----------
     params : Array
         `packed_blend`.
-    angle, weights, changes, correction, chain, memory, pose, jacobian
-        As `combine_corrected` takes them.
+    angle, weights, changes, chain, memory, pose, jacobian
+        As `combine` takes them.
     """
+    blend_corrected(params, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian)
+
+
+@njit
+def blend_corrected(
+    params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
+    pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
+    """`blend`, with a correction as `combine_corrected` takes it."""
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
     figure = params[_DRIFTS + 3 * clips :]

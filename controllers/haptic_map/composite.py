@@ -26,7 +26,7 @@ def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     weights, changes = np.zeros((2, _CLIPS)), np.zeros((2, 3, _CLIPS))
     weights[0, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - a, a
     changes[1, 1, 1], changes[1, 1, 2] = -slope, slope
-    blend(params[_BLEND:], angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian)
+    blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
 
 
 class Composite(AnimationMap):

@@ -9,7 +9,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.blending import blend
+from controllers.haptic_map.blending import blend_corrected
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.haptic_map.footfalls import foot_corrections
 from controllers.haptic_map.inbetween import ROOT, correction, packed_table, table_channels
@@ -44,7 +44,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         correction(table, angle, a, b, d)
         d[2] *= a_slope
         d[3] *= b_slope
-    blend(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
+    blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
 class Cylindrical(AnimationMap):
