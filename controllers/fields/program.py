@@ -18,12 +18,14 @@ from controllers.fields.instructions import (
     HIGHER_ORDER,
     LIMIT,
     RECORDED,
+    SOFT_WALL,
     STACK,
     STRETCHY,
     TRACE_DISTANCE,
     TRACE_ROW,
     Program,
 )
+from controllers.fields.soft_wall import soft_wall_wrench
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.state import Array, IntArray
 
@@ -65,6 +67,9 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top += 1
         elif opcode == STRETCHY:
             stretchy_wrench(params, at, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == SOFT_WALL:
+            soft_wall_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
         elif opcode == EXTERNAL:
             for i in range(6):

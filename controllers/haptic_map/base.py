@@ -3,6 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
+import numpy as np
+
 from controllers.state import Array, Pose
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
@@ -57,3 +59,18 @@ class HapticMap(ABC):
     @abstractmethod
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
+
+    def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
+        """A vector of the control space at x as one of the target's: h_* ẋ, shape (nv,).
+
+        A field of velocities in C becomes one of rates in D. `twist`, shape (6,): linear [m/s], then angular velocity
+        [rad/s], both in H.
+        """
+        return self.jacobian(x, memory) @ np.asarray(twist, dtype=np.float64)
+
+    def pull_back(self, x: Array, torque: Array, memory: Array | None = None) -> Array:
+        """A force on the target as the wrench that the hand feels: h_*ᵀ f, shape (6,), force [N] and moment [N m] in H.
+
+        The power is the same: (h_*ᵀ f)·ẋ = f·(h_* ẋ). `torque`, shape (nv,): force or torque on each rate.
+        """
+        return self.jacobian(x, memory).T @ np.asarray(torque, dtype=np.float64)
