@@ -56,6 +56,14 @@ class RunConfig:
         k_s of a held or pushed tube [N/m].
     rubber_tube : float
         Radius of the tube that can be held and pushed [m].
+    walls : bool
+        Let the hand feel the limits of the figure's joints, and of their speeds.
+    wall_stiffness : float
+        Of a joint beyond its limit [N m/rad].
+    wall_margin : float
+        Before a limit, where the wall begins [rad].
+    joint_speed : float
+        Greatest speed of a joint without resistance [rad/s].
     bump : float
         Half width of what a bend changes [s], at most half a lap.
     lap : float
@@ -96,6 +104,10 @@ class RunConfig:
     seek: float = 150.0
     rubber: float = 150.0
     rubber_tube: float = 0.008
+    walls: bool = False
+    wall_stiffness: float = 0.1
+    wall_margin: float = 0.09
+    joint_speed: float = 20.0
     bump: float = 0.5
     lap: float = 4.0
     radius: float = 0.0477

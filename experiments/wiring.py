@@ -22,6 +22,7 @@ from experiments.config import STRETCHING, RunConfig
 from experiments.modes import Field, default_rivers, law
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
+from experiments.walls import figure_walls
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
 from models.mocap.clip import Clip
@@ -147,6 +148,9 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
     field = stretch_law(config, curve, grabs) if config.mode in STRETCHING else law(config, curve)
     program = field.program()
+    if config.walls:
+        walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
+        program = program + walls.program()
     limiter = ForceLimiter(period)
     servo = Servo(
         plant=make_plant(world),
