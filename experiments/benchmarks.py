@@ -17,9 +17,11 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.state import HandState
 from experiments.config import RunConfig
-from experiments.modes import heaviest_tick_microseconds
+from experiments.modes import heaviest_field, tick_microseconds
 from experiments.run import SUMMARY
+from experiments.walls import figure_walls
 from experiments.wiring import Session, load_clips, stylus_path, wire
 from sim.compiled import entry_point
 from sim.loop import make_logs
@@ -41,8 +43,9 @@ def bench() -> None:
     print(f"two threads / twice one thread: {thread_scaling(lambda: wire(config, clips)):.2f} (≥ 0.90)")
     small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
     print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
-    print(f"ten rivers of higher order, with the limiter: {heaviest_tick_microseconds():.1f} µs a tick (≤ 20)")
+    print(f"ten rivers of higher order, with the limiter: {tick_microseconds(*heaviest_field()):.1f} µs a tick (≤ 20)")
     print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
+    print(f"soft walls of 17 joints, with the limiter: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
 
 
@@ -145,6 +148,15 @@ def map_microseconds(session: Session) -> float:
     points = stylus_path(session.curve.point(np.linspace(0.0, session.config.lap, 2000)))
     _map_many(kind, params, points[:2], memory, pose, jacobian)
     return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
+
+
+def walls_microseconds(session: Session) -> float:
+    """Mean time of a tick of the figure's soft walls for a hand on the default curve [µs]."""
+    curve, config = session.curve, session.config
+    times = np.linspace(0.0, config.lap, 4000)
+    hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
+    walls = figure_walls(session.haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
+    return tick_microseconds(walls.program(), hands)
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:
