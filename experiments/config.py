@@ -23,9 +23,9 @@ class RunConfig:
         upper body inside, upper body outside; for the rivers' map one for each of the three rivers.
     mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow"}
         Field of force.
-    map : {"cylindrical", "composite", "rivers"}
-        Haptic map: four clips round a cylinder; the lower body of one clip and the upper body blended between two; or
-        a clip for each river.
+    map : str
+        Haptic map: "cylindrical", four clips round a cylinder; "composite", the lower body of one clip and the upper
+        body blended between two; "rivers", a clip for each river; or a map's file (.npz), which has its own clips.
     user : {"relaxed", "trace", "push"}
         A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
     seconds : float
@@ -88,7 +88,7 @@ class RunConfig:
 
     clips: tuple[str, ...] = ()
     mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
-    map: Literal["cylindrical", "composite", "rivers"] = "cylindrical"
+    map: str = "cylindrical"
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1

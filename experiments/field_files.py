@@ -1,14 +1,11 @@
 """Fields in files: a bundle of rivers or an edited field as a NumPy archive, exact to the last bit."""
 
-import zipfile
 from pathlib import Path
-
-import numpy as np
 
 from controllers.errors import ControllerError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.edited import Edited
-from controllers.state import Array
+from experiments.archives import read_archive, write_archive
 from sim.errors import SimError
 
 _KINDS = {"RiverBundle": RiverBundle, "Edited": Edited}
@@ -24,12 +21,7 @@ def save_field(field: RiverBundle | Edited, path: Path) -> None:
     path : Path
         ``.npz`` file.
     """
-    kind = np.array(type(field).__name__)
-    with path.open("wb") as file:
-        # Keys are numbered, for a name of a river may be no name of a file.
-        arrays = field.arrays()
-        numbered = {str(i): value for i, value in enumerate(arrays.values())}
-        np.savez(file, allow_pickle=False, kind=kind, keys=np.array(list(arrays)), **numbered)
+    write_archive(path, type(field).__name__, field.arrays())
 
 
 def load_field(path: Path) -> RiverBundle | Edited:
@@ -42,14 +34,7 @@ def load_field(path: Path) -> RiverBundle | Edited:
     OSError
         If it cannot be read.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            kind = str(archive["kind"])
-            arrays: dict[str, Array] = {str(key): archive[str(i)] for i, key in enumerate(archive["keys"])}
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise SimError(f"{path}: is no file of a field ({error}); expected one that save_field wrote") from None
-    if kind not in _KINDS:
-        raise SimError(f"{path}: holds a {kind}; expected one of {', '.join(_KINDS)}")
+    kind, arrays = read_archive(path, _KINDS, "field")
     try:
         return _KINDS[kind].from_arrays(arrays)
     except ControllerError as error:

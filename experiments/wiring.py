@@ -19,6 +19,7 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
 from experiments.balance import balanced
 from experiments.config import STRETCHING, RunConfig
+from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.modes import Field, default_rivers, law
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
@@ -42,6 +43,7 @@ from sim.world import World, phantom_angles
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
+_MOST_CLIPS = {"cylindrical": 4, "composite": 3, "rivers": 3}
 MOST_PACE = 1.4  # times the clips' own that passes without a word
 
 
@@ -116,9 +118,6 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     ModelError, ControllerError, SimError
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
-    most = 4 if config.map == "cylindrical" else 3
-    if not 1 <= len(clips) <= most:
-        raise ParameterError(f"the {config.map} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
     if config.figure_ticks < 1:
         raise ParameterError(
             f"figure_ticks is {config.figure_ticks}; expected 1 or more servo ticks between two updates"
@@ -136,7 +135,11 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
-    haptic_map = _haptic_map(config, clips, curve, world.figure)
+    if config.map.endswith(MAP_SUFFIX):
+        haptic_map, clips = load_figure_map(Path(config.map))
+        remarks += (f"the clips are those of the map: {', '.join(haptic_map.names)}",)
+    else:
+        haptic_map = _haptic_map(config, clips, curve, world.figure)
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
     reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend)
@@ -179,6 +182,11 @@ def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
 
 
 def _haptic_map(config: RunConfig, clips: tuple[Clip, ...], curve: Trajectory, figure: mujoco.MjModel) -> ClipMap:
+    if config.map not in _MOST_CLIPS:
+        raise ParameterError(f"no map {config.map!r}; there are {', '.join(_MOST_CLIPS)}, or give a file (.npz)")
+    most = _MOST_CLIPS[config.map]
+    if not 1 <= len(clips) <= most:
+        raise ParameterError(f"the {config.map} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
     motions = [(clip.poses, clip.fps) for clip in clips]
     radii = (config.radius - config.reach, config.radius + config.reach)
     legs = figure_legs(figure)

@@ -27,34 +27,45 @@ class ClipMap(HapticMap):
         It: (params, x, memory, pose, jacobian).
     params : Array
         What it reads.
-    nq : int
-        Numbers of a pose: root position, root quaternion, then joint quaternions (wxyz).
+    clips : sequence of (Array, float)
+        What it was made of: poses (n, nq) and frames per second.
+    names : sequence of str
+        Of the clips, all different.
+    limbs : sequence of Limb
+        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
     drifts : Array, shape (m, 3)
         ξ of each clip (see `loops`).
-    durations : sequence of float
-        Of each clip [s].
     """
 
     def __init__(
-        self, kind: int, kernel: Kernel, params: Array, nq: int, drifts: Array, durations: Sequence[float]
+        self,
+        kind: int,
+        kernel: Kernel,
+        params: Array,
+        clips: Sequence[tuple[Array, float]],
+        names: Sequence[str],
+        limbs: Sequence[Limb],
+        drifts: Array,
     ) -> None:
-        self._kind, self._kernel, self._params, self._nq = kind, kernel, params, nq
-        self._lap_seconds, self._travels = float(np.mean(durations)), bool(drifts.any())
+        self._kind, self._kernel, self._params = kind, kernel, params
+        # As they were given: what is made of them again is the same to the last bit.
+        self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
+        self.names, self.limbs, self._travels = tuple(names), tuple(limbs), bool(drifts.any())
 
     @property
     def nq(self) -> int:
         """Numbers of a configuration."""
-        return self._nq
+        return self.clips[0][0].shape[1]
 
     @property
     def nv(self) -> int:
         """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
-        return 6 + 3 * ((self._nq - 7) // 4)
+        return 6 + 3 * ((self.nq - 7) // 4)
 
     @property
     def lap_seconds(self) -> float:
         """Time of a lap at which the clips run, on average, at their own pace [s]."""
-        return self._lap_seconds
+        return float(np.mean([(len(poses) - 1) / fps for poses, fps in self.clips]))
 
     @property
     def travels(self) -> bool:
@@ -128,4 +139,4 @@ class AnimationMap(ClipMap):
         samples = int(np.clip(max(len(clip) for clip in poses) - 1, 64, 2048))
         params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
         drifts = np.stack([loop.drift for loop in self.loops])
-        super().__init__(kind, kernel, params, poses[0].shape[1], drifts, [loop.duration for loop in self.loops])
+        super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs, drifts)

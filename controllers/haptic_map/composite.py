@@ -1,6 +1,6 @@
 """The red-blue composite map: one clip walks, two others fight over its arms (Donald & Henle 2000, Figs. 5 to 7)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numba import njit
@@ -8,6 +8,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.blending import blend
+from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder
 from controllers.haptic_map.limbs import Limb
 from controllers.state import Array
@@ -66,5 +67,27 @@ class Composite(AnimationMap):
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
+        self.r_range, self.upper_joints = r_range, tuple(upper_joints)
         numbers = checked_interval("r_range", r_range, 1e-3)
         super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs)
+
+    def arrays(self) -> dict[str, Array]:
+        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
+        return numbers | clip_arrays(self.clips, self.names, self.limbs)
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Array]) -> "Composite":
+        """Map of what `arrays` gave.
+
+        Raises
+        ------
+        ParameterError
+            If an array is missing, or they make no map.
+        """
+        clips, joints = kept_clips(arrays), kept(arrays, "upper_joints", (None,))
+        if len(clips) != _CLIPS or not np.isfinite(joints).all():
+            raise ParameterError(f"a composite map has {_CLIPS} clips and joints, got {len(clips)} and {joints}")
+        lower, red, blue = clips
+        r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
+        return Composite(lower, red, blue, [int(joint) for joint in joints], (r_low, r_high), kept_limbs(arrays))

@@ -1,6 +1,6 @@
 """The cylindrical map: an angle is the frame, radius and height blend four clips (Donald & Henle 2000, Fig. 3)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -10,6 +10,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.blending import blend_corrected
+from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.haptic_map.footfalls import foot_corrections
 from controllers.haptic_map.inbetween import ROOT, correction, packed_table, table_channels
@@ -87,6 +88,7 @@ class Cylindrical(AnimationMap):
             raise ParameterError(
                 f"the cylindrical map blends {_CLIPS} clips, got {len(clips)}; give one more than once"
             )
+        self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
         super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
         self._numbers = numbers
@@ -132,3 +134,25 @@ class Cylindrical(AnimationMap):
         values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
         other._correct(values)
         return other
+
+    def arrays(self) -> dict[str, Array]:
+        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        arrays = {"domain": np.array([self.r_range, self.z_range])}
+        if self.limbs:
+            arrays["corrections"] = self._corrections
+        return arrays | clip_arrays(self.clips, self.names, self.limbs)
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Array]) -> "Cylindrical":
+        """Map of what `arrays` gave.
+
+        Raises
+        ------
+        ParameterError
+            If an array is missing, or they make no map.
+        """
+        (r_low, r_high), (z_low, z_high) = kept(arrays, "domain", (2, 2)).tolist()
+        made = Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), kept_limbs(arrays))
+        if made.limbs:
+            made._correct(kept(arrays, "corrections", (None, *made._corrections.shape[1:])))
+        return made

@@ -1,14 +1,14 @@
 """The lifted map: every clip is a curve of its own, and the stylus is where it is among them (section 8.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
 from controllers.haptic_map.combination import combine, figure_channels, packed_figure
 from controllers.haptic_map.cylinder import clamped, cylinder
 from controllers.haptic_map.frames import (
@@ -24,12 +24,12 @@ from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
-from controllers.haptic_map.splines import basis, basis_slope, control_points
+from controllers.haptic_map.sites import box, checked_sites
+from controllers.haptic_map.splines import basis, basis_slope, control_points, round_lap
 from controllers.state import Array, IntArray
 
 LIFTED = 3
 
-_LEAST_ROWS, _LEAST_RADIUS, _LEAST_DISTANCE = 8, 2e-3, 2e-4
 _LAGS = 128  # samples of λ round the lap
 _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _FIGURE = range(11)
 
@@ -136,64 +136,47 @@ class Lifted(ClipMap):
         margin: float = 4e-3,
     ) -> None:
         m = len(clips)
-        self.names = tuple(names) or tuple(str(i) for i in range(m))
-        if m < 1 or {len(closed), len(angles), len(self.names)} != {m} or len(set(self.names)) != m:
+        names = tuple(names) or tuple(str(i) for i in range(m))
+        if m < 1 or {len(closed), len(angles), len(names)} != {m} or len(set(names)) != m:
             raise ParameterError(
                 f"a lifted map takes one or more clips, each with closed, angles and a name of its own; got {m} clips, "
-                f"{len(closed)} closed, {len(angles)} angles, the names {', '.join(self.names)}"
+                f"{len(closed)} closed, {len(angles)} angles, the names {', '.join(names)}"
             )
-        self.fps = tuple(float(fps) for _, fps in clips)
-        self.poses = tuple(checked_clip(p, fps, f"clip {n}") for n, (p, fps) in zip(self.names, clips, strict=True))
-        if len({poses.shape[1] for poses in self.poses}) != 1:
-            raise ParameterError(f"all clips must have poses of one size, got {[p.shape[1] for p in self.poses]}")
-        self._clips = tuple(self._placed(i, angles[i], bool(closed[i])) for i in range(m))
-        self.limbs, self.margin = tuple(limbs), _checked_margin(margin)
-        self.sites = _checked_sites(sites, self.names, self.margin)
-        super().__init__(
-            LIFTED, lifted_map, self._packed(), self.poses[0].shape[1], self._drifts,
-            [clip.duration for clip in self._clips],
-        )  # fmt: skip
-
-    def _placed(self, i: int, angles: Array, closed: bool) -> PlacedClip:
-        name, poses = f"clip {self.names[i]}", self.poses[i]
-        checked = checked_angles(angles, len(poses), closed, name)
-        gap = closing_gap(poses) if closed else 0.0
-        if gap > CLOSES:
-            raise ParameterError(
-                f"{name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
-                "give it as open, or cut it where it repeats"
-            )
-        return PlacedClip.of(poses, self.fps[i], checked, closed)
+        self._placed = tuple(_placed_clip(*values) for values in zip(names, clips, closed, angles, strict=True))
+        sizes = [clip.poses.shape[1] for clip in self._placed]
+        if len(set(sizes)) != 1:
+            raise ParameterError(f"all clips must have poses of one size, got {sizes}")
+        self.margin = _checked_margin(margin)
+        self.sites = checked_sites(sites, names, self.margin)
+        super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs, self._drifts)
 
     @property
     def _drifts(self) -> Array:
-        return np.stack([clip.drift for clip in self._clips])
+        return np.stack([clip.drift for clip in self._placed])
 
     @property
     def closed(self) -> tuple[bool, ...]:
         """Whether each clip closes."""
-        return tuple(clip.closed for clip in self._clips)
+        return tuple(clip.closed for clip in self._placed)
 
     @property
     def angles(self) -> tuple[Array, ...]:
         """θ_i(t_k) of each clip [rad]."""
-        return tuple(clip.angles for clip in self._clips)
+        return tuple(clip.angles for clip in self._placed)
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Intervals of r and z [m] that hold all sites; beyond them the stylus is clamped."""
-        low, high = _box(self.sites)
+        low, high = box(self.sites)
         return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
     def placed(self, i: int) -> Array:
         """Poses of clip i (n, nq) where they were moved to: what h gives along its curve from the first lap on."""
-        return self._clips[i].poses.copy()
+        return self._placed[i].poses.copy()
 
     def site(self, i: int, angles: Array) -> Array:
         """q_i = (r, z) [m] of curve i at angles (...), shape (..., 2)."""
-        around = np.concatenate([self.sites[:, i], self.sites[:1, i]])
-        spline = CubicSpline(np.linspace(0.0, 2.0 * np.pi, len(around)), around, bc_type="periodic")
-        return spline(np.mod(angles, 2.0 * np.pi))
+        return round_lap(self.sites[:, i], angles)
 
     def curve(self, i: int) -> Trajectory:
         """α̃_i, timed by the clip, periodic if it closes; exact at the frames."""
@@ -202,97 +185,100 @@ class Lifted(ClipMap):
         points = np.column_stack([q[:, 0] * np.cos(angles), q[:, 0] * np.sin(angles), q[:, 1]])
         if self.closed[i]:
             points[-1] = points[0]
-        return Trajectory(np.arange(len(points)) / self.fps[i], points, periodic=self.closed[i])
+        return Trajectory(np.arange(len(points)) / self.clips[i][1], points, periodic=self.closed[i])
 
     def weights(self, x: Array) -> Array:
         """Weights w_i (m,) of the clips at a stylus pose (7,); of sum 1."""
-        m = len(self.poses)
+        m = len(self.clips)
         near, w, changes, result = np.empty(m, dtype=np.int64), np.empty(m), np.empty((3, m)), np.zeros(m)
         _, count = _weigh(self._params, np.asarray(x, dtype=np.float64), np.empty((3, 6)), near, w, changes)
         result[near[:count]] = w[:count]
         return result
 
-    def _packed(self) -> Array:
-        drifts, rotations = self._drifts, (self.poses[0].shape[1] - 3) // 4
-        lags = self._common_lags(rotations)
-        phases = np.linspace(0.0, 2.0 * np.pi, _LAGS + 1)
-        lag_at = CubicSpline(phases, np.concatenate([lags, lags[:1]]), bc_type="periodic")
+    def arrays(self) -> dict[str, Array]:
+        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        arrays = {"sites": self.sites, "margin": np.array([self.margin])}
+        for name, clip in zip(self.names, self._placed, strict=True):
+            arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
+        return arrays | clip_arrays(self.clips, self.names, self.limbs)
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Array]) -> "Lifted":
+        """Map of what `arrays` gave.
+
+        Raises
+        ------
+        ParameterError
+            If an array is missing, or they make no map.
+        """
+        names = kept_names(arrays)
+        return Lifted(
+            kept_clips(arrays),
+            [bool(kept(arrays, f"closed/{name}", (1,))[0]) for name in names],
+            [kept(arrays, f"angles/{name}", (None,)) for name in names],
+            kept(arrays, "sites", (None, None, 2)),
+            kept_limbs(arrays),
+            names,
+            float(kept(arrays, "margin", (1,))[0]),
+        )
+
+    def _packed(self, limbs: Sequence[Limb]) -> Array:
+        drifts, rotations = self._drifts, (self._placed[0].poses.shape[1] - 3) // 4
+        lags = self._common_lags(rotations, limbs)
         channels: list[Array] = []
-        for clip, drift in zip(self._clips, drifts, strict=True):
+        for clip, drift in zip(self._placed, drifts, strict=True):
             result, ends = clip.remainder[:, None], list[Array]()
-            rest, lag = result.copy(), lag_at(np.mod(clip.angles, 2.0 * np.pi))
-            for n, limb in enumerate(self.limbs):
+            rest, lag = result.copy(), round_lap(lags, clip.angles)
+            for n, limb in enumerate(limbs):
                 quaternions, end = end_channels(rest, drift[None], limb, lag[:, n])
                 result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
                 ends.append(end)
             channels.append(np.concatenate([result, *ends], axis=2)[:, 0])
         first = 3 + 4 * rotations
-        ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if self.limbs), default=0.0)
+        ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if limbs), default=0.0)
         for c in channels:
             c[:, first + END - 1 :: END] -= ground
         splines = [
-            lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(self._clips, channels, strict=True)
+            lap_spline(clip.angles, c, rotations, clip.closed) for clip, c in zip(self._placed, channels, strict=True)
         ]
-        low, high = _box(self.sites)
+        low, high = box(self.sites)
         half = 0.5 * self.margin
         blocks = [
-            packed_figure(np.zeros(rotations, dtype=np.int64), self.limbs),
+            packed_figure(np.zeros(rotations, dtype=np.int64), limbs),
             control_points(lags, np.ones(lags.shape[1:])).ravel(),
             drifts.ravel(),
             packed_frames(splines),
             packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
-        return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self.poses), *at], *blocks])
+        return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self._placed), *at], *blocks])
 
-    def _common_lags(self, rotations: int) -> Array:
+    def _common_lags(self, rotations: int, limbs: Sequence[Limb]) -> Array:
         """λ of each limb at equal steps of the lap, shape (_LAGS, limbs), from all clips."""
-        if not self._drifts[:, 2].any() or not self.limbs:
-            return np.zeros((_LAGS, len(self.limbs)))
+        if not self._drifts[:, 2].any() or not limbs:
+            return np.zeros((_LAGS, len(limbs)))
         phases = np.arange(_LAGS) * 2.0 * np.pi / _LAGS
-        channels = np.empty((_LAGS, len(self.poses), 3 + 4 * rotations))
-        for i, clip in enumerate(self._clips):
+        channels = np.empty((_LAGS, len(self._placed), 3 + 4 * rotations))
+        for i, clip in enumerate(self._placed):
             packed = packed_frames([lap_spline(clip.angles, clip.remainder, rotations, clip.closed)])
             for phase, value in zip(phases, channels[:, i], strict=True):
                 interpolate_frames(packed, 0, phase, value, np.empty_like(value))
-        return np.stack([end_lag(end_poses(channels, limb)[0], self._drifts) for limb in self.limbs], axis=1)
+        return np.stack([end_lag(end_poses(channels, limb)[0], self._drifts) for limb in limbs], axis=1)
 
 
-def _box(sites: Array) -> tuple[Array, Array]:
-    """Least and largest (r, z) of what the control points of sites hold: no curve leaves it, between rows either."""
-    control = control_points(sites, np.ones(sites.shape[1:]))
-    return control.min(axis=(0, 1)), control.max(axis=(0, 1))
+def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:
+    poses, fps = checked_clip(*clip, f"clip {name}"), clip[1]
+    checked = checked_angles(angles, len(poses), closed, f"clip {name}")
+    gap = closing_gap(poses) if closed else 0.0
+    if gap > CLOSES:
+        raise ParameterError(
+            f"clip {name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
+            "give it as open, or cut it where it repeats"
+        )
+    return PlacedClip.of(poses, fps, checked, closed)
 
 
 def _checked_margin(margin: float) -> float:
     if not (np.isfinite(margin) and margin >= 1e-4):
         raise ParameterError(f"the margin of a lifted map must be 1e-4 m or more and finite, got {margin}")
     return float(margin)
-
-
-def _checked_sites(sites: Array, names: tuple[str, ...], margin: float) -> Array:
-    array = np.array(sites, dtype=np.float64)
-    if array.ndim != 3 or len(array) < _LEAST_ROWS or array.shape[1:] != (len(names), 2):
-        raise ParameterError(
-            f"sites must have shape (rows ≥ {_LEAST_ROWS}, {len(names)} clips, 2: r and z), got {array.shape}"
-        )
-    if not np.isfinite(array).all():
-        raise ParameterError(f"sites must be finite; at row {int(np.argwhere(~np.isfinite(array))[0][0])} one is not")
-    least = float(_box(array)[0][0])
-    if least < _LEAST_RADIUS + margin:
-        raise ParameterError(
-            f"a curve comes to {1e3 * least:.2f} mm from the axis, where the phase is not defined; expected "
-            f"{1e3 * (_LEAST_RADIUS + margin):.2f} mm or more"
-        )
-    rows = CubicSpline(np.arange(len(array) + 1), np.concatenate([array, array[:1]]), bc_type="periodic")
-    places = rows(np.arange(4 * len(array)) / 4.0)
-    for i in range(len(names) - 1):
-        distance = np.linalg.norm(places[:, i + 1 :] - places[:, i : i + 1], axis=2)
-        if distance.min() < _LEAST_DISTANCE:
-            row, j = np.unravel_index(int(distance.argmin()), distance.shape)
-            raise ParameterError(
-                f"the curves of clips {names[i]} and {names[i + 1 + int(j)]} come to {1e3 * distance.min():.3f} mm of "
-                f"each other at {2.0 * np.pi * float(row) / len(places):.2f} rad; "
-                f"expected {1e3 * _LEAST_DISTANCE} mm or more"
-            )
-    return array

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
 
@@ -20,6 +21,13 @@ def basis_slope(u: float) -> tuple[float, float, float, float]:
     v = 1.0 - u
     d0, d1, d3 = -0.5 * v * v, 1.5 * u * u - 2.0 * u, 0.5 * u * u
     return d0, d1, -d0 - d1 - d3, d3
+
+
+def round_lap(samples: Array, angles: Array) -> Array:
+    """Values at angles (...) [rad] of the periodic C² splines through samples (n, ...) at equal steps of the lap."""
+    around = np.concatenate([samples, samples[:1]])
+    spline = CubicSpline(np.linspace(0.0, 2.0 * np.pi, len(around)), around, bc_type="periodic")
+    return spline(np.mod(angles, 2.0 * np.pi))
 
 
 def control_points(samples: Array, signs: Array) -> Array:

@@ -42,10 +42,10 @@ MAP = Lifted(CLIPS, CLOSED, ANGLES, ring(4), [LEG], ("walk", "still", "turn", "c
 def worst_at_frames(lifted):
     """Largest difference [m, rad] between h along the curves and the clips, at all frames."""
     worst = 0.0
-    for i in range(len(lifted.poses)):
+    for i in range(len(lifted.clips)):
         curve, memory = lifted.curve(i), lifted.compiled().memory
         for k, pose in enumerate(lifted.placed(i)):
-            x = np.append(curve.point(k / lifted.fps[i]), [1.0, 0.0, 0.0, 0.0])
+            x = np.append(curve.point(k / lifted.clips[i][1]), [1.0, 0.0, 0.0, 0.0])
             worst = max(worst, np.abs(difference(lifted.pose(x, memory), pose)).max())
     return worst
 

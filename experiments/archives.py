@@ -1,0 +1,65 @@
+"""Named arrays in a NumPy archive that says what they are, and in which version of the format."""
+
+import zipfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from controllers.state import Array
+from sim.errors import SimError
+
+VERSION = 1
+
+
+def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
+    """Write arrays; an existing file is replaced.
+
+    Parameters
+    ----------
+    path : Path
+        ``.npz`` file.
+    kind : str
+        What they are.
+    arrays : mapping of str to Array
+        By key.
+    """
+    with path.open("wb") as file:
+        # Keys are numbered, for a key may be no name of a file.
+        numbered = {str(i): value for i, value in enumerate(arrays.values())}
+        np.savez(
+            file, allow_pickle=False, version=np.array(VERSION), kind=np.array(kind), keys=np.array(list(arrays)),
+            **numbered,
+        )  # fmt: skip
+
+
+def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, dict[str, Array]]:
+    """Kind and arrays of a file that `write_archive` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kinds : collection of str
+        What it may hold.
+    what : str
+        The same in a word, for messages.
+
+    Raises
+    ------
+    SimError
+        If the file is none of these, or damaged.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            version, kind = int(archive["version"]), str(archive["kind"])
+            arrays: dict[str, Array] = {str(key): archive[str(i)] for i, key in enumerate(archive["keys"])}
+    except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile) as error:
+        raise SimError(f"{path}: is no file of a {what}, or damaged ({error})") from None
+    if version != VERSION:
+        raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
+    if kind not in kinds:
+        raise SimError(f"{path}: holds a {kind}; expected a {what}: one of {', '.join(kinds)}")
+    return kind, arrays
