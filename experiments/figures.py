@@ -17,6 +17,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from experiments.changes import river_changes
 from sim.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 
@@ -73,6 +74,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand against curve and tube, seen along z and along y of the hand frame [mm]."""
     curve, path = 1e3 * recording.array("curve"), 1e3 * _rows(recording, "ticks", "p")
+    rivers = 1e3 * recording.arrays.get("river_curves", np.empty((0, 0, 3)))
     radius = 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
@@ -81,6 +83,8 @@ def path_figure(recording: Recording) -> Figure:
             PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=PALE_TUBE, zorder=1), autolim=False
         )
         ax.plot(curve[:, i], curve[:, j], color=CURVE, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
+        for other in rivers:
+            ax.plot(other[:, i], other[:, j], color=CURVE, lw=0.6, ls=":", zorder=4)
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
         ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label="hand, pushing", zorder=3)
@@ -103,6 +107,7 @@ def deviation_figure(recording: Recording) -> Figure:
             ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label="edge of the tube")
         ax.plot(t, distance, color=CURVE)
         ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
+        _mark_changes(ax, recording)
     left_alone = distance if np.all(pushed) else distance[~pushed]
     axes[0].set(title="distance from the curve", ylim=(0, 1.08 * np.max(distance) + 1e-3))
     axes[1].set(title="magnified", ylim=(0, 1.5 * np.percentile(left_alone, 90) + 1e-3), xlabel="time [s]")
@@ -164,6 +169,7 @@ def tracking_figure(recording: Recording) -> Figure:
         ax.plot(t, values, color=CURVE)
         ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
         ax.set_ylim(bottom=0)
+        _mark_changes(ax, recording)
     if np.any(flight):
         _legend(axes[0])
     axes[-1].set_xlabel("time [s]")
@@ -184,6 +190,16 @@ def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]
 def _legend(ax: Axes) -> None:
     """In a row above the axes, where it hides no data."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
+def _mark_changes(ax: Axes, recording: Recording) -> None:
+    """A line at every change of river, with the name of the new one."""
+    for change in river_changes(recording):
+        ax.axvline(change.t, color=USER, lw=0.8)
+        ax.annotate(
+            change.after, (change.t, 1.0), (2, -2), xycoords=("data", "axes fraction"), textcoords="offset points",
+            va="top", fontsize=7, color=USER,
+        )  # fmt: skip
 
 
 def _shade(ax: Axes, t: Array, where: npt.NDArray[np.bool_], color: str, label: str) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
+from experiments.changes import river_changes
 from experiments.summary import (
     AnimationSummary,
     FigureSummary,
@@ -61,7 +62,9 @@ def summarise(
         default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
         animation.add(frames, default, pushed[::per_frame])
         figure.add(frames)
-    return RunSummary(path.summary(), animation.summary(), figure.summary(), speed, warnings)
+    return RunSummary(
+        path.summary(), animation.summary(), figure.summary(), speed, warnings, changes=river_changes(recording)
+    )
 
 
 class _MeanSquare:

@@ -21,7 +21,7 @@ from experiments.config import STRETCHING, RunConfig
 from experiments.measures import BLOCK_FRAMES, summarise
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
 from experiments.summary import RunSummary, SpeedSummary
-from experiments.wiring import Session, load_clips, stylus_path, wire
+from experiments.wiring import Session, load_clips, packed_legs, stylus_path, wire
 from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model
@@ -217,7 +217,8 @@ def _clips_of_rivers(session: Session, stride: int) -> Callable[[Array, Array, A
     """Likewise where rivers play clips, which go over into each other as they did for the figure."""
     period = stride * session.servo.figure_ticks * session.servo.plant.period
     compiled, config = session.haptic_map.compiled(), session.config
-    reference = make_reference(session.world.figure, compiled, period, config.smoothing, config.blend)
+    figure = session.world.figure
+    reference = make_reference(figure, compiled, period, config.smoothing, config.blend, packed_legs(figure))
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         traces = np.zeros((len(nearest), TRACE_SIZE))

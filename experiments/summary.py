@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from experiments.changes import RiverChange
 from experiments.stretch import StretchSummary
 
 
@@ -116,7 +117,7 @@ class SpeedSummary:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it; `lines` says it in five sentences, or six where the curve was bent."""
+    """All of it; `lines` says it in five sentences, and one more where the curve was bent or rivers changed."""
 
     path: PathSummary
     animation: AnimationSummary
@@ -124,6 +125,7 @@ class RunSummary:
     speed: SpeedSummary
     warnings: dict[str, int]
     stretch: StretchSummary | None = None
+    changes: tuple[RiverChange, ...] = ()
 
     def lines(self) -> list[str]:
         """What happened, a sentence each."""
@@ -133,8 +135,10 @@ class RunSummary:
         )
         warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
         bent = [] if self.stretch is None else [self.stretch.line()]
+        changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
         return [
             *bent,
+            *changed,
             f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "

@@ -142,7 +142,9 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         haptic_map = _haptic_map(config, clips, curve, world.figure)
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
-    reference = make_reference(world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend)
+    reference = make_reference(
+        world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend, packed_legs(world.figure)
+    )
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     poses = np.empty((1, haptic_map.nq))
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
@@ -216,6 +218,11 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
         sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
         legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole))
     return tuple(legs)
+
+
+def packed_legs(figure: mujoco.MjModel) -> Array:
+    """`figure_legs` as the kernel takes them, shape (2, 18)."""
+    return np.array([leg.packed() for leg in figure_legs(figure)])
 
 
 def stylus_path(points: Array) -> Array:

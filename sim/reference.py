@@ -21,7 +21,7 @@ from sim.compiled import entry_point
 from sim.errors import SimError
 from sim.native import mj_differentiate_pos
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
-from sim.transition import Transition, carry_offset, make_transition, note_change
+from sim.transition import Transition, carry_on, make_transition, note_change
 
 Array = npt.NDArray[np.float64]
 
@@ -89,10 +89,10 @@ def _look_around(reference: CompiledReference) -> None:
 
 @njit
 def _carry(reference: CompiledReference) -> None:
-    """Add what is left of a transition to the three poses."""
-    carry_offset(reference.transition, 0.0, reference.pose)
-    carry_offset(reference.transition, -reference.period, reference.before)
-    carry_offset(reference.transition, reference.period, reference.after)
+    """Move the three poses to what a transition shows."""
+    carry_on(reference.transition, 0.0, reference.pose)
+    carry_on(reference.transition, -reference.period, reference.before)
+    carry_on(reference.transition, reference.period, reference.after)
 
 
 @njit
@@ -198,7 +198,12 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
 
 
 def make_reference(
-    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float, blend: float = 0.0
+    figure_model: mujoco.MjModel,
+    compiled: CompiledMap,
+    period: float,
+    bandwidth: float,
+    blend: float = 0.0,
+    limbs: Array | None = None,
 ) -> CompiledReference:
     """The reference of a run, before its first update.
 
@@ -214,6 +219,8 @@ def make_reference(
         Of the tracking filter, ω/2π [Hz].
     blend : float
         In which one clip goes over into another [s]; 0: the figure jumps.
+    limbs : Array, shape (n, 18), optional
+        Legs that step meanwhile, `Limb.packed`; without them the feet slide.
 
     Raises
     ------
@@ -225,11 +232,12 @@ def make_reference(
     if not 0.0 <= blend < math.inf:
         raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
     kind, params, memory = compiled
+    legs = np.zeros((0, 18)) if limbs is None else limbs
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
         kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), orientation=np.array([1.0, 0.0, 0.0, 0.0]),
         turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq), velocity=np.zeros(nv),
-        acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend), scratch_memory=memory.copy(),
+        acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs), scratch_memory=memory.copy(),
         scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Changes from one motion of the figure to another: what was shown is kept, and what it is ahead by decays."""
+"""Changes from one motion of the figure to another: what was shown goes on, what it is ahead by decays, feet step."""
 
 from typing import NamedTuple
 
@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.haptic_map.footsteps import STEP, limb_end, plan_steps, put_limb, step_end
 from controllers.haptic_map.inertialization import add_offset, offset_left
 from sim.native import mj_differentiate_pos
 
@@ -13,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Transition(NamedTuple):
-    """State of the inertialisation (see `controllers.haptic_map.inertialization`).
+    """State of the inertialisation (see `inertialization` and `footsteps` in `controllers.haptic_map`).
 
     Attributes
     ----------
@@ -23,6 +24,10 @@ class Transition(NamedTuple):
         Time since the last change [s], infinite before the first, shape (1,).
     change : Array
         Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
+    limbs, steps : Array
+        Legs, shape (n, 18), and how they step, shape (n, 27).
+    ends : Array
+        Scratch: where the feet of the new motion are, shape (n, 7).
     shown : Array
         Scratch: what was shown, and one period before and after, shape (3, 75).
     offset, before, after : Array
@@ -32,26 +37,38 @@ class Transition(NamedTuple):
     seconds: float
     since: Array
     change: Array
+    limbs: Array
+    steps: Array
+    ends: Array
     shown: Array
     offset: Array
     before: Array
     after: Array
 
 
-def make_transition(nq: int, nv: int, seconds: float) -> Transition:
-    """A transition before the first change, of poses of nq and tangents of nv numbers."""
+def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transition:
+    """A transition before the first change, of poses of nq and tangents of nv numbers, with legs (n, 18) that step."""
+    n = len(limbs)
     return Transition(
-        seconds, np.full(1, np.inf), np.zeros((3, nv)), np.zeros((3, nq)), np.zeros(nv), np.zeros(nv), np.zeros(nv)
-    )
+        seconds=seconds, since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)),
+        ends=np.zeros((n, 7)), shown=np.zeros((3, nq)), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
+    )  # fmt: skip
 
 
 @njit
-def carry_offset(transition: Transition, s: float, pose: Array) -> None:
-    """Add to a pose, s seconds from now, what is left of the offset."""
-    since = transition.since[0]
-    if since < transition.seconds:
-        offset_left(transition.change, transition.seconds, min(since + s, transition.seconds), transition.offset)
-        add_offset(pose, transition.offset)
+def carry_on(transition: Transition, s: float, pose: Array) -> None:
+    """Move a pose of the new motion, s seconds from now, to what is shown: the offset that is left, and the steps."""
+    since, limbs, ends = transition.since[0], transition.limbs, transition.ends
+    if since >= transition.seconds:
+        return
+    at = min(since + s, transition.seconds)
+    for n in range(limbs.shape[0]):
+        limb_end(limbs[n], pose, ends[n])
+        step_end(transition.steps[n], at, transition.seconds, ends[n])
+    offset_left(transition.change, transition.seconds, at, transition.offset)
+    add_offset(pose, transition.offset)
+    for n in range(limbs.shape[0]):
+        put_limb(limbs[n], pose, ends[n])
 
 
 @njit
@@ -60,7 +77,8 @@ def note_change(
 ) -> None:
     """Offset of what was shown over poses that are asked for now, a period earlier and a period later; its rates too.
 
-    `transition.shown` holds the first, in that order; `transition.change` is set: o, ȯ, ö by central differences.
+    `transition.shown` holds the first, in that order; `transition.change` is set: o, ȯ, ö by central differences; and
+    the steps are planned.
     """
     now, then, next_ = transition.offset, transition.before, transition.after
     mj_differentiate_pos(figure_model, now.ctypes, 1.0, pose.ctypes, transition.shown[0].ctypes)
@@ -70,3 +88,5 @@ def note_change(
         transition.change[0, i] = now[i]
         transition.change[1, i] = 0.5 * (next_[i] - then[i]) / period
         transition.change[2, i] = (next_[i] - 2.0 * now[i] + then[i]) / period**2
+    if transition.seconds > 0.0:
+        plan_steps(transition.limbs, transition.steps, transition.shown, pose, period, transition.seconds)

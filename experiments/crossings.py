@@ -1,0 +1,158 @@
+"""Hands at crossings of two rivers, on the simulated Phantom: who stays, who changes over, who is thrown out.
+
+``python -m experiments.crossings`` prints the table of `docs/fields.md`.
+"""
+
+from typing import Literal, NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.certificates.device import HandImpedance
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import TRACE_RIVER, Program
+from controllers.fields.program import evaluate
+from controllers.fields.river import River
+from controllers.safety import ForceLimiter, limit_force
+from experiments.field_figures import DRAG, SPEED, straight_river
+from experiments.modes import ADMISSION, HYSTERESIS, SIGMA
+from experiments.trial_simulation import trial_model
+from models.scene import PHANTOM, SceneConfig
+from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
+from sim.plant import Hand, Plant, advance, make_hand
+from sim.users.arm import Arm
+from sim.users.intent import Push
+from sim.world import place_stylus
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Form = Literal["discrete", "smooth"]
+
+ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)
+PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)
+PUSH_SECONDS = 0.2
+SECONDS = 1.25  # from 45 mm before the crossing to 45 mm behind it
+CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
+
+
+class Passage(NamedTuple):
+    """A hand's way through a crossing, tick by tick.
+
+    Attributes
+    ----------
+    p : Array
+        Where it was in H [m], shape (n, 3).
+    force : Array
+        Of the field, limited [N], shape (n, 3).
+    river : Array
+        Which river had it, −1 for none, shape (n,).
+    """
+
+    p: Array
+    force: Array
+    river: Array
+
+
+@njit
+def _pass(
+    plant: Plant, port: PhantomPort, hand: Hand, ops: IntArray, params: Array, memory: Array, limits: Array,
+    limiter: Array, p: Array, force: Array, river: Array,
+) -> None:  # fmt: skip
+    wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
+    for k in range(p.shape[0]):
+        t = k * plant.period
+        sense(port, t, 0.0)
+        evaluate(ops, params, memory, port.hand, wrench)
+        limit_force(limits, limiter, wrench, force[k])
+        actuate(port, force[k])
+        p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
+        advance(plant, port, hand, t, False, applied)
+
+
+def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...] = ()) -> Passage:
+    """Let the simulated Phantom, in the hand of a relaxed user who pushes, go in a field from rest.
+
+    Parameters
+    ----------
+    program : Program
+        The field.
+    start : array_like, shape (3,)
+        In H [m].
+    seconds : float
+        How long [s].
+    pushes : tuple of Push
+        What the hand does.
+    """
+    scene = SceneConfig()
+    substeps = scene.substeps()
+    model = trial_model(
+        HandImpedance(0.0, 0.0, 0.0), scene.servo_period / substeps, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    )
+    data = mujoco.MjData(model)
+    place_stylus(model, data, np.asarray(start, dtype=float))
+    mujoco.mj_forward(model, data)
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    plant = Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=np.zeros(3), arm_v=(a, b, c), substeps=substeps, period=scene.servo_period,
+    )  # fmt: skip
+    port = phantom_port(model, data, scene.servo_period, CUTOFF)
+    limiter = ForceLimiter(scene.servo_period)
+    n = round(seconds / scene.servo_period)
+    p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    _pass(
+        plant, port, make_hand(Arm(pushes=pushes)), program.ops, program.params, program.fresh_memory(),
+        limiter.limits(), limiter.fresh_memory(), p, force, river,
+    )  # fmt: skip
+    return Passage(p, force, river)
+
+
+def touching_river(degrees: float) -> River:
+    """River that touches the x axis at the origin of H, on an arc that turns by an angle in 0.12 m; 0: the axis."""
+    times = np.linspace(0.0, 1.6, 33)
+    s = SPEED * (times - 0.8)
+    bend = max(np.radians(degrees), 1e-9) / 0.12
+    points = np.stack((np.sin(bend * s) / bend, (1.0 - np.cos(bend * s)) / bend, np.zeros(33)), axis=1)
+    return River(Trajectory(times, points), drag=DRAG)
+
+
+def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
+    """Field of the river along x and of a second one, or of the first alone."""
+    rivers = (straight_river(0.0), second)
+    bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
+    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED, form).program()
+
+
+def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
+    """Through the origin along x, pushed in the plane across the first river, towards the second, on the way."""
+    pushes = (Push(0.0, PUSH_SECONDS, newtons, (0.0, 1.0, 0.0), (-0.0075, 0.0, 0.0), 0.004),) if newtons else ()
+    return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), SECONDS, pushes)
+
+
+def verdict(way: Passage) -> str:
+    """Which river had the hand at the end, and whether one let it go for longer than 20 ms."""
+    lost = float(np.sum(way.river < 0.0)) * 1e-3
+    end = "out" if way.river[-1] < 0.0 else f"{int(way.river[-1]) + 1}"
+    return end if lost < 0.02 else f"{end} ({lost:.2f} s)"
+
+
+def crossing_passages() -> str:
+    """The table as Markdown: by angle and push, the river that has the hand in the end."""
+    lines = ["| angle | form | deviation unpushed [mm] | " + " | ".join(f"{f:g} N" for f in PUSHES) + " |"]
+    lines.append("|--:|---|--:|" + "--:|" * len(PUSHES))
+    for degrees in ANGLES:
+        for form in ("discrete", "smooth"):
+            ways = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
+            lone = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
+            away = 1e3 * float(np.max(np.abs(ways[0].p - lone.p)))
+            cells = " | ".join(verdict(way) for way in ways)
+            lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(crossing_passages())
