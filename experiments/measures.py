@@ -14,6 +14,7 @@ from experiments.summary import (
     PushSummary,
     RunSummary,
     SpeedSummary,
+    TankSummary,
 )
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.clip import pose_difference
@@ -26,7 +27,7 @@ HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
 FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
 TOUCH = 1.0  # [N] from which the ground bears the figure
 BLOCK_FRAMES = 2000  # of the figure, read at a time
-_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user")
+_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
 
 
@@ -50,6 +51,7 @@ def summarise(
         Taken over.
     """
     path, animation, figure = PathMeasure(recording), AnimationMeasure(), FigureMeasure(recording)
+    tank = TankSummary(math.inf, 0)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
     rows = BLOCK_FRAMES * per_frame
     for first in range(0, len(recording.channel("ticks", "t")), rows):
@@ -62,8 +64,10 @@ def summarise(
         default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
         animation.add(frames, default, pushed[::per_frame])
         figure.add(frames)
+        least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
+        tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
     return RunSummary(
-        path.summary(), animation.summary(), figure.summary(), speed, warnings, changes=river_changes(recording)
+        path.summary(), animation.summary(), figure.summary(), tank, speed, warnings, changes=river_changes(recording)
     )
 
 

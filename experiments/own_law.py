@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from controllers.energy_tank import EnergyTank
 from controllers.fields.instructions import Program
 from experiments.config import RunConfig
 from experiments.wiring import Session, load_clips, wire
@@ -11,7 +12,10 @@ from sim.loop import Loop, Observer
 
 
 def loop_with(
-    config: RunConfig, program: Program, observe: Observer = lambda ticks, frames, n: None
+    config: RunConfig,
+    program: Program,
+    observe: Observer = lambda ticks, frames, n: None,
+    tank: EnergyTank | None = None,
 ) -> tuple[Session, Loop]:
     """Session of a configuration with its field replaced, and the loop that runs it.
 
@@ -23,6 +27,8 @@ def loop_with(
         The field; its laws in Python are called at every tick.
     observe : Observer
         What is done with each block of ticks.
+    tank : EnergyTank, optional
+        What the field may inject; by default as much as that of the configuration.
 
     Raises
     ------
@@ -34,5 +40,7 @@ def loop_with(
     field = session.servo.field._replace(
         ops=program.ops, params=program.params, memory=program.fresh_memory(), wrench=np.zeros(6)
     )
+    if tank is not None:
+        field = field._replace(budget=tank.params(), tank=tank.fresh_memory())
     session = replace(session, servo=session.servo._replace(field=field))
     return session, Loop(session.servo, session.world, observe, python_laws=program.python_laws)

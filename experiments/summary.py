@@ -67,6 +67,22 @@ class AnimationSummary:
 
 
 @dataclass(frozen=True)
+class TankSummary:
+    """How much of its budget of energy the field needed.
+
+    Attributes
+    ----------
+    least_mj : float
+        Energy that the tank held at least [mJ].
+    scaled_ticks : int
+        Ticks at which it let less than the whole force through.
+    """
+
+    least_mj: float
+    scaled_ticks: int
+
+
+@dataclass(frozen=True)
 class FigureSummary:
     """How the physical figure followed the animation, until it fell, if it did.
 
@@ -117,11 +133,12 @@ class SpeedSummary:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it; `lines` says it in five sentences, and one more where the curve was bent or rivers changed."""
+    """All of it; `lines` says it in five sentences, one more where the curve was bent, rivers changed, the tank acted."""
 
     path: PathSummary
     animation: AnimationSummary
     figure: FigureSummary
+    tank: TankSummary
     speed: SpeedSummary
     warnings: dict[str, int]
     stretch: StretchSummary | None = None
@@ -136,9 +153,11 @@ class RunSummary:
         warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
         bent = [] if self.stretch is None else [self.stretch.line()]
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
+        held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
         return [
             *bent,
             *changed,
+            *([held] if self.tank.scaled_ticks else []),
             f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "

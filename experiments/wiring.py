@@ -18,6 +18,7 @@ from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
 from experiments.balance import balanced
+from experiments.budget import energy_tank
 from experiments.config import STRETCHING, RunConfig
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.modes import Field, default_rivers, law
@@ -157,12 +158,14 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
         program = program + walls.program()
     limiter = ForceLimiter(period)
+    tank = energy_tank(config, curve, limiter, grabs)
     servo = Servo(
         plant=make_plant(world),
         port=phantom_port(world.model, world.data, period, config.cutoff),
         field=CompiledField(
             ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
-            limiter=limiter.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
+            limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
+            wrench=np.zeros(6), force=np.zeros(3),
         ),
         hand=make_hand(_user(config, curve, grabs)),
         reference=reference,

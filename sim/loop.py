@@ -50,7 +50,8 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
     return (
         TickLog(
             hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
-            user=np.zeros((ticks, 3)), torque=np.zeros((ticks, 3)), trace=np.zeros((ticks, TRACE_SIZE)),
+            user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
+            trace=np.zeros((ticks, TRACE_SIZE)),
             ctrl=np.zeros((ticks, len(plant.ctrl))), applied=np.zeros((ticks, plant.substeps, 3)),
             residual=np.zeros((ticks, len(servo.figure.applied))),
         ),
@@ -69,7 +70,8 @@ def groups(servo: Servo) -> dict[str, Group]:
         1.0 / plant.period,
         {
             "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
-            "force": (3,), "user": (3,), "torque": (3,), "phase": (), "nearest": (3,), "distance": (), "river": (),
+            "force": (3,), "user": (3,), "tank": (), "tank_scale": (), "torque": (3,),
+            "phase": (), "nearest": (3,), "distance": (), "river": (),
             "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, 3), "residual": (6,),
         },
     )  # fmt: skip
@@ -191,7 +193,8 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
     return {
         "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
         "switch": hand[:, 14],
-        "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n], "torque": ticks.torque[:n],
+        "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n],
+        "tank": ticks.tank[:n, 0], "tank_scale": ticks.tank[:n, 1], "torque": ticks.torque[:n],
         "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
         "distance": trace[:, TRACE_DISTANCE], "river": trace[:, TRACE_RIVER],
         "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],

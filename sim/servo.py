@@ -4,7 +4,7 @@ Each tick of period T:
 
 1. `sense`: encoders → hand vector in H.
 2. `evaluate`: the field's program → wrench, and where on the curve the hand is.
-3. `limit_force`: what the device may be asked for.
+3. `limit_force`: what the device may be asked for; `guard_energy`: how much of it the energy tank allows.
 4. `actuate`: τ = Jᵀ F + N → the Phantom's motors.
 5. Every `figure_ticks` ticks: `update_reference` (h and its derivatives along the hand's motion), and `drive`, which
    sets the torques of the figure that follows it.
@@ -20,10 +20,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.energy_tank import TANK_ENERGY, guard_energy
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.program import evaluate
 from controllers.safety import limit_force
-from controllers.state import HAND_TIME
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from sim.body import BodyState, drive
 from sim.compiled import entry_point
 from sim.devices.phantom_port import PhantomPort, actuate, has_sensed, sense
@@ -35,13 +36,15 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Field(NamedTuple):
-    """A compiled field and its limiter: programs, parameters, memory, and the last wrench."""
+    """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench."""
 
     ops: IntArray
     params: Array
     memory: Array
     limits: Array
     limiter: Array
+    budget: Array
+    tank: Array
     wrench: Array
     force: Array
 
@@ -66,7 +69,9 @@ class TickLog(NamedTuple):
     hand : Array
         The hand vector as measured, shape (n, 15).
     field, force, user : Array
-        Wrench of the field (6), force after the limiter (3), force of the hand at the end of the tick (3), in H.
+        Wrench of the field (6), force after limiter and tank (3), force of the hand at the end of the tick (3), in H.
+    tank : Array
+        Energy [J] that the tank holds, and the share of the force that it let through, shape (n, 2).
     torque : Array
         Torques at the Phantom's joints [N m], shape (n, 3).
     trace : Array
@@ -83,6 +88,7 @@ class TickLog(NamedTuple):
     field: Array
     force: Array
     user: Array
+    tank: Array
     torque: Array
     trace: Array
     ctrl: Array
@@ -116,10 +122,12 @@ class FrameLog(NamedTuple):
 
 @njit
 def field_force(servo: Servo) -> None:
-    """Evaluate and limit the field at the measured hand, and command the motors."""
+    """Evaluate and limit the field at the measured hand, within the tank's budget, and command the motors."""
     field, hand = servo.field, servo.port.hand
     evaluate(field.ops, field.params, field.memory, hand, field.wrench)
     limit_force(field.limits, field.limiter, field.wrench, field.force)
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    guard_energy(field.budget, field.tank, p, v, field.force)
     actuate(servo.port, field.force)
 
 
@@ -163,6 +171,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             ticks.hand[k] = port.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force
+            ticks.tank[k] = servo.field.tank[TANK_ENERGY : TANK_ENERGY + 2]
             ticks.torque[k] = port.torque
             ticks.trace[k] = servo.field.memory[:TRACE_SIZE]
             ticks.ctrl[k] = plant.ctrl

@@ -22,6 +22,7 @@ from controllers.certificates.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.report import Verdict
 from controllers.certificates.sampled_loop import SampledLoop
 from controllers.certificates.stability import River
+from controllers.energy_tank import river_power
 from controllers.fields.river import window
 from controllers.state import Array
 
@@ -135,7 +136,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
         "terminal_speed": speed,
         "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
         "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
-        "power_bound": 0.25 * river.b_d * float(np.max(pace)) ** 2,
+        "power_bound": river_power(river.b_d, float(np.max(pace))),
         "speed_bound": float(np.max(pace)) + push / river.b_d if river.b_d > 0.0 else None,
         "peak_gain": gain.distance,
         "force_gain": gain.force,

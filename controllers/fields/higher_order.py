@@ -11,6 +11,7 @@ from numba import njit
 from controllers.curves.branches import BRANCHES, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
+from controllers.fields.admissible import admissible_speeds
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
 from controllers.fields.instructions import (
@@ -61,11 +62,8 @@ def _branch_mismatch(params: Array, block: int, curve: int, phase: float, p: Arr
     s = speed
     rows = int(params[block + _SPEEDS])
     if rows > 0:
-        share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START]) * (rows - 1)
-        i = min(int(share), rows - 2)
-        low, high = block + _BLOCK + 2 * i, block + _BLOCK + 2 * (i + 1)
-        least = params[low] + (share - i) * (params[high] - params[low])
-        greatest = params[low + 1] + (share - i) * (params[high + 1] - params[low + 1])
+        share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
+        least, greatest = admissible_speeds(params, block + _BLOCK, rows, share)
         s = min(max((v[0] * along[0] + v[1] * along[1] + v[2] * along[2]) / speed, least), greatest)
     square = towards = draw = 0.0
     for i in range(3):

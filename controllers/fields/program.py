@@ -7,6 +7,7 @@ from controllers.fields.algebra import blend, gate, limit
 from controllers.fields.bunny import bunny_wrench
 from controllers.fields.edited import recorded_wrench
 from controllers.fields.follow import follow_wrench
+from controllers.fields.governor import governor_wrench
 from controllers.fields.higher_order import higher_order_wrench
 from controllers.fields.instructions import (
     ADD,
@@ -15,6 +16,7 @@ from controllers.fields.instructions import (
     EXTERNAL,
     FOLLOW,
     GATE,
+    GOVERNOR,
     HIGHER_ORDER,
     LIMIT,
     RECORDED,
@@ -70,6 +72,9 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top += 1
         elif opcode == SOFT_WALL:
             soft_wall_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == GOVERNOR:
+            governor_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
         elif opcode == EXTERNAL:
             for i in range(6):

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.errors import ControllerError, ParameterError
+from controllers.fields.admissible import checked_speeds
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import Program, checked
 from controllers.fields.window import window
@@ -77,15 +78,7 @@ class River:
         checked("tau", self.tau, "s", least=1e-4)
         checked("drag", self.drag, "N s/m")
         if self.speeds is not None:
-            speeds = np.array(self.speeds, dtype=np.float64)
-            if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
-                raise ParameterError(
-                    f"speeds of a river must be finite and of shape (m, 2), m ≥ 2; their shape is {speeds.shape}"
-                )
-            if (speeds[:, 0] < 0.0).any() or (speeds[:, 1] < speeds[:, 0]).any():
-                at = int(np.argmax((speeds[:, 0] < 0.0) | (speeds[:, 1] < speeds[:, 0])))
-                raise ParameterError(f"speeds of a river must be 0 ≤ least ≤ greatest; row {at} is {speeds[at]} m/s")
-            object.__setattr__(self, "speeds", speeds)
+            object.__setattr__(self, "speeds", checked_speeds("river", self.speeds))
 
     @cached_property
     def _blob(self) -> Array:

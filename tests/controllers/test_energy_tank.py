@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.energy_tank import TANK_ENERGY, EnergyTank, guard_energy
+from controllers.energy_tank import TANK_ENERGY, TANK_SCALE, EnergyTank, guard_energy, river_power, spring_store
 from controllers.errors import ParameterError
 
 TANK = EnergyTank(1e-3, power=0.02, capacity=0.05)
@@ -38,11 +38,27 @@ def test_an_active_field_injects_no_more_than_its_budget(period):
 
 def test_a_force_that_takes_energy_is_not_touched():
     memory = TANK.fresh_memory()
-    memory[TANK_ENERGY] = -1.0
+    memory[TANK_ENERGY] = 0.0
     for v in ([-0.3, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.5, 0.0]):
         force = np.array([2.0, 0.0, 0.0])
         guard_energy(TANK.params(), memory, np.zeros(3), np.array(v), force)
         assert force.tolist() == [2.0, 0.0, 0.0]
+
+
+def test_an_overdrawn_store_lets_go_and_fills_again():
+    """Whatever the force seems to do: at e = −P τ nothing is let through, at −P τ/2 the half."""
+    for energy, share in ((-1.0, 0.0), (-0.02 * 0.05, 0.0), (-0.01 * 0.05, 0.5), (-1e-12, 1.0)):
+        memory = TANK.fresh_memory()
+        memory[TANK_ENERGY] = energy
+        force = np.array([2.0, 0.0, 0.0])
+        guard_energy(TANK.params(), memory, np.zeros(3), np.array([-0.3, 0.0, 0.0]), force)
+        assert force[0] == pytest.approx(2.0 * share, abs=1e-8)
+        assert memory[TANK_SCALE] == pytest.approx(share, abs=1e-8)
+    memory = TANK.fresh_memory()
+    memory[TANK_ENERGY] = -0.001
+    for _ in range(26):
+        guard_energy(TANK.params(), memory, np.zeros(3), np.zeros(3), np.zeros(3))
+    assert memory[TANK_ENERGY] == pytest.approx(-0.0005, rel=1e-9)
 
 
 def test_a_vanishing_speed_is_no_trouble():
@@ -75,7 +91,19 @@ def test_an_empty_tank_still_gives_its_power_and_is_continuous():
     np.testing.assert_allclose(powers, [0.018, 0.019, 0.02, 0.02, 0.02], rtol=1e-12)
 
 
-@pytest.mark.parametrize("numbers", [(0.0, 1.0, 1.0, 1.0), (1e-3, np.inf, 1.0, 1.0), (1e-3, 1.0, 1.0, 1e-3)])
+@pytest.mark.parametrize(
+    "numbers", [(0.0, 1.0, 1.0, 1.0), (1e-3, np.inf, 1.0, 1.0), (1e-3, 1.0, 1.0, 1e-3), (1e-3, 1.0, 1.0, 0.05, 2.0)]
+)
 def test_a_tank_that_cannot_be_is_refused(numbers):
     with pytest.raises(ParameterError, match="tank"):
         EnergyTank(*numbers)
+
+
+def test_what_springs_and_dampers_can_give_is_what_the_work_along_the_way_sums_to():
+    """∫ min(k s, F) ds by a sum, and the greatest b (φ̇ − v) v by a search."""
+    way = np.linspace(0.0, 0.2, 200_001)
+    for stiffness, force in ((300.0, 8.5), (300.0, np.inf), (20.0, 8.5), (0.0, 8.5)):
+        expected = np.trapezoid(np.minimum(stiffness * way, force), way)
+        assert spring_store(stiffness, 0.2, force) == pytest.approx(expected, abs=1e-9)
+    speed = np.linspace(-0.2, 0.2, 4001)
+    assert river_power(8.0, 0.075) == pytest.approx((8.0 * (0.075 - speed) * speed).max(), rel=1e-6)

@@ -32,15 +32,9 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     flight = np.zeros(m)
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
-    ticks = {
-        "t": t,
-        "p": p,
-        "nearest": nearest,
-        "distance": distance,
-        "phase": phase,
-        "user": user,
-        "river": np.full(N, -1.0),
-    }
+    ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
+    ticks |= {"river": np.full(N, -1.0), "tank": 0.1 - 0.02 * t}
+    ticks["tank_scale"] = np.where((t >= 3.0) & (t < 3.1), 0.5, 1.0)
     ground = np.tile([0.0, 0.0, 700.0], (m, 1))
     ground[100:120] = 0.0  # in flight
     ground[200:230] = 0.0  # and when it should stand
@@ -90,7 +84,9 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
-    assert len(summary.lines()) == 5
+    assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
+    assert len(summary.lines()) == 6
+    assert "held the field back at 100 ticks" in summary.lines()[0]
 
 
 @pytest.mark.parametrize("block", [1, 7, 113, 205])
@@ -100,7 +96,7 @@ def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(measures, "BLOCK_FRAMES", block)
     pieces = summary_of(tmp_path / "pieces.h5")
     assert len(pieces.path.pushes) == 1
-    for part in ("path", "animation", "figure"):
+    for part in ("path", "animation", "figure", "tank"):
         for name, value in vars(getattr(whole, part)).items():
             other = getattr(getattr(pieces, part), name)
             if name == "pushes":

@@ -1,0 +1,43 @@
+"""Admissible speeds along a curve: the least and the greatest at each phase, linear between samples."""
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+
+@njit
+def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tuple[float, float]:
+    """Least and greatest admissible speed [m/s].
+
+    Parameters
+    ----------
+    params : Array
+        ``params[first:]`` holds `rows` ≥ 2 pairs, equally spaced from the curve's start to its end.
+    first, rows : int
+        Where they begin, and how many they are.
+    share : float
+        Share of the curve's phase that is over, 0 to 1.
+    """
+    place = share * (rows - 1)
+    i = min(int(place), rows - 2)
+    low, high = first + 2 * i, first + 2 * (i + 1)
+    least = params[low] + (place - i) * (params[high] - params[low])
+    greatest = params[low + 1] + (place - i) * (params[high + 1] - params[low + 1])
+    return least, greatest
+
+
+def checked_speeds(name: str, values: npt.ArrayLike) -> Array:
+    """Pairs of speeds as an array of shape (m, 2), or what is wrong with them."""
+    speeds = np.array(values, dtype=np.float64)
+    if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
+        raise ParameterError(
+            f"speeds of a {name} must be finite and of shape (m, 2), m ≥ 2; their shape is {speeds.shape}"
+        )
+    wrong = (speeds[:, 0] < 0.0) | (speeds[:, 1] < speeds[:, 0])
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise ParameterError(f"speeds of a {name} must be 0 ≤ least ≤ greatest; row {at} is {speeds[at]} m/s")
+    return speeds

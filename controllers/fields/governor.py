@@ -1,0 +1,97 @@
+"""The governor: a hand that plays a motion slower or faster than it can be done meets a force."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
+from controllers.fields.admissible import admissible_speeds, checked_speeds
+from controllers.fields.instructions import GOVERNOR, Program, checked, leave_trace, wrench_of
+from controllers.fields.window import window
+from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+
+_DRAG, _INVERSE_SQUARE, _ROWS, _SPEEDS = range(4)
+
+
+@njit
+def governor_force(speed: float, least: float, greatest: float, drag: float) -> float:
+    """Force [N] along the curve on a hand of a speed along it, b (⟨v_min − s⟩ − ⟨s − v_max⟩); speeds in m/s."""
+    return drag * (np.maximum(0.0, least - speed) - np.maximum(0.0, speed - greatest))
+
+
+@njit
+def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Instruction GOVERNOR: parameters [b, 1/ε², rows, speeds (2 rows)], memory [t*]."""
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
+    memory[slot] = phase
+    x, y, z = curve_velocity(params, curve, phase)
+    # Where the curve rests it has no direction, and there is no force.
+    pace = max(np.sqrt(x * x + y * y + z * z), 1e-12)
+    share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
+    least, greatest = admissible_speeds(params, at + _SPEEDS, int(params[at + _ROWS]), share)
+    speed = (v[0] * x + v[1] * y + v[2] * z) / pace
+    force = governor_force(speed, least, greatest, params[at + _DRAG])
+    force *= window(distance * distance * params[at + _INVERSE_SQUARE]) / pace
+    wrench[0], wrench[1], wrench[2] = force * x, force * y, force * z
+    wrench[3:] = 0.0
+    leave_trace(params, curve, memory, phase, distance, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class Governor:
+    r"""Force that keeps a hand's pace along a curve within what the motion under it admits.
+
+    .. math:: F = w(d/\varepsilon)\,b\,\bigl(\langle v_{min} - s\rangle - \langle s - v_{max}\rangle\bigr)\,
+              \frac{\dot\varphi}{|\dot\varphi|}, \qquad s = \dot p \cdot \frac{\dot\varphi}{|\dot\varphi|},
+              \quad \langle x \rangle = \max(0, x)
+
+    at t*, the phase of the curve's point nearest to the hand, d its distance, w the C² `window`. Inside the interval
+    there is no force, at its ends the force is continuous; it is what a drag would do to a hand that is as much too
+    fast or too slow. Alone it does not hold the hand to the curve: add it to a field that does.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    speeds : array_like, shape (m, 2)
+        v_min and v_max [m/s] at m phases equally spaced from the curve's start to its end, linear between them, as
+        of `River.speeds`; what comes of `controllers.certificates.rate_bounds.RateBounds.stylus_speed`.
+    drag : float
+        b [N s/m].
+    epsilon : float
+        ε, radius of the tube [m], may be infinite.
+
+    Raises
+    ------
+    ParameterError
+        If b is negative or not finite, ε below 1e-4 m, or the speeds are not pairs 0 ≤ v_min ≤ v_max.
+    """
+
+    curve: Trajectory
+    speeds: npt.ArrayLike
+    drag: float = 8.0
+    epsilon: float = 0.25
+
+    def __post_init__(self) -> None:
+        checked("drag", self.drag, "N s/m")
+        checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
+        object.__setattr__(self, "speeds", checked_speeds("governor", self.speeds))
+
+    @cached_property
+    def _program(self) -> Program:
+        speeds = np.asarray(self.speeds)
+        numbers = np.concatenate([[self.drag, self.epsilon**-2, len(speeds)], speeds.ravel()])
+        return Program.law(GOVERNOR, numbers, [np.nan], self.curve)
+
+    def program(self) -> Program:
+        """Compiled form of the field."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """F at one hand state, by the compiled law; t* is found without a warm start."""
+        return wrench_of(governor_wrench, self._program, hand)

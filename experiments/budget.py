@@ -1,0 +1,77 @@
+"""The energy that the field of a run may inject: the certificate's power, and what its springs hold."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.energy_tank import EnergyTank, river_power, spring_store
+from controllers.safety import ForceLimiter
+from experiments.config import STRETCHING, RunConfig
+from experiments.modes import river_bundle
+from sim.users.intent import Grab
+
+SPAN = 0.2  # [m] through which a spring can be drawn: across the workspace
+_BEND = 2.0  # steepest slope of a bump of height and half width 1, and a little more
+_SAMPLES = 512  # of a curve, in the search for its fastest place
+
+
+def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, grabs: Sequence[Grab] = ()) -> EnergyTank:
+    r"""Tank that a run as it is meant never empties, and that a wrong or late law does.
+
+    .. math:: P = \tfrac14 b_d |\dot\varphi|^2_{max}
+
+    is what the damper of a river injects at most (see `controllers.certificates.energy`), the sum of it for several
+    rivers; a bunny's spring is carried along besides, min(k_r δ e^{-1/2}, F_p) |φ̇|. The tank holds at first what the
+    springs give to a hand that begins at the edge of the map's domain, and at most what they hold with the limiter's
+    force: that is what a hand that has drawn them gets back. Of a field that is not known here the limiter's force and
+    the curve's pace bound the power, and its force across the workspace the store.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Mode, gains and widths.
+    curve : Trajectory
+        φ, in the hand frame H.
+    limiter : ForceLimiter
+        What the device may be asked for.
+    grabs : sequence of Grab
+        What the hand takes hold of, by which a bent curve may become faster.
+    """
+    pace, force = _pace(curve), limiter.peak
+    damped = river_power(config.damping, pace)
+    springs: tuple[tuple[float, float], ...] = ((config.stiffness, config.tube),)
+    if config.mode == "follow":
+        power = damped
+    elif config.mode == "bunny":
+        # ∫ k s exp(−s²/2δ²) ds = k δ² is what a spring of reach √2 δ holds.
+        springs = ((config.stiffness, np.sqrt(2.0) * config.bunny_width),)
+        power = damped + pace * min(config.stiffness * config.bunny_width * np.exp(-0.5), force)
+    elif config.mode == "rivers":
+        bundle = river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
+        springs = ((config.stiffness, config.river_tube),) * len(bundle.rivers)
+        power = sum(river_power(config.damping, _pace(river.curve)) for river in bundle.rivers)
+    elif config.mode in STRETCHING:
+        # A press of the switch leaves the search for the rubber: its energy once a second.
+        springs, power = ((max(config.seek, config.rubber), SPAN),), spring_store(config.rubber, config.rubber_tube)
+        if config.mode == "stretch-then-follow":
+            carried = max((float(np.linalg.norm(grab.carry)) for grab in grabs), default=0.0)
+            springs, power = (
+                (*springs, (config.stiffness, config.tube)),
+                power + river_power(config.damping, pace + _BEND * carried / config.bump),
+            )
+    else:
+        return EnergyTank(config.scene.servo_period, force * pace, force * SPAN, _drain(config))
+    capacity = sum(spring_store(stiffness, min(reach, SPAN), force) for stiffness, reach in springs)
+    initial = sum(spring_store(stiffness, min(reach, config.reach), force) for stiffness, reach in springs)
+    return EnergyTank(config.scene.servo_period, power, capacity, _drain(config), initial)
+
+
+def _pace(curve: Trajectory) -> float:
+    """Greatest |φ̇| [m/s]."""
+    return float(np.linalg.norm(curve.velocity(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
+
+
+def _drain(config: RunConfig) -> float:
+    """Time in which a full tank may be emptied [s], for any servo period."""
+    return max(0.05, 2.0 * config.scene.servo_period)
