@@ -123,5 +123,6 @@ def spring_store(stiffness: float, distance: float, force: float = np.inf) -> fl
 
     .. math:: \int_0^R \min(k s, F)\,ds
     """
-    bend = min(distance, force / stiffness if stiffness > 0.0 else np.inf)
-    return 0.5 * stiffness * bend**2 + (force * (distance - bend) if distance > bend else 0.0)
+    if stiffness * distance <= force:
+        return 0.5 * stiffness * distance**2
+    return force * (distance - 0.5 * force / stiffness)

@@ -13,6 +13,7 @@ from sim.users.intent import Grab
 
 SPAN = 0.2  # [m] through which a spring can be drawn: across the workspace
 _BEND = 2.0  # steepest slope of a bump of height and half width 1, and a little more
+_LEAST = 1e-3  # [W], [J] for a field without springs or dampers, whose work is measured by encoders that round
 _SAMPLES = 512  # of a curve, in the search for its fastest place
 
 
@@ -38,7 +39,7 @@ def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, gra
     grabs : sequence of Grab
         What the hand takes hold of, by which a bent curve may become faster.
     """
-    pace, force = _pace(curve), limiter.peak
+    pace, force = fastest(curve), limiter.peak
     damped = river_power(config.damping, pace)
     springs: tuple[tuple[float, float], ...] = ((config.stiffness, config.tube),)
     if config.mode == "follow":
@@ -50,7 +51,7 @@ def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, gra
     elif config.mode == "rivers":
         bundle = river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
         springs = ((config.stiffness, config.river_tube),) * len(bundle.rivers)
-        power = sum(river_power(config.damping, _pace(river.curve)) for river in bundle.rivers)
+        power = sum(river_power(config.damping, fastest(river.curve)) for river in bundle.rivers)
     elif config.mode in STRETCHING:
         # A press of the switch leaves the search for the rubber: its energy once a second.
         springs, power = ((max(config.seek, config.rubber), SPAN),), spring_store(config.rubber, config.rubber_tube)
@@ -61,17 +62,35 @@ def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, gra
                 power + river_power(config.damping, pace + _BEND * carried / config.bump),
             )
     else:
-        return EnergyTank(config.scene.servo_period, force * pace, force * SPAN, _drain(config))
-    capacity = sum(spring_store(stiffness, min(reach, SPAN), force) for stiffness, reach in springs)
-    initial = sum(spring_store(stiffness, min(reach, config.reach), force) for stiffness, reach in springs)
-    return EnergyTank(config.scene.servo_period, power, capacity, _drain(config), initial)
+        power, springs = force * pace, ((np.inf, SPAN),)
+    return tank_for(power, springs, config.reach, limiter)
 
 
-def _pace(curve: Trajectory) -> float:
+def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float, limiter: ForceLimiter) -> EnergyTank:
+    """Tank of a power [W] and of springs.
+
+    Parameters
+    ----------
+    power : float
+        What dampers inject [W].
+    springs : sequence of (float, float)
+        Stiffness [N/m] and reach [m] of each.
+    start : float
+        Distance [m] from the curve within which hands begin.
+    limiter : ForceLimiter
+        What the device may be asked for.
+    """
+    stores = (sum(_store(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
+    power, capacity, initial = (max(number, _LEAST) for number in (power, *stores))
+    # In this time a full tank may be emptied, at any servo period.
+    return EnergyTank(limiter.period, power, capacity, max(0.05, 2.0 * limiter.period), initial)
+
+
+def _store(spring: tuple[float, float], most: float, force: float) -> float:
+    stiffness, reach = spring
+    return spring_store(stiffness, min(reach, most), force)
+
+
+def fastest(curve: Trajectory) -> float:
     """Greatest |φ̇| [m/s]."""
     return float(np.linalg.norm(curve.velocity(np.linspace(curve.start, curve.end, _SAMPLES)), axis=1).max())
-
-
-def _drain(config: RunConfig) -> float:
-    """Time in which a full tank may be emptied [s], for any servo period."""
-    return max(0.05, 2.0 * config.scene.servo_period)

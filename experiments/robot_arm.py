@@ -13,10 +13,12 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from controllers.curves.trajectory import Trajectory
+from controllers.energy_tank import river_power
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.safety import ForceLimiter
+from experiments.budget import fastest, tank_for
 from experiments.config import ArmConfig
 from experiments.figures import STYLE
 from experiments.report import write_report
@@ -129,6 +131,8 @@ def wire_arm(config: ArmConfig) -> tuple[Servo, RobotWorld, Trajectory]:
     program = Follow(curve, config.stiffness, config.damping, config.tube).program()
     period = config.scene.servo_period
     limiter = ForceLimiter(period)
+    power = river_power(config.damping, fastest(curve))
+    tank = tank_for(power, ((config.stiffness, config.tube),), config.radius, limiter)
     pushes = lap_pushes(config.lap, config.lap) if config.user == "push" else ()
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     world.reset(start)
@@ -141,7 +145,8 @@ def wire_arm(config: ArmConfig) -> tuple[Servo, RobotWorld, Trajectory]:
         port=port,
         field=Field(
             ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
-            limiter=limiter.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
+            limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
+            wrench=np.zeros(6), force=np.zeros(3),
         ),
         hand=make_hand(Arm(pushes=pushes)),
         reference=make_reference(world.arm, haptic_map.compiled(), period * config.arm_ticks, config.smoothing),

@@ -102,8 +102,9 @@ def test_a_tank_that_cannot_be_is_refused(numbers):
 def test_what_springs_and_dampers_can_give_is_what_the_work_along_the_way_sums_to():
     """∫ min(k s, F) ds by a sum, and the greatest b (φ̇ − v) v by a search."""
     way = np.linspace(0.0, 0.2, 200_001)
-    for stiffness, force in ((300.0, 8.5), (300.0, np.inf), (20.0, 8.5), (0.0, 8.5)):
+    for stiffness, force in ((300.0, 8.5), (300.0, np.inf), (20.0, 8.5), (0.0, 8.5), (1e9, 8.5)):
         expected = np.trapezoid(np.minimum(stiffness * way, force), way)
-        assert spring_store(stiffness, 0.2, force) == pytest.approx(expected, abs=1e-9)
+        assert spring_store(stiffness, 0.2, force) == pytest.approx(expected, abs=1e-5 * expected + 1e-9)
+    assert spring_store(np.inf, 0.2, 8.5) == 0.2 * 8.5
     speed = np.linspace(-0.2, 0.2, 4001)
     assert river_power(8.0, 0.075) == pytest.approx((8.0 * (0.075 - speed) * speed).max(), rel=1e-6)
