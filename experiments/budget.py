@@ -17,7 +17,9 @@ _LEAST = 1e-3  # [W], [J] for a field without springs or dampers, whose work is 
 _SAMPLES = 512  # of a curve, in the search for its fastest place
 
 
-def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, grabs: Sequence[Grab] = ()) -> EnergyTank:
+def energy_tank(
+    config: RunConfig, curve: Trajectory, limiter: ForceLimiter, grabs: Sequence[Grab] = (), urged: float = 0.0
+) -> EnergyTank:
     r"""Tank that a run as it is meant never empties, and that a wrong or late law does.
 
     .. math:: P = \tfrac14 b_d |\dot\varphi|^2_{max}
@@ -38,6 +40,8 @@ def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, gra
         What the device may be asked for.
     grabs : sequence of Grab
         What the hand takes hold of, by which a bent curve may become faster.
+    urged : float
+        Speed [m/s] to which a governor urges the hand.
     """
     pace, force = fastest(curve), limiter.peak
     damped = river_power(config.damping, pace)
@@ -63,7 +67,7 @@ def energy_tank(config: RunConfig, curve: Trajectory, limiter: ForceLimiter, gra
             )
     else:
         power, springs = force * pace, ((np.inf, SPAN),)
-    return tank_for(power, springs, config.reach, limiter)
+    return tank_for(power + river_power(config.governor_drag, urged), springs, config.reach, limiter)
 
 
 def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float, limiter: ForceLimiter) -> EnergyTank:

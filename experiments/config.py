@@ -50,6 +50,10 @@ class RunConfig:
         How crossing rivers share the hand: by its velocity, smoothly or with hysteresis, or not at all.
     blend : float
         In which one river's clip goes over into another's [s]; 0: the figure jumps.
+    governor : bool
+        Whether a hand too slow or too fast for the flights of the animation meets a force, and in rivers is not taken.
+    governor_drag : float
+        b of that force [N s/m].
     seek : float
         k_f, with which stretchy tubes draw the hand to the curve [N/m].
     rubber : float
@@ -101,6 +105,8 @@ class RunConfig:
     river_tube: float = 0.015
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     blend: float = 0.4
+    governor: bool = False
+    governor_drag: float = 8.0
     seek: float = 150.0
     rubber: float = 150.0
     rubber_tube: float = 0.008

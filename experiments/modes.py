@@ -1,6 +1,8 @@
 """The modes of a run that are fields over a fixed curve: follow, bunny, rivers; and how fast the heaviest one is."""
 
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -26,6 +28,7 @@ IntArray = npt.NDArray[np.int64]
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
 # at a right angle is not: it is √2 from it.
 ADMISSION, SIGMA, HYSTERESIS = 1.2, 0.15, 0.15
+GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
 WAVE = 0.6  # height of the wave, of the map's half width
 
 
@@ -41,8 +44,8 @@ class Field(Protocol):
         ...
 
 
-def law(config: RunConfig, curve: Trajectory) -> Field:
-    """Field of a mode over the default curve.
+def law(config: RunConfig, curve: Trajectory, speeds_of: Callable[[int, Trajectory], Array] | None = None) -> Field:
+    """Field of a mode over the default curve; `speeds_of` gives the admissible speeds of rivers, see `River.speeds`.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def law(config: RunConfig, curve: Trajectory) -> Field:
             curve, config.stiffness, config.damping, config.bunny_width, config.bunny_attraction, config.bunny_pace
         )
     if config.mode == "rivers":
-        return _rivers(config, curve)
+        return _rivers(config, curve, speeds_of)
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
@@ -75,12 +78,15 @@ def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
     return river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
 
 
-def _rivers(config: RunConfig, curve: Trajectory) -> Field:
+def _rivers(config: RunConfig, curve: Trajectory, speeds_of: Callable[[int, Trajectory], Array] | None) -> Field:
     bundle = default_rivers(config, curve)
     if config.crossing == "sum":
         return bundle
-    pace = curve.length / curve.duration
-    return HigherOrder(bundle, ADMISSION * pace, SIGMA * pace, HYSTERESIS * pace, config.crossing)
+    pace, admission = curve.length / curve.duration, ADMISSION
+    if speeds_of is not None:
+        gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))
+        bundle, admission = replace(bundle, rivers=gated), GATE
+    return HigherOrder(bundle, admission * pace, SIGMA * pace, HYSTERESIS * pace, config.crossing)
 
 
 def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:

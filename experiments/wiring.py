@@ -20,8 +20,9 @@ from controllers.safety import ForceLimiter
 from experiments.balance import balanced
 from experiments.budget import energy_tank
 from experiments.config import STRETCHING, RunConfig
+from experiments.governor import governed_law
 from experiments.map_files import MAP_SUFFIX, load_figure_map
-from experiments.modes import Field, default_rivers, law
+from experiments.modes import Field, default_rivers
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
 from experiments.walls import figure_walls
@@ -132,6 +133,8 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
             raise ParameterError(f"{name} is {value}; expected a positive, finite number")
     if config.bump > 0.5 * config.lap:
         raise ParameterError(f"bump is {config.bump} s; expected at most half a lap, {0.5 * config.lap:g} s")
+    if config.governor and config.mode in STRETCHING:
+        raise ParameterError(f"a curve that is bent has no governor; leave out --governor, or --mode {config.mode}")
     world = World(config.scene)
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
@@ -152,13 +155,16 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     world.reset(start, poses[0])
     figure = Figure(world.model, world.data, world.figure, FIGURE)
     grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
-    field = stretch_law(config, curve, grabs) if config.mode in STRETCHING else law(config, curve)
+    if config.mode in STRETCHING:
+        field, urged = stretch_law(config, curve, grabs), 0.0
+    else:
+        field, urged = governed_law(config, curve, haptic_map)
     program = field.program()
     if config.walls:
         walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
         program = program + walls.program()
     limiter = ForceLimiter(period)
-    tank = energy_tank(config, curve, limiter, grabs)
+    tank = energy_tank(config, curve, limiter, grabs, urged)
     servo = Servo(
         plant=make_plant(world),
         port=phantom_port(world.model, world.data, period, config.cutoff),
