@@ -164,7 +164,7 @@ def draw(bench: Bench) -> Figure:
     force_ax.legend()
     taken = np.array([bench.taken(speed) for speed in SPEEDS])
     gate_ax.plot(1e3 * taken[:, 0], 100 * taken[:, 1], "o", ms=4, color=FIELD)
-    gate_ax.set(ylabel="time in the tube in which the river has the hand [%]")
+    gate_ax.set(ylabel="taken by the river [% of time in tube]")
     for ax in (force_ax, gate_ax):
         ax.axvspan(1e3 * least, 1e3 * greatest, color="#e4f1e6", lw=0)
         ax.set(xlabel="speed in mid-flight [mm/s]")
@@ -174,7 +174,7 @@ def draw(bench: Bench) -> Figure:
     slowest = np.interp(passage.phase, shares, bench.speeds[:, 0])
     slow_ax.plot(passage.t, 1e3 * slowest, color=CURVE, label="least speed [mm/s]")
     slow_ax.plot(passage.t, 100 * passage.along, color=FIELD, label="force [0.01 N]")
-    slow_ax.set(xlabel="time [s]", title="a hand that slows down in mid-flight")
+    slow_ax.set(xlabel="time [s]", title="a hand that slows down in flight")
     slow_ax.legend()
     return figure
 
