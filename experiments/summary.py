@@ -133,7 +133,7 @@ class SpeedSummary:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it; `lines` says it in five sentences, one more where the curve was bent, rivers changed, the tank acted."""
+    """All of it; `lines` says it in five sentences, one more for a bent curve, changes of river, a tank that acted."""
 
     path: PathSummary
     animation: AnimationSummary
