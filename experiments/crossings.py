@@ -11,14 +11,13 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.certificates.hand import HandImpedance
-from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER, Program
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from controllers.safety import ForceLimiter, limit_force
-from experiments.field_figures import DRAG, SPEED, straight_river
+from experiments.field_figures import SPEED, straight_river
 from experiments.modes import ADMISSION, HYSTERESIS, SIGMA
 from experiments.trial_simulation import trial_model
 from models.scene import PHANTOM, SceneConfig
@@ -109,15 +108,6 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
         limiter.limits(), limiter.fresh_memory(), p, force, river,
     )  # fmt: skip
     return Passage(p, force, river)
-
-
-def touching_river(degrees: float) -> River:
-    """River that touches the x axis at the origin of H, on an arc that turns by an angle in 0.12 m; 0: the axis."""
-    times = np.linspace(0.0, 1.6, 33)
-    s = SPEED * (times - 0.8)
-    bend = max(np.radians(degrees), 1e-9) / 0.12
-    points = np.stack((np.sin(bend * s) / bend, (1.0 - np.cos(bend * s)) / bend, np.zeros(33)), axis=1)
-    return River(Trajectory(times, points), drag=DRAG)
 
 
 def crossing_field(second: River, form: Form, alone: bool = False) -> Program:

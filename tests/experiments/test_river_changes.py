@@ -1,0 +1,35 @@
+"""Changes of river in a recording: told when the trace changes, neither earlier nor twice."""
+
+from pathlib import Path
+
+import numpy as np
+
+from experiments import changes
+from experiments.changes import RiverChange, river_changes
+from sim.recorder import Group, Recorder
+from sim.recording import Recording
+
+RIVER = np.repeat([-1.0, 0.0, -1.0, 0.0, 1.0, -1.0, 2.0, 1.0], [3, 5, 4, 6, 7, 2, 8, 1])
+
+
+def _recorded(path: Path, names: bool) -> Recording:
+    static: dict[str, str] = {"river_names": "level\nwave\nhigh"} if names else {}
+    with Recorder(path, {}, 0, {"ticks": Group(1000.0, {"t": (), "river": ()})}, static) as recorder:
+        recorder.append("ticks", {"t": np.arange(len(RIVER)) / 1000.0, "river": RIVER})
+    return Recording(path)
+
+
+def test_every_change_is_told_at_its_first_tick_however_the_rows_are_read(tmp_path: Path, monkeypatch) -> None:
+    expected = (
+        RiverChange(0.018, "level", "wave"), RiverChange(0.027, "wave", "high"), RiverChange(0.035, "high", "wave"),
+    )  # fmt: skip
+    with _recorded(tmp_path / "run.h5", True) as recording:
+        for rows in (1, 2, 7, 1000):
+            monkeypatch.setattr(changes, "ROWS", rows)
+            assert river_changes(recording) == expected
+    assert expected[0].line() == "t = 0.02 s: level → wave"
+
+
+def test_a_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
+    with _recorded(tmp_path / "run.h5", False) as recording:
+        assert river_changes(recording) == ()
