@@ -18,6 +18,7 @@ import tyro  # noqa: E402
 
 from controllers.certificates.hand import NO_HANDS, HandRange  # noqa: E402
 from controllers.errors import ControllerError  # noqa: E402
+from controllers.haptic_map.lifting import Room  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -198,6 +199,33 @@ class TeleArm:
 
 
 @dataclass(frozen=True)
+class Lift:
+    """Author a curve for every clip, and one haptic map with all of them, from the clips alone."""
+
+    clips: Positional[tuple[str, ...]]
+    """Names of embedded clips, or files."""
+    out: Path = Path("runs/map.npz")
+    """File to write the map into."""
+    room: Room = field(default_factory=Room)
+    cyclic: tuple[str, ...] = ()
+    """Clips that have to close; by default all those are closed curves that do."""
+    seed: int = 1
+    """Of the places from which the arrangement begins."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+    json: bool = False
+    """Print the report as JSON."""
+
+    def __call__(self) -> int:
+        """Lift, and say what came of it."""
+        from experiments.lift import lift_into
+
+        report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
+        print(json.dumps(report.to_json(), indent=2) if self.json else "\n".join(report.lines()))
+        return 0
+
+
+@dataclass(frozen=True)
 class Report:
     """Draw the figures and the page of a run again, from its recording."""
 
@@ -261,6 +289,7 @@ Command = (
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
+    | Annotated[Lift, tyro.conf.subcommand("lift")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
     | Annotated[TeleArm, tyro.conf.subcommand("arm")]
     | Annotated[Report, tyro.conf.subcommand("report")]
