@@ -26,6 +26,9 @@ class RunConfig:
     map : str
         Haptic map: "cylindrical", four clips round a cylinder; "composite", the lower body of one clip and the upper
         body blended between two; "rivers", a clip for each river; or a map's file (.npz), which has its own clips.
+    curve : str
+        Of a lifted map, the curve that the run begins on, and that a single one follows: a clip's name or number; it
+        is timed by the clip, so that `lap` and `radius` do not count. By default the first.
     user : {"relaxed", "trace", "push"}
         A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
     seconds : float
@@ -93,6 +96,7 @@ class RunConfig:
     clips: tuple[str, ...] = ()
     mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
     map: str = "cylindrical"
+    curve: str = ""
     user: Literal["relaxed", "trace", "push"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor
 from controllers.fields.instructions import Program
 from controllers.haptic_map.animation import ClipMap
@@ -74,8 +75,12 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 
-def governed_law(config: RunConfig, curve: Trajectory, haptic_map: ClipMap) -> tuple[Field, float]:
-    """Field of a mode over a curve, governed if the run says so, and the speed [m/s] to which it urges a hand.
+def governed_law(
+    config: RunConfig, curve: Trajectory, haptic_map: ClipMap, rivers: RiverBundle | None = None
+) -> tuple[Field, float]:
+    """Field of a mode over a curve, or over rivers of a map's own, governed if the run says so.
+
+    Returned with the speed [m/s] to which it urges a hand.
 
     Rivers of higher order are gated: `River.speeds` of each are those of its own curve, and a hand that misses them by
     more than `modes.GATE` of the curve's pace is not taken. To any other field the governor is added.
@@ -86,12 +91,12 @@ def governed_law(config: RunConfig, curve: Trajectory, haptic_map: ClipMap) -> t
         If there is no such field, or the map's poses are not the figure's.
     """
     if not config.governor:
-        return law(config, curve), 0.0
+        return law(config, curve, rivers=rivers), 0.0
     if config.mode == "rivers" and config.crossing != "sum":
-        return law(config, curve, lambda i, river: speeds_along(haptic_map, river, i)), 0.0
+        return law(config, curve, lambda i, river: speeds_along(haptic_map, river, i), rivers), 0.0
     speeds = speeds_along(haptic_map, curve)
     governor = Governor(curve, speeds, config.governor_drag, config.reach)
-    return Governed(law(config, curve), governor), float(speeds[:, 0].max())
+    return Governed(law(config, curve, rivers=rivers), governor), float(speeds[:, 0].max())
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from controllers.haptic_map.lifting import Lifting, Room, closes, lift
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.motion_features import Motion
 from experiments.in_betweens import MotionMeasure
+from experiments.map_files import MAP_SUFFIX, save_map
 from experiments.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
 from experiments.wiring import figure_legs, load_clips
 from models.errors import ModelError
@@ -186,7 +187,7 @@ def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), see
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
     haptic_map = Lifted(
         [(clip.poses, clip.fps) for clip in clips], [motion.closed for motion in motions], lifting.angles,
-        lifting.sites, figure_legs(figure_model()), labels,
+        lifting.sites, figure_legs(figure_model()), labels, transitions=np.array(lifting.transitions).reshape(-1, 5),
     )  # fmt: skip
     return LiftedClips(clips, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
 
@@ -209,3 +210,25 @@ def _motion(clip: Clip, name: str, must_close: bool) -> Motion:
 def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:
     """Measure a lifted map."""
     return LiftReport(lifted, measure_map(lifted.layout(), lifted.clips, np.random.default_rng(seed)))
+
+
+def lift_into(
+    names: Sequence[str], out: Path, room: Room, cyclic: Sequence[str], seed: int, overwrite: bool
+) -> LiftReport:
+    """Lift clips, write the map into a file, and measure it; arguments as in `lift_clips`.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `lift_clips`; or if the file is no .npz, or exists and is not to be replaced.
+    OSError
+        If it cannot be written.
+    """
+    if out.suffix != MAP_SUFFIX:
+        raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
+    if out.exists() and not overwrite:
+        raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
+    lifted = lift_clips(names, room, cyclic, seed)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_map(lifted.haptic_map, out)
+    return report_lift(lifted, seed)

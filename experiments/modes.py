@@ -44,8 +44,15 @@ class Field(Protocol):
         ...
 
 
-def law(config: RunConfig, curve: Trajectory, speeds_of: Callable[[int, Trajectory], Array] | None = None) -> Field:
-    """Field of a mode over the default curve; `speeds_of` gives the admissible speeds of rivers, see `River.speeds`.
+def law(
+    config: RunConfig,
+    curve: Trajectory,
+    speeds_of: Callable[[int, Trajectory], Array] | None = None,
+    rivers: RiverBundle | None = None,
+) -> Field:
+    """Field of a mode over a curve, or over rivers of a map's own.
+
+    `speeds_of` gives the admissible speeds of rivers, see `River.speeds`.
 
     Raises
     ------
@@ -59,7 +66,7 @@ def law(config: RunConfig, curve: Trajectory, speeds_of: Callable[[int, Trajecto
             curve, config.stiffness, config.damping, config.bunny_width, config.bunny_attraction, config.bunny_pace
         )
     if config.mode == "rivers":
-        return _rivers(config, curve, speeds_of)
+        return _rivers(config, rivers or default_rivers(config, curve), speeds_of)
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
@@ -78,10 +85,10 @@ def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
     return river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
 
 
-def _rivers(config: RunConfig, curve: Trajectory, speeds_of: Callable[[int, Trajectory], Array] | None) -> Field:
-    bundle = default_rivers(config, curve)
+def _rivers(config: RunConfig, bundle: RiverBundle, speeds_of: Callable[[int, Trajectory], Array] | None) -> Field:
     if config.crossing == "sum":
         return bundle
+    curve = bundle.rivers[0].curve
     pace, admission = curve.length / curve.duration, ADMISSION
     if speeds_of is not None:
         gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))

@@ -14,6 +14,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
@@ -21,6 +22,7 @@ from experiments.balance import balanced
 from experiments.budget import energy_tank
 from experiments.config import STRETCHING, RunConfig
 from experiments.governor import governed_law
+from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.modes import Field, default_rivers
 from experiments.stretch import law as stretch_law
@@ -139,11 +141,19 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     curve = Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
+    rivers = None
     if config.map.endswith(MAP_SUFFIX):
         haptic_map, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(haptic_map.names)}",)
+        if isinstance(haptic_map, Lifted):
+            curve = lifted_curve(haptic_map, config.curve)
+            rivers = lifted_rivers(haptic_map, config) if config.mode == "rivers" else None
     else:
         haptic_map = _haptic_map(config, clips, curve, world.figure)
+    if config.curve and not isinstance(haptic_map, Lifted):
+        raise ParameterError(
+            "only a lifted map has curves of clips; leave out --curve, or give --map a file of hvf lift"
+        )
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
     reference = make_reference(
@@ -158,7 +168,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     if config.mode in STRETCHING:
         field, urged = stretch_law(config, curve, grabs), 0.0
     else:
-        field, urged = governed_law(config, curve, haptic_map)
+        field, urged = governed_law(config, curve, haptic_map, rivers)
     program = field.program()
     if config.walls:
         walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
@@ -178,7 +188,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         figure=figure.state,
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
-    remarks += _pace_remark(config.lap, haptic_map.lap_seconds)
+    remarks += _pace_remark(curve.duration, haptic_map.lap_seconds)
     return Session(config, clips, remarks, curve, field, haptic_map, world, figure, servo)
 
 
@@ -242,13 +252,13 @@ def stylus_path(points: Array) -> Array:
 def _user(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Arm:
     pushes = config.pushes
     if config.user == "push" and not pushes:
-        laps = range(1, max(2, int(config.seconds / config.lap)))
-        pushes = tuple(push for lap in laps for push in lap_pushes(lap * config.lap, config.lap))
+        laps = range(1, max(2, int(config.seconds / curve.duration)))
+        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration))
     if config.user == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
     if config.user == "trace":
         times = np.arange(0.0, config.seconds, 0.01)
-        return Arm(path=curve.point(times % config.lap), period=0.01, pushes=pushes)
+        return Arm(path=curve.point(times), period=0.01, pushes=pushes)
     return Arm(pushes=pushes, grabs=grabs)
 
 

@@ -117,6 +117,9 @@ class Lifted(ClipMap):
         Of the clips; by default their numbers.
     margin : float
         Of the clamping [m].
+    transitions : Array, shape (k, 5), optional
+        Where a hand may change over: numbers of two clips, θ [rad], relative distances of pose and velocity. Kept
+        with the map; h does not depend on them.
 
     Raises
     ------
@@ -134,6 +137,7 @@ class Lifted(ClipMap):
         limbs: Sequence[Limb] = (),
         names: Sequence[str] = (),
         margin: float = 4e-3,
+        transitions: Array | None = None,
     ) -> None:
         m = len(clips)
         names = tuple(names) or tuple(str(i) for i in range(m))
@@ -148,6 +152,7 @@ class Lifted(ClipMap):
             raise ParameterError(f"all clips must have poses of one size, got {sizes}")
         self.margin = _checked_margin(margin)
         self.sites = checked_sites(sites, names, self.margin)
+        self.transitions = _checked_transitions(transitions, m)
         super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs, self._drifts)
 
     @property
@@ -197,7 +202,7 @@ class Lifted(ClipMap):
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
-        arrays = {"sites": self.sites, "margin": np.array([self.margin])}
+        arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": self.transitions}
         for name, clip in zip(self.names, self._placed, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
         return arrays | clip_arrays(self.clips, self.names, self.limbs)
@@ -220,6 +225,7 @@ class Lifted(ClipMap):
             kept_limbs(arrays),
             names,
             float(kept(arrays, "margin", (1,))[0]),
+            kept(arrays, "transitions", (None, 5)),
         )
 
     def _packed(self, limbs: Sequence[Limb]) -> Array:
@@ -282,3 +288,12 @@ def _checked_margin(margin: float) -> float:
     if not (np.isfinite(margin) and margin >= 1e-4):
         raise ParameterError(f"the margin of a lifted map must be 1e-4 m or more and finite, got {margin}")
     return float(margin)
+
+
+def _checked_transitions(transitions: Array | None, clips: int) -> Array:
+    array = np.array(np.zeros((0, 5)) if transitions is None else transitions, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 5 or not np.isfinite(array).all():
+        raise ParameterError(f"transitions must be finite and of shape (k, 5), got {array.shape}")
+    if not np.isin(array[:, :2], np.arange(clips)).all():
+        raise ParameterError(f"transitions are between clips 0 to {clips - 1}, got {array[:, :2].tolist()}")
+    return array
