@@ -66,7 +66,7 @@ def law(
             curve, config.stiffness, config.damping, config.bunny_width, config.bunny_attraction, config.bunny_pace
         )
     if config.mode == "rivers":
-        return _rivers(config, rivers or default_rivers(config, curve), speeds_of)
+        return _rivers(config, rivers or default_rivers(config, curve), _pace(curve, rivers), speeds_of)
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
@@ -85,11 +85,19 @@ def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
     return river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
 
 
+def _pace(curve: Trajectory, rivers: RiverBundle | None) -> float:
+    """Speed that rivers are told apart by [m/s]: the default curve's, or the greatest, at which a hand is taken too."""
+    if rivers is None:
+        return curve.length / curve.duration
+    curves = [river.curve for river in rivers.rivers]
+    speeds = [np.linalg.norm(c.velocity(np.linspace(c.start, c.end, 512)), axis=1).max() for c in curves]
+    return float(max(speeds))
+
+
 def _rivers(config: RunConfig, bundle: RiverBundle, speeds_of: Callable[[int, Trajectory], Array] | None) -> Field:
     if config.crossing == "sum":
         return bundle
-    curve = bundle.rivers[0].curve
-    pace, admission = curve.length / curve.duration, ADMISSION
+    admission = ADMISSION
     if speeds_of is not None:
         gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))
         bundle, admission = replace(bundle, rivers=gated), GATE

@@ -151,9 +151,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     else:
         haptic_map = _haptic_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(haptic_map, Lifted):
-        raise ParameterError(
-            "only a lifted map has curves of clips; leave out --curve, or give --map a file of hvf lift"
-        )
+        raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
     reference = make_reference(
