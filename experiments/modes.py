@@ -94,7 +94,9 @@ def _pace(curve: Trajectory, rivers: RiverBundle | None) -> float:
     return float(max(speeds))
 
 
-def _rivers(config: RunConfig, bundle: RiverBundle, speeds_of: Callable[[int, Trajectory], Array] | None) -> Field:
+def _rivers(
+    config: RunConfig, bundle: RiverBundle, pace: float, speeds_of: Callable[[int, Trajectory], Array] | None
+) -> Field:
     if config.crossing == "sum":
         return bundle
     admission = ADMISSION
