@@ -8,7 +8,7 @@ jumps as soon as two are half a turn apart, whatever their weights. So a somersa
 
 With r_i = q⁻¹ ⊗ q_i = (s_i, v_i), the mean satisfies g = Σ w_i s_i v_i = 0 and A = Σ w_i (s_i² I − v_i v_iᵀ), which
 is λI − M seen in the tangent space of q, is positive definite: that proves that the iteration found the largest
-eigenvalue.
+eigenvalue. All of this holds for weights of which some are negative too: M need not be definite.
 """
 
 import numpy as np
@@ -76,6 +76,9 @@ def _dominant(unit: Array, weights: Array, q: Quat) -> None:
     """Eigenvector of the largest eigenvalue of M by squaring it 24 times: slow, and sure."""
     m = np.zeros((4, 4))
     for i in range(unit.shape[0]):
+        # Negative weights are made up for by a multiple of the identity, which turns no eigenvector.
+        for j in range(4):
+            m[j, j] += max(-weights[i], 0.0)
         for j in range(4):
             for k in range(4):
                 m[j, k] += weights[i] * unit[i, j] * unit[i, k]
@@ -109,7 +112,7 @@ def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
     unit : Array, shape (m, 4)
         Unit quaternions wxyz, of any sign.
     weights : Array, shape (m,)
-        Not negative, of sum 1.
+        Of sum 1; negative ones are taken as long as M has one largest eigenvalue.
     q : Quat
         Written: the mean, with the sign of the heaviest quaternion.
     """
@@ -122,7 +125,8 @@ def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
         dot = 0.0
         for j in range(4):
             dot += unit[i, j] * unit[heaviest, j]
-        w = weights[i] if dot >= 0.0 else -weights[i]
+        # A negative weight would only spoil the beginning, which without it is never zero.
+        w = max(weights[i], 0.0) if dot >= 0.0 else -max(weights[i], 0.0)
         for j in range(4):
             q[j] += w * unit[i, j]
     norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)

@@ -17,6 +17,7 @@ greatest values there, so their derivatives vanish, and a hand that leaves a cur
 
 import numpy as np
 from numba import njit
+from scipy.spatial import KDTree
 
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.state import Array, IntArray
@@ -27,7 +28,7 @@ _NEAR = 1e-7  # [m] ε
 _MOST = 0.35  # E₀
 _REACH = 2.4  # R over the radius of a site's own cell: beyond all whose cells touch it, which are within 2
 _RIDGE = 0.01  # λ times the mean reach
-_GRID = 24  # steps of the domain in which cells of sites are measured
+_GRID = 8.0  # steps of the domain, for the root of the number of clips, in which cells of sites are measured
 _ROWS, _CLIPS, _CELLS, _LAMBDA, _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _OFFSETS = range(9)
 
 
@@ -180,15 +181,15 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
 
 def reaches(sites: Array, r_range: tuple[float, float], z_range: tuple[float, float]) -> Array:
     """R of sites (rows, m, 2) in a domain [m], shape (rows, m): a multiple of the radius of each site's own cell."""
-    r, z = (np.linspace(low, high, _GRID) for low, high in (r_range, z_range))
-    grid = np.stack(np.meshgrid(r, z, indexing="ij"), axis=-1).reshape(-1, 1, 2)
+    steps = int(np.clip(_GRID * np.sqrt(sites.shape[1]), 24, 96))
+    r, z = (np.linspace(low, high, steps) for low, high in (r_range, z_range))
+    grid = np.stack(np.meshgrid(r, z, indexing="ij"), axis=-1).reshape(-1, 2)
     radius = np.zeros(sites.shape[:2])
     for row, places in enumerate(sites):
-        distance = np.linalg.norm(grid - places, axis=2)
-        np.maximum.at(radius[row], distance.argmin(axis=1), distance.min(axis=1))
-    # A site between two steps of the grid still has neighbours.
-    step = float(np.hypot(r[1] - r[0], z[1] - z[0]))
-    return _REACH * np.maximum(radius, 2.0 * step)
+        distance, nearest = KDTree(places).query(grid)
+        np.maximum.at(radius[row], nearest, distance)
+    # No place is farther than half a diagonal from a step of the grid.
+    return _REACH * (radius + 0.5 * float(np.hypot(r[1] - r[0], z[1] - z[0])))
 
 
 def packed_neighbours(sites: Array, r_range: tuple[float, float], z_range: tuple[float, float]) -> Array:

@@ -32,6 +32,20 @@ def test_it_is_the_dominant_eigenvector_for_any_spread(spread):
             assert abs(_mean(unit, weights) @ vectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.3, 1.0, 3.0])
+def test_with_negative_weights_it_is_still_the_eigenvector_of_the_largest_eigenvalue(spread):
+    told = 0
+    for _ in range(200):
+        unit, weights = _case(spread)
+        weights[:2] -= RNG.uniform(0.0, 0.5, 2)
+        weights /= weights.sum()
+        values, vectors = np.linalg.eigh(np.einsum("i,ij,ik->jk", weights, unit, unit))
+        if weights.max() < 3.0 and values[-1] - values[-2] > 1e-2:
+            told += 1
+            assert abs(_mean(unit, weights) @ vectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
+    assert told > 50
+
+
 def test_it_minimises_the_chordal_distance():
     for _ in range(20):
         unit, weights = _case(0.8)
