@@ -1,0 +1,99 @@
+"""Real clips lifted: h along each clip's curve is the clip, at every frame, alone and among others."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.frames import CLOSES, closing_gap
+from controllers.haptic_map.lifted import Lifted
+from experiments.wiring import figure_legs
+from models.errors import ModelError
+from models.mocap.clip import Clip, pose_difference
+from models.mocap.library import embedded, embedded_names, load_clip
+from models.scene import SceneConfig
+from sim.reference import poses_along
+from sim.world import World
+
+TURN = 2.0 * np.pi
+LEGS = figure_legs(World(SceneConfig()).figure)
+EMBEDDED = [embedded(name) for name in embedded_names()]
+MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
+
+
+def lifted(clips):
+    """Clips on a lattice of curves that wander; closed where they close, all at an uneven pace."""
+    m, side = len(clips), int(np.ceil(np.sqrt(len(clips))))
+    lap, k = np.arange(64)[:, None] * TURN / 64, np.arange(m)
+    r, z = 0.036 + 0.012 * (k % side), -0.012 + 0.012 * (k // side)
+    sites = np.stack([r + 2e-3 * np.sin(lap + k), z + 2e-3 * np.cos(2.0 * lap + k)], axis=-1)
+    closed = [clip.n_frames >= 4 and closing_gap(clip.poses) <= CLOSES for clip in clips]
+    angles = []
+    for i, (clip, closes) in enumerate(zip(clips, closed, strict=True)):
+        s = np.linspace(0.0, 1.0, clip.n_frames)
+        s += 0.02 * np.sin(TURN * s)
+        angles.append((0.6 * i) % 6.0 + TURN * s if closes else 0.2 + (TURN - 0.8) * s)
+    motions = [(clip.poses, clip.fps) for clip in clips]
+    return Lifted(motions, closed, angles, sites, LEGS, [f"{i} {clip.name}" for i, clip in enumerate(clips)])
+
+
+def worst_at_frames(h_map):
+    """Largest difference [m, rad] between h along the curves and the clips, at all frames."""
+    kind, params, _ = h_map.compiled()
+    worst = 0.0
+    for i, (poses, fps) in enumerate(h_map.clips):
+        points = h_map.curve(i).point(np.arange(len(poses)) / fps)
+        stylus = np.hstack([points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))])
+        shown = np.empty_like(poses)
+        poses_along(kind, params, h_map.compiled().memory, stylus, shown)
+        worst = max(worst, float(np.abs(pose_difference(h_map.placed(i), shown)).max()))
+        # Moved over the ground as a whole, and not changed otherwise.
+        joints = pose_difference(poses, h_map.placed(i))
+        assert np.abs(joints[:, 6:]).max() < 1e-9
+        assert np.ptp(np.linalg.norm(h_map.placed(i)[:, :2] - h_map.placed(i)[0, :2], axis=1)) == pytest.approx(
+            np.ptp(np.linalg.norm(poses[:, :2] - poses[0, :2], axis=1)), abs=1e-9
+        )
+    return worst
+
+
+@pytest.mark.parametrize("clip", EMBEDDED, ids=lambda clip: clip.name)
+def test_an_embedded_clip_alone_is_exact_at_every_frame(clip):
+    assert worst_at_frames(lifted([clip])) < 1e-9
+
+
+@pytest.mark.parametrize("clip", EMBEDDED, ids=lambda clip: clip.name)
+def test_an_embedded_clip_cut_open_is_exact_at_every_frame(clip):
+    cut = Clip(clip.poses[: round(0.7 * clip.n_frames)], clip.fps, clip.name)
+    assert not lifted([cut]).closed[0]
+    assert worst_at_frames(lifted([cut])) < 1e-9
+
+
+def test_all_embedded_clips_together_and_one_twice_distorted_are_exact_at_every_frame():
+    assert worst_at_frames(lifted(EMBEDDED)) < 1e-9
+    walk = EMBEDDED[embedded_names().index("walk")]
+    poses = walk.poses.copy()
+    poses[:, 2] += 0.05 * np.sin(np.linspace(0.0, TURN, len(poses)))
+    poses[:, 7:11] = poses[:, 11:15]
+    assert worst_at_frames(lifted([*EMBEDDED, Clip(poses, walk.fps, "distorted")])) < 1e-9
+
+
+def recorded():
+    """Clips of all motion files of the shared collection that can be read on the figure."""
+    clips = []
+    for path in sorted(MOCAP.rglob("*")):
+        if path.suffix.lower() in (".bvh", ".amc", ".txt", ".json"):
+            try:
+                clips.append(load_clip(path))
+            except ModelError:
+                continue
+    return [clip for clip in clips if clip.n_frames > 1]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not MOCAP.is_dir(), reason="no shared motion capture beside the project")
+def test_recorded_clips_alone_and_ten_together_are_exact_at_every_frame():
+    clips = recorded()
+    assert len(clips) >= 10
+    for clip in clips:
+        assert worst_at_frames(lifted([clip])) < 1e-6
+    assert worst_at_frames(lifted(clips[:10])) < 1e-6
