@@ -19,6 +19,7 @@ from controllers.fields.follow import Follow
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.safety import ForceLimiter
 from experiments.budget import fastest, tank_for
+from experiments.compiling import compile_once
 from experiments.config import ArmConfig
 from experiments.figures import STYLE
 from experiments.report import write_report
@@ -27,7 +28,6 @@ from experiments.wiring import lap_pushes
 from models.phantom.parameters import PREMIUM_1_5
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm_model
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT
-from sim.compiled import is_cached
 from sim.devices.phantom_port import phantom_port
 from sim.loop import Loop, groups, tick_channels
 from sim.plant import make_hand, make_plant
@@ -210,8 +210,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     console = Console(stderr=True)
     check_folder(out, overwrite)
     servo, world, curve = wire_arm(config)
-    if not is_cached():
-        console.print("Compiling the servo loop; this happens once for each version of the code.")
+    compile_once(console, "arm")
     out.mkdir(parents=True, exist_ok=True)
     for name in (RECORDING, SUMMARY, REPORT, FIGURE):
         (out / name).unlink(missing_ok=True)

@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.compiling import compile_once
 from experiments.config import STRETCHING, RunConfig
 from experiments.measures import BLOCK_FRAMES, summarise
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
@@ -26,7 +27,6 @@ from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model
 from sim.clock import RealTime
-from sim.compiled import is_cached
 from sim.errors import SimError
 from sim.loop import BLOCK_SECONDS, Loop, groups, record_into
 from sim.recorder import Recorder
@@ -74,11 +74,10 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     console = Console(stderr=True)
     check_folder(out, overwrite)
     clips, remarks = load_clips(config.clips)
+    compile_once(console)
     session = wire(config, clips, remarks)
     for remark in session.remarks:
         console.print(remark, highlight=False)
-    if not is_cached():
-        console.print("Compiling the servo loop; this happens once for each version of the code.")
     clear_folder(out)
     with Recorder(
         out / RECORDING, config_dict(config), config.seed, groups(session.servo), session.static()
