@@ -1,19 +1,28 @@
 """Alignment of loops in time: a shift of the phase, then, where it pays, a smooth monotone warp that closes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from controllers.haptic_map.limb_ends import end_poses
+from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop
 from controllers.state import Array, IntArray
 
 _SAMPLES = 128
 _BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
 _STEEPEST = 0.25  # and changes the pace by at most a quarter
+_STANCE = 2.0  # what standing counts beside rotations
+_LOW, _SLOW = 0.02, 0.5  # [m], [m a lap] an end so high, or so fast, stands by half
 _WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it bends flights and steps for nothing
 
 
-def _features(loop: Loop) -> Array:
-    """Rotation matrices of root and joints, which know no sign, and the root's height: shape (samples, features)."""
+def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
+    """Rotation matrices of root and joints, which know no sign, the root's height, and which ends stand.
+
+    Shape (samples, features).
+    """
     channels = loop.channels(np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES))
     w, x, y, z = np.moveaxis(channels[:, 3:].reshape(_SAMPLES, -1, 4), -1, 0)
     matrix = np.stack(
@@ -21,7 +30,19 @@ def _features(loop: Loop) -> Array:
          y * z - w * x, y * z + w * x],
         axis=-1,
     )  # fmt: skip
-    return np.concatenate([2.0 * matrix.reshape(_SAMPLES, -1), channels[:, 2:3]], axis=1)
+    stance = [_STANCE * _stands(channels, loop.drift, limb)[:, None] for limb in limbs]
+    return np.concatenate([2.0 * matrix.reshape(_SAMPLES, -1), channels[:, 2:3], *stance], axis=1)
+
+
+def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
+    """From 0 to 1, how much an end stands: low, and slow over the ground; shape (samples,)."""
+    place, _, height = (part[:, 0] for part in end_poses(channels[:, None], limb))
+    ahead, behind = (np.roll(place, shift, axis=0) for shift in (-1, 1))
+    across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
+    # Over the ground an end moves with the drift of its clip, and in its frame.
+    speed = np.linalg.norm(0.5 * _SAMPLES * (ahead - behind)[:, :2] + drift[:2] + across, axis=1)
+    low = 1.0 / (1.0 + ((height - height.min()) / _LOW) ** 2)
+    return low / (1.0 + (speed / _SLOW) ** 2)
 
 
 def _best_shift(reference: Array, features: Array) -> int:
@@ -79,7 +100,7 @@ def _lead(reference: Array, features: Array) -> Array:
     return lead / _SAMPLES if left < _WORTH * before else np.zeros(_SAMPLES)
 
 
-def aligned_channels(loops: list[Loop], samples: int) -> Array:
+def aligned_channels(loops: list[Loop], samples: int, limbs: Sequence[Limb] = ()) -> Array:
     """Remainders of all loops at equal steps of the common phase.
 
     The first loop keeps its own phase; every other one is shifted and warped to it.
@@ -90,17 +111,19 @@ def aligned_channels(loops: list[Loop], samples: int) -> Array:
         Clips as closed loops.
     samples : int
         N, phases 0, 1/N, … of the lap.
+    limbs : sequence of Limb
+        Limbs whose standing is aligned to standing.
 
     Returns
     -------
     Array, shape (N, m, nq)
         Signs of quaternions agree with the first loop's as far as they can.
     """
-    reference = _features(loops[0])
+    reference = _features(loops[0], limbs)
     phase = np.arange(samples) / samples
     channels = [loops[0].channels(phase, np.zeros(samples))]
     for loop in loops[1:]:
-        features = _features(loop)
+        features = _features(loop, limbs)
         shift = _best_shift(reference, features)
         lead = _lead(reference, np.roll(features, -shift, axis=0))
         knots = np.arange(_SAMPLES + 1) / _SAMPLES

@@ -11,6 +11,7 @@ from controllers.haptic_map.blending import packed_blend
 from controllers.haptic_map.combination import fresh_lap
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop, checked_clip, closed_loop
+from controllers.haptic_map.strides import in_step
 from controllers.state import Array, Pose
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
@@ -104,7 +105,8 @@ class AnimationMap(ClipMap):
         It: (params, x, memory, pose, jacobian).
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second; a pose is root position, root quaternion, then joint quaternions (wxyz).
-        Clips that do not close are closed (`closed_loop`), and all are aligned to the first in time (`alignment`).
+        Clips that do not close are closed (`closed_loop`), travelling ones brought in step (`strides`), and all
+        are aligned to the first in time (`alignment`).
     numbers : sequence of float
         What the kernel reads before the blend's own parameters.
     second_group : sequence of int
@@ -130,7 +132,8 @@ class AnimationMap(ClipMap):
         poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
-        self.loops: list[Loop] = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
+        loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
+        self.loops: list[Loop] = in_step(loops)
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):

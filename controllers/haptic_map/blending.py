@@ -97,7 +97,7 @@ def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Seque
         If a limb has a joint that the poses do not have.
     """
     drifts = np.stack([loop.drift for loop in loops])
-    channels = with_ends(aligned_channels(loops, samples), drifts, limbs)
+    channels = with_ends(aligned_channels(loops, samples, limbs), drifts, limbs)
     rotations = len(groups)
     rows = control_points(channels, _closing_signs(channels, rotations)).ravel()
     return np.concatenate([[samples, len(loops)], drifts.ravel(), packed_figure(groups, limbs), rows])

@@ -11,25 +11,25 @@ _AXIS = 1e-3  # [m] nearer to the axis the derivative stops growing
 
 
 @njit
-def eased(s: float) -> tuple[float, float]:
+def eased(s: float, margin: float = _MARGIN) -> tuple[float, float]:
     """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between but for the eased edges; C²."""
     if s <= 0.0:
         return 0.0, 0.0
     if s >= 1.0:
         return 1.0, 0.0
-    slope = 1.0 / (1.0 - _MARGIN)
-    edge = min(s, 1.0 - s) / _MARGIN
+    slope = 1.0 / (1.0 - margin)
+    edge = min(s, 1.0 - s) / margin
     if edge >= 1.0:
-        return slope * (s - 0.5 * _MARGIN), slope
+        return slope * (s - 0.5 * margin), slope
     # Integral of the smooth step 3x² − 2x³.
-    u = slope * _MARGIN * (edge**3 - 0.5 * edge**4)
+    u = slope * margin * (edge**3 - 0.5 * edge**4)
     return (u if s < 0.5 else 1.0 - u), slope * edge * edge * (3.0 - 2.0 * edge)
 
 
 @njit
-def blend_weight(x: float, low: float, high: float) -> tuple[float, float]:
+def blend_weight(x: float, low: float, high: float, margin: float = _MARGIN) -> tuple[float, float]:
     """Weight of what lies at the upper end of an interval, and its derivative by x."""
-    u, slope = eased((x - low) / (high - low))
+    u, slope = eased((x - low) / (high - low), margin)
     return u, slope / (high - low)
 
 

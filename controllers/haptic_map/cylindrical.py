@@ -21,7 +21,8 @@ from controllers.state import Array
 CYLINDRICAL = 1
 _CLIPS = 4
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
-_NODES = 9  # of the corrections' table, along each weight
+_NODES = 9  # of the corrections' table, across the blend each way
+_EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
 _ROWS = 512  # of it round the lap, at most
 
 
@@ -42,9 +43,11 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     if size > 0:
         table = params[_TABLE : _TABLE + size]
         d = np.empty((4, table_channels(table)))
-        correction(table, angle, a, b, d)
-        d[2] *= a_slope
-        d[3] *= b_slope
+        i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
+        j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
+        correction(table, angle, i, j, d)
+        d[2] *= i_slope
+        d[3] *= j_slope
     blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
@@ -92,14 +95,17 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
         super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
         self._numbers = numbers
-        b, a = np.meshgrid(*[np.linspace(0.0, 1.0, _NODES)] * 2)
+        share = np.linspace(0.0, 1.0, 4001)
+        nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [eased(at, _EDGE)[0] for at in share], share)
+        z, r = np.meshgrid(nodes, nodes)
+        self._nodes = np.stack([r.ravel(), z.ravel()], axis=-1)
+        a, b = (np.array([eased(at)[0] for at in way]) for way in self._nodes.T)
         shares = [(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b]
         self.mixtures: Array = np.stack(shares, axis=-1).reshape(-1, _CLIPS)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
-        self._nodes = np.stack([a.ravel(), b.ravel()], axis=-1)
         if limbs:
             rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
-            channels = with_ends(aligned_channels(self.loops, rows), self.drifts, limbs)
+            channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
             self._correct(foot_corrections(channels, self.drifts, limbs, self.mixtures))
 
     def _correct(self, values: Array) -> None:
@@ -111,11 +117,8 @@ class Cylindrical(AnimationMap):
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
         r_min, r_max, z_min, z_max = self._numbers
-        share = np.linspace(0.0, 1.0, 2001)
-        weight = [eased(x)[0] for x in share]
-        a, b = np.interp(self._nodes, weight, share).T
-        r, z = r_min + a * (r_max - r_min), z_min + b * (z_max - z_min)
-        x = np.zeros((len(a), len(angles), 7))
+        r, z = r_min + self._nodes[:, 0] * (r_max - r_min), z_min + self._nodes[:, 1] * (z_max - z_min)
+        x = np.zeros((len(r), len(angles), 7))
         x[..., 0], x[..., 1] = r[:, None] * np.cos(angles), r[:, None] * np.sin(angles)
         x[..., 2], x[..., 3] = z[:, None], 1.0
         return x

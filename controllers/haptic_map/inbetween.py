@@ -1,4 +1,4 @@
-r"""What a blend is corrected by between its clips: a smooth table over the lap and the two weights of a cylinder.
+r"""What a blend is corrected by between its clips: a smooth table over the lap and two coordinates across the blend.
 
 .. math:: D(\theta, a, b) = \textstyle\sum_{ijk} B_i(\theta)\, B_j(a)\, B_k(b)\, C_{ijk}
 
@@ -45,7 +45,7 @@ def correction(table: Array, angle: float, a: float, b: float, d: Array) -> None
     table : Array
         `packed_table`.
     angle, a, b : float
-        θ in [0, 2π], and weights in [0, 1].
+        θ in [0, 2π], and coordinates in [0, 1].
     d : Array, shape (4, channels)
         Written: D [m, rad], and its derivatives by θ, a and b.
     """

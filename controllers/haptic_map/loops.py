@@ -106,16 +106,19 @@ class Loop:
         Angle [rad] by which the joint that closes worst did not close in the clip, and was made to.
     splines : list of CubicSpline
         ρ's position, then root and joint rotations in R⁴, each of period 1 or 2 (when it comes back as −q).
+    share : float
+        How much of the splines' period 1 a lap goes round (see `strides`).
     """
 
     drift: Array
     duration: float
     gap: float
     splines: list[CubicSpline]
+    share: float = 1.0
 
     def channels(self, s: Array, lead: Array) -> Array:
         """Remainder at phases s, all rotations of unit length, shape (n, nq); the root moved by exp(lead ξ)."""
-        parts = [spline(np.mod(s, float(spline.x[-1]))) for spline in self.splines]
+        parts = [spline(np.mod(self.share * s, float(spline.x[-1]))) for spline in self.splines]
         rotations = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts[1:]]
         shift, angle = plane_exponential(lead[:, None] * self.drift)
         parts[0][:, :2] = turned(angle, parts[0][:, :2]) + shift

@@ -1,0 +1,97 @@
+"""Blends of the embedded clips: feet that stand do not slide nor sink, and the floor can give what they ask for."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from experiments.balance import nearest_supported
+from experiments.config import FIGURE_CLIPS, RunConfig
+from experiments.wiring import load_clips, wire
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.mocap.balance import supported
+from models.mocap.clip import pose_difference
+from models.mocap.floor_forces import Floor, residual
+from sim.reference import poses_along
+
+TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
+CONFIG = RunConfig(seconds=1.0)
+ROWS = 160
+MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
+
+
+@pytest.fixture(scope="module")
+def maps():
+    return {
+        clips: wire(RunConfig(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
+        for clips in (FIGURE_CLIPS, ("walk", "cheer", "angry", "squat_dance"), ("walk", "run"))
+    }
+
+
+def laps(h_map, r, z, rows=ROWS, count=1.0):
+    """Poses of a hand that goes round evenly, at a place of the half plane in units of the reach."""
+    angles = 2 * np.pi * (np.arange(int(rows * count)) + 0.5) / rows
+    radius = CONFIG.radius + r * CONFIG.reach
+    x = np.zeros((len(angles), 7))
+    x[:, 0], x[:, 1], x[:, 2], x[:, 3] = radius * np.cos(angles), radius * np.sin(angles), z * CONFIG.reach, 1.0
+    poses, (kind, params, memory) = np.empty((len(x), h_map.nq)), h_map.compiled()
+    poses_along(kind, params, memory.copy(), x, poses)
+    return poses
+
+
+def soles(poses):
+    """Lowest points of the contact spheres, shape (n, 8, 3)."""
+    model = figure_model()
+    data, places = mujoco.MjData(model), []
+    for pose in poses:
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        places.append([data.geom(name).xpos - [0.0, 0.0, CONTACT_RADIUS] for name in FOOT_CONTACTS])
+    return np.array(places)
+
+
+def slide(places):
+    """Largest way over the floor of a sphere while it touches, from where it came down [m]."""
+    worst, start = 0.0, [None] * places.shape[1]
+    for frame in places:
+        for k, place in enumerate(frame):
+            if place[2] >= TOUCH:
+                start[k] = None
+            else:
+                start[k] = place[:2] if start[k] is None else start[k]
+                worst = max(worst, float(np.linalg.norm(place[:2] - start[k])))
+    return worst
+
+
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, ("walk", "cheer", "angry", "squat_dance"), ("walk", "run")])
+def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
+    for r, z in MIXTURES:
+        places = soles(laps(maps[clips], r, z, count=1.5))
+        assert slide(places) < 0.03, (r, z)
+        assert places[..., 2].min() > -0.008, (r, z)
+
+
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, ("walk", "cheer", "angry", "squat_dance")])
+def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips):
+    floor, step, shares = Floor(), CONFIG.lap / ROWS, []
+    for r, z in MIXTURES:
+        poses = laps(maps[clips], r, z, count=1.0 + 4 / ROWS)
+        change = pose_difference(poses[:-1], poses[1:]) / step
+        v, a, q = (change[1:] + change[:-1]) / 2, np.diff(change, axis=0) / step, poses[1:-1]
+        demand = floor.demand(q, v, a)
+        left = residual(demand, floor.grip(demand, soles(q)[..., 2] < PUSHES))[:, :3] / floor.body_weight
+        shares.append(float(np.sqrt((left**2).sum(axis=1).mean())))
+    # Hicks et al. 2015: good below 5 %.
+    assert max(shares) < 0.05
+    assert np.mean(shares) < 0.025
+
+
+def test_the_nearest_supported_point_is_that_of_the_convex_hull():
+    rng = np.random.default_rng(0)
+    for touching in range(9):
+        contacts = rng.uniform(-0.2, 0.2, (40, 8, 3))
+        contacts[..., 2] = np.where(np.arange(8) < touching, 0.0, 0.1)
+        points = rng.uniform(-0.4, 0.4, (40, 2))
+        found = nearest_supported(points, contacts, 0.8)
+        raised = np.add(contacts, [0.0, 0.0, CONTACT_RADIUS])
+        expected = [supported(point, feet, 0.8) for point, feet in zip(points, raised, strict=True)]
+        np.testing.assert_allclose(found, expected, atol=1e-9)
