@@ -35,11 +35,12 @@ def turned(rotation: Array, vector: Array, out: Array) -> None:
 
 
 @njit
-def shorten(vector: Array, longest: float) -> None:
-    """Scale a vector of shape (3,) down to a length, in place."""
+def shorten(vector: Array, longest: float) -> bool:
+    """Scale a vector of shape (3,) down to a length, in place; returns whether it was longer."""
     length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if length > longest:
         vector *= longest / length
+    return length > longest
 
 
 @njit
@@ -67,8 +68,10 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
         p, t = 3 + 4 * body, 3 + 3 * body
         rotation_error(s.qpos[p : p + 4], q_r[p : p + 4], error)
         turned(error, v_r[t : t + 3], moved)
+        size = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+        pull = rate**2 * min(1.0, gains.joint_reach / max(size, 1e-12))
         for i in range(3):
-            a[t + i] = 2.0 * rate * (moved[i] - s.qvel[t + i]) + rate**2 * error[i]
+            a[t + i] = 2.0 * rate * (moved[i] - s.qvel[t + i]) + pull * error[i]
         if body == 0:
             shorten(a[3:6], gains.root_turn)
         turned(error, a_r[t : t + 3], moved)

@@ -16,6 +16,9 @@ class FigureGains(NamedTuple):
     ----------
     joint_rate, root_rate : float
         ω of the critically damped feedback on joints and root [1/s].
+    joint_reach : float
+        Largest error of a joint that the feedback acts on [rad]: beyond, it comes back at a steady speed, ω/2 times
+        this, and its motors have torque left to stop it with.
     root_pull, root_turn : float
         Largest acceleration that feedback may ask of the root [m/s²], [rad/s²]: a late landing is absorbed.
     linear_limit, angular_limit : float
@@ -34,6 +37,7 @@ class FigureGains(NamedTuple):
 
     joint_rate: float = 40.0
     root_rate: float = 40.0
+    joint_reach: float = 0.15
     root_pull: float = 30.0
     root_turn: float = 300.0
     linear_limit: float = 40.0

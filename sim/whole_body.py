@@ -41,8 +41,8 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     s.yielding[:] = 0
     for plan in range(_PLANS):
         s.acceleration[:6] = s.wanted_root
-        _plan_contacts(s, support)
-        _let_root_fall(s, support)
+        met = _plan_contacts(s, support)
+        _let_root_fall(s, support if met else 0.0)
         if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
             break
     _make_up_for_legs(s, support)
@@ -86,15 +86,18 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
 
 
 @njit
-def _plan_contacts(s: FigureState, support: float) -> None:
-    """Contact forces and residual that meet the root's demand (M a* + c)_r, and the generalised forces they make."""
+def _plan_contacts(s: FigureState, support: float) -> bool:
+    """Contact forces and residual that meet the root's demand (M a* + c)_r, and the generalised forces they make.
+
+    Returns whether they meet it: not if the residual was beyond its bounds.
+    """
     R, w, y = s.xmat[0], s.wrench, s.residual
     w[:] = 0.0
     s.force[:] = 0.0
     s.given[:] = 0.0
     if s.share.max() <= 0.0:
         y[:] = 0.0
-        return
+        return False
     for i in range(6):
         s.demand[i] = s.bias[i] - s.passive[i]
         for k in range(s.acceleration.shape[0]):
@@ -118,14 +121,15 @@ def _plan_contacts(s: FigureState, support: float) -> None:
     for i in range(3):
         w[i] = y[i] * s.weight
         w[3 + i] = (R[i] * y[3] + R[3 + i] * y[4] + R[6 + i] * y[5]) * s.weight * _LEVER
-    _bound_residual(s, support)
+    return not _bound_residual(s, support)
 
 
 @njit
-def _bound_residual(s: FigureState, support: float) -> None:
-    """Shorten the residual to its bounds, which shrink with the support."""
-    shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
-    shorten(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
+def _bound_residual(s: FigureState, support: float) -> bool:
+    """Shorten the residual to its bounds, which shrink with the support; returns whether it was beyond them."""
+    force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
+    moment = shorten(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
+    return force or moment
 
 
 @njit
@@ -145,7 +149,11 @@ def _add_contact(s: FigureState, c: int) -> None:
 
 @njit
 def _let_root_fall(s: FigureState, support: float) -> None:
-    """Without support the root's acceleration is what the forces make it: M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j."""
+    """Without support the root's acceleration is what the forces make it: M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
+
+    So it is where the residual is at its bounds: torques planned for an acceleration that does not come throw the limbs
+    about.
+    """
     if support >= 1.0:
         return
     a, falling, block = s.acceleration, s.demand, s.block[:6, :6]
