@@ -56,7 +56,8 @@ class Cylindrical(AnimationMap):
 
     θ = atan2(y, x) is the phase: one lap of the hand is one lap of every clip. The weights w_i(r, z) blend the four
     clips bilinearly and ease in at the edges (C²); beyond them they stay, so no limb is ever extrapolated. How poses
-    are blended is told in `blending`.
+    are blended is told in `blending`. With limbs, in-betweens are corrected by a table (`inbetween`): ends move while
+    they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
 
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
     the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
@@ -73,6 +74,13 @@ class Cylindrical(AnimationMap):
         Intervals [m] over which the clips blend; r_min > 0.
     limbs : sequence of Limb
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+
+    Attributes
+    ----------
+    mixtures : Array, shape (k, 4)
+        Weights of the clips at the nodes of the table.
+    drifts : Array, shape (4, 3)
+        ξ of each clip.
 
     Raises
     ------
