@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from models.scene import SceneConfig
-from sim.users.intent import Grab, Push
+from sim.users.intent import Grab, Push, Turn
 
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
 MAP_CLIPS = {"composite": ("squat_dance", "angry", "cheer"), "rivers": ("squat_dance", "cheer", "angry")}
@@ -29,8 +29,11 @@ class RunConfig:
     curve : str
         Of a lifted map, the curve that the run begins on, and that a single one follows: a clip's name or number; it
         is timed by the clip, so that `lap` and `radius` do not count. By default the first.
-    user : {"relaxed", "trace", "push"}
-        A hand that lets go, one that traces the curve by itself, or one that pushes outwards and inwards once a lap.
+    expressive : bool
+        Whether the figure looks where the stylus points and leans as it leans, in whatever map.
+    user : {"relaxed", "trace", "push", "turn"}
+        A hand that lets go, one that traces the curve by itself, one that pushes outwards and inwards once a lap, or
+        one that turns the stylus: one lap to the left and right, one down and up, one over to either side.
     seconds : float
         Simulated time [s].
     seed : int
@@ -41,6 +44,11 @@ class RunConfig:
         b_d of the field [N s/m].
     tube : float
         Radius ε in which the field is felt [m].
+    orientation_stiffness : float
+        k_o of a moment that would turn the stylus to the curve's orientation [N m/rad]: it is recorded, but a device
+        with three motors cannot give it.
+    orientation_damping : float
+        b_o of that moment [N m s/rad].
     bunny_width : float
         δ of the bunny [m].
     bunny_attraction : {"point", "along"}
@@ -89,6 +97,8 @@ class RunConfig:
         Figure's size, servo period and physics step.
     pushes : tuple of Push
         What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on.
+    turns : tuple of Turn
+        How it turns the stylus; with any it also holds it upright in between.
     grabs : tuple of Grab
         What it takes hold of; in the modes that stretch, by default, a tour of what can be done.
     """
@@ -97,12 +107,15 @@ class RunConfig:
     mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
     map: str = "cylindrical"
     curve: str = ""
-    user: Literal["relaxed", "trace", "push"] = "relaxed"
+    expressive: bool = False
+    user: Literal["relaxed", "trace", "push", "turn"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1
     stiffness: float = 300.0
     damping: float = 8.0
     tube: float = 0.25
+    orientation_stiffness: float = 0.0
+    orientation_damping: float = 0.0
     bunny_width: float = 0.05
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
@@ -127,6 +140,7 @@ class RunConfig:
     figure_ticks: int = 8
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
+    turns: tuple[Turn, ...] = ()
     grabs: tuple[Grab, ...] = ()
 
     def __post_init__(self) -> None:

@@ -33,7 +33,7 @@ from sim.recorder import Recorder
 from sim.recording import Recording
 from sim.reference import make_reference, poses_along, reference_along
 from sim.servo import FrameLog, TickLog
-from sim.users.intent import Grab, Push
+from sim.users.intent import Grab, Push, Turn
 from sim.viewer.page import LivePage, NullPage, Page
 
 Array = npt.NDArray[np.float64]
@@ -129,6 +129,7 @@ def config_of(recording: Recording) -> RunConfig:
     try:
         values["scene"] = SceneConfig(**values["scene"])  # pyright: ignore[reportCallIssue]
         values["pushes"] = tuple(Push(**push) for push in values["pushes"])  # pyright: ignore
+        values["turns"] = tuple(Turn(**turn) for turn in values["turns"])  # pyright: ignore
         values["grabs"] = tuple(Grab(**grab) for grab in values["grabs"])  # pyright: ignore
         values["clips"] = tuple(values["clips"])  # pyright: ignore[reportArgumentType]
         return RunConfig(**values)  # pyright: ignore[reportArgumentType]

@@ -12,6 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.higher_order import HigherOrder
 from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
@@ -21,6 +22,7 @@ from controllers.safety import ForceLimiter
 from experiments.balance import balanced
 from experiments.budget import energy_tank
 from experiments.config import STRETCHING, RunConfig
+from experiments.expression import expressive_figure, lap_turns, oriented
 from experiments.governor import governed_law
 from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
@@ -47,6 +49,7 @@ from sim.world import World, phantom_angles
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 _MOST_CLIPS = {"cylindrical": 4, "composite": 3, "rivers": 3}
 MOST_PACE = 1.4  # times the clips' own that passes without a word
 
@@ -60,7 +63,7 @@ class Session:
     remarks: tuple[str, ...]
     curve: Trajectory
     field: Field
-    haptic_map: ClipMap
+    haptic_map: HapticMap
     world: World
     figure: Figure
     servo: Servo
@@ -143,31 +146,34 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         phantom_angles(curve.point(phase))
     rivers = None
     if config.map.endswith(MAP_SUFFIX):
-        haptic_map, clips = load_figure_map(Path(config.map))
-        remarks += (f"the clips are those of the map: {', '.join(haptic_map.names)}",)
-        if isinstance(haptic_map, Lifted):
-            curve = lifted_curve(haptic_map, config.curve)
-            rivers = lifted_rivers(haptic_map, config) if config.mode == "rivers" else None
+        blended, clips = load_figure_map(Path(config.map))
+        remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)
+        if isinstance(blended, Lifted):
+            curve = lifted_curve(blended, config.curve)
+            rivers = lifted_rivers(blended, config) if config.mode == "rivers" else None
     else:
-        haptic_map = _haptic_map(config, clips, curve, world.figure)
-    if config.curve and not isinstance(haptic_map, Lifted):
+        blended = _haptic_map(config, clips, curve, world.figure)
+    if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+    haptic_map = expressive_figure(blended) if config.expressive else blended
     compiled = haptic_map.compiled()
     period = config.scene.servo_period
     reference = make_reference(
         world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend, packed_legs(world.figure)
     )
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
+    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
     poses = np.empty((1, haptic_map.nq))
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
-    world.reset(start, poses[0])
+    user = _user(config, curve, grabs)
+    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
+    world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
-    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
     if config.mode in STRETCHING:
         field, urged = stretch_law(config, curve, grabs), 0.0
     else:
-        field, urged = governed_law(config, curve, haptic_map, rivers)
-    program = field.program()
+        field, urged = governed_law(config, curve, blended, rivers)
+    program = oriented(field.program(), config, curve)
     if config.walls:
         walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
         program = program + walls.program()
@@ -181,12 +187,12 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
             limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
-        hand=make_hand(_user(config, curve, grabs)),
+        hand=make_hand(user),
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
-    remarks += _pace_remark(curve.duration, haptic_map.lap_seconds)
+    remarks += _pace_remark(curve.duration, blended.lap_seconds)
     return Session(config, clips, remarks, curve, field, haptic_map, world, figure, servo)
 
 
@@ -244,20 +250,22 @@ def packed_legs(figure: mujoco.MjModel) -> Array:
 
 def stylus_path(points: Array) -> Array:
     """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
-    return np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))))
+    return np.hstack((points, np.tile(UPRIGHT, (len(points), 1))))
 
 
 def _user(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Arm:
-    pushes = config.pushes
+    pushes, turns = config.pushes, config.turns
+    laps = range(1, max(2, int(config.seconds / curve.duration)))
+    if config.user == "turn" and not turns:
+        turns = tuple(turn for lap in laps for turn in lap_turns(lap * curve.duration, curve.duration, lap - 1))
     if config.user == "push" and not pushes:
-        laps = range(1, max(2, int(config.seconds / curve.duration)))
         pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration))
     if config.user == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
     if config.user == "trace":
         times = np.arange(0.0, config.seconds, 0.01)
-        return Arm(path=curve.point(times), period=0.01, pushes=pushes)
-    return Arm(pushes=pushes, grabs=grabs)
+        return Arm(path=curve.point(times), period=0.01, pushes=pushes, turns=turns)
+    return Arm(pushes=pushes, grabs=grabs, turns=turns)
 
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:

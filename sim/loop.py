@@ -15,6 +15,7 @@ from models.mocap.clip import pose_difference
 from models.scene import FIGURE
 from sim.devices.simulated import read_phantom
 from sim.errors import SimError
+from sim.plant import hand_torques
 from sim.recorder import Group, Recorder
 from sim.robot import RobotWorld
 from sim.servo import FrameLog, Servo, TickLog, run_block
@@ -51,8 +52,8 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
         TickLog(
             hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
             user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
-            trace=np.zeros((ticks, TRACE_SIZE)),
-            ctrl=np.zeros((ticks, len(plant.ctrl))), applied=np.zeros((ticks, plant.substeps, 3)),
+            trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
+            applied=np.zeros((ticks, plant.substeps, hand_torques(servo.hand))),
             residual=np.zeros((ticks, len(servo.figure.applied))),
         ),
         FrameLog(
@@ -72,7 +73,7 @@ def groups(servo: Servo) -> dict[str, Group]:
             "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
             "force": (3,), "user": (3,), "tank": (), "tank_scale": (), "torque": (3,),
             "phase": (), "nearest": (3,), "distance": (), "river": (),
-            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, 3), "residual": (6,),
+            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, hand_torques(servo.hand)), "residual": (6,),
         },
     )  # fmt: skip
     frames = Group(

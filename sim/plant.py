@@ -7,10 +7,11 @@ import numpy.typing as npt
 from numba import njit
 
 from models.scene import PHANTOM
-from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, true_motion
+from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, true_motion, true_turn
 from sim.native import mj_step
 from sim.robot import RobotWorld
 from sim.users.arm import Arm, CompiledArm, hand_force
+from sim.users.fingers import turning_moment
 from sim.world import World
 
 Array = npt.NDArray[np.float64]
@@ -47,13 +48,20 @@ class Plant(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """The simulated user, and in H what the hand feels (true position, velocity, Jacobian) and its force."""
+    """The simulated user, in H what the hand feels (true position, velocity, Jacobian) and its force.
+
+    And the same of a hand that turns the stylus: true orientation (wxyz), angular velocity, gimbal axes, its moment.
+    """
 
     arm: CompiledArm
     p: Array
     v: Array
     jacobian: Array
     force: Array
+    q: Array
+    w: Array
+    axes: Array
+    moment: Array
 
 
 def make_plant(world: World | RobotWorld) -> Plant:
@@ -68,7 +76,13 @@ def make_plant(world: World | RobotWorld) -> Plant:
 
 def make_hand(arm: Arm) -> Hand:
     """A simulated user before its first tick."""
-    return Hand(arm.compiled(), np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+    linear = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
+    return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+
+
+def hand_torques(hand: Hand) -> int:
+    """How many joints the hand has torques about: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
+    return 6 if len(hand.arm.turns) > 0 else 3
 
 
 @njit
@@ -84,8 +98,10 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
     replay : bool
         Take the hand's torques from `applied` instead of asking the hand.
     applied : Array
-        The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], written or read, shape (substeps, 3).
+        The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], and with six columns about the gimbal
+        joints, τ = AᵀM; written or read, shape (substeps, `hand_torques`).
     """
+    turning = applied.shape[1] > 3
     for i in range(plant.substeps):
         if not replay:
             true_motion(port, hand.p, hand.v, hand.jacobian)
@@ -93,6 +109,15 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
             J, F = hand.jacobian, hand.force
             for j in range(3):
                 applied[i, j] = J[0, j] * F[0] + J[1, j] * F[1] + J[2, j] * F[2]
+            if turning:
+                arm, A, M = hand.arm, hand.axes, hand.moment
+                true_turn(port, hand.q, hand.w, A)
+                when = t + i * plant.period / plant.substeps
+                turning_moment(arm.turn_stiffness, arm.turn_damping, arm.turns, when, hand.q, hand.w, M)
+                for j in range(3):
+                    applied[i, 3 + j] = A[0, j] * M[0] + A[1, j] * M[1] + A[2, j] * M[2]
         for j in range(3):
             plant.applied[plant.arm_v[j]] = applied[i, j]
+            if turning:
+                plant.applied[port.gimbal_v[j]] = applied[i, 3 + j]
         mj_step(plant.model, plant.data)

@@ -14,6 +14,7 @@ from numba import njit
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.inertialization import stopping_way
 from controllers.haptic_map.river_clips import RIVER_CLIPS, change_clip, heading_between, place_clip, takes_over
 from controllers.rotations import rotate
@@ -151,7 +152,8 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
     reference.transition.since[0] += period
-    if reference.kind == RIVER_CLIPS and takes_over(reference.params, reference.memory, trace[TRACE_RIVER]):
+    kind, params = base_of(reference.kind, reference.params)
+    if kind == RIVER_CLIPS and takes_over(params, reference.memory, trace[TRACE_RIVER]):
         _change_river(reference, trace[TRACE_RIVER], trace[TRACE_PHASE])
     _look_around(reference)
     _carry(reference)

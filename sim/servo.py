@@ -79,7 +79,7 @@ class TickLog(NamedTuple):
     ctrl : Array
         All motor commands, shape (n, nu).
     applied : Array
-        The hand's torques about θ1, θ2, θ3 at each physics step, shape (n, substeps, 3).
+        The hand's torques at each physics step, shape (n, substeps, 3), or 6 (see `sim.plant.advance`).
     residual : Array
         Residual wrench at the figure's root, shape (n, 6).
     """

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.humanoid.skeleton import N_POSE, figure_model
-from models.phantom.kinematics import inverse_kinematics, vector_to_device_frame, within_limits
+from models.phantom.kinematics import Quat, gimbal_angles, inverse_kinematics, vector_to_device_frame, within_limits
 from models.scene import FIGURE, PHANTOM, SceneConfig, world_model
 from sim.errors import SimError
 
@@ -40,7 +40,7 @@ class World:
         object.__setattr__(self, "data", mujoco.MjData(model))
         object.__setattr__(self, "figure", figure_model(self.config.stature, self.config.mass))
 
-    def reset(self, p_H: Array, pose: Array) -> None:
+    def reset(self, p_H: Array, pose: Array, q_HS: Quat | None = None) -> None:
         """Put the stylus at a point and the figure in a pose, both at rest.
 
         Parameters
@@ -49,13 +49,15 @@ class World:
             Stylus tip in the hand frame [m], shape (3,).
         pose : Array
             The figure's pose, shape (75,).
+        q_HS : Quat, optional
+            Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
 
         Raises
         ------
         SimError
             If the Phantom cannot reach the point.
         """
-        place_stylus(self.model, self.data, p_H)
+        place_stylus(self.model, self.data, p_H, q_HS)
         root = int(self.model.joint(FIGURE + "root").qposadr[0])
         self.data.qpos[root : root + N_POSE] = pose
         mujoco.mj_forward(self.model, self.data)
@@ -73,8 +75,10 @@ class World:
         return {name: count for name, count in zip(names, counts, strict=False) if count}
 
 
-def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array) -> None:
+def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Quat | None = None) -> None:
     """Reset a world that holds the Phantom, with the stylus tip at a point of the hand frame [m], shape (3,).
+
+    The stylus is turned to an orientation (wxyz); by default its gimbal joints are at zero.
 
     Raises
     ------
@@ -83,12 +87,16 @@ def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array) -> None
     """
     mujoco.mj_resetData(model, data)
     theta = phantom_angles(p_H)
+    gimbal = (0.0, 0.0, 0.0) if q_HS is None else gimbal_angles.py_func(theta, q_HS)
     for name, angle in (
         ("theta1", theta[0]),
         ("theta2", theta[1]),
         ("theta3", theta[2]),
         ("elbow", theta[2] - theta[1]),
         ("twin", theta[1] - theta[2]),
+        ("gimbal1", gimbal[0]),
+        ("gimbal2", gimbal[1]),
+        ("gimbal3", gimbal[2]),
     ):
         data.qpos[model.joint(PHANTOM + name).qposadr[0]] = angle
 

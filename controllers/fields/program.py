@@ -19,6 +19,7 @@ from controllers.fields.instructions import (
     GOVERNOR,
     HIGHER_ORDER,
     LIMIT,
+    ORIENTATION,
     RECORDED,
     SOFT_WALL,
     STACK,
@@ -27,6 +28,7 @@ from controllers.fields.instructions import (
     TRACE_ROW,
     Program,
 )
+from controllers.fields.orientation import orientation_wrench
 from controllers.fields.soft_wall import soft_wall_wrench
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.state import Array, IntArray
@@ -75,6 +77,9 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top += 1
         elif opcode == GOVERNOR:
             governor_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == ORIENTATION:
+            orientation_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
         elif opcode == EXTERNAL:
             for i in range(6):

@@ -5,7 +5,7 @@ from numba import njit
 
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
-from controllers.haptic_map.expressive import EXPRESSIVE, base_kind, base_params, express
+from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express
 from controllers.haptic_map.lifted import LIFTED, lifted_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
@@ -30,11 +30,10 @@ def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array
 @njit
 def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
+    base, numbers = base_of(kind, params)
+    _evaluate_one(base, numbers, x, memory, pose, jacobian)
     if kind == EXPRESSIVE:
-        _evaluate_one(base_kind(params), base_params(params), x, memory, pose, jacobian)
         express(params, x, pose, jacobian)
-    else:
-        _evaluate_one(kind, params, x, memory, pose, jacobian)
 
 
 @njit

@@ -20,15 +20,11 @@ _ROUNDING = 0.02  # of a room: with less than this left it shrinks to nothing wi
 
 
 @njit
-def base_kind(params: Array) -> int:
-    """Kind of the map that is wrapped."""
-    return int(params[_KIND])
-
-
-@njit
-def base_params(params: Array) -> Array:
-    """Parameters of the map that is wrapped."""
-    return params[_ROWS + _ROW * int(params[_JOINTS]) :]
+def base_of(kind: int, params: Array) -> tuple[int, Array]:
+    """Kind and parameters of the map that a map wraps; its own if it wraps none."""
+    if kind != EXPRESSIVE:
+        return kind, params
+    return int(params[_KIND]), params[_ROWS + _ROW * int(params[_JOINTS]) :]
 
 
 @njit

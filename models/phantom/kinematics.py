@@ -179,6 +179,27 @@ def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quat:
 
 
 @njit
+def stylus_axes(theta: Vec3, gimbal: Vec3) -> tuple[Scalars3, Scalars3, Scalars3, Scalars3, Scalars3]:
+    """Unit vectors of H about which θ1, θ3, g1, g2, g3 turn the stylus: ω = Σ a_j q̇_j, columns of `stylus_orientation`.
+
+    Parameters
+    ----------
+    theta, gimbal : three floats each
+        Joint angles and gimbal angles [rad].
+    """
+    s1, c1 = np.sin(theta[0]), np.cos(theta[0])
+    s3, c3 = np.sin(theta[2]), np.cos(theta[2])
+    sy, cy = np.sin(gimbal[0]), np.cos(gimbal[0])
+    sp, cp = np.sin(gimbal[1]), np.cos(gimbal[1])
+    # Axes of the forearm, R_z(θ1) R_y(θ3): forwards, left, up along it.
+    ahead, left, up = (c1 * c3, s1 * c3, -s3), (-s1, c1, 0.0 * s1), (c1 * s3, s1 * s3, c3)
+    pitch = (cy * left[0] - sy * ahead[0], cy * left[1] - sy * ahead[1], cy * left[2] - sy * ahead[2])
+    level = (cy * ahead[0] + sy * left[0], cy * ahead[1] + sy * left[1], cy * ahead[2] + sy * left[2])
+    pen = (cp * level[0] - sp * up[0], cp * level[1] - sp * up[1], cp * level[2] - sp * up[2])
+    return (0.0 * s1, 0.0 * s1, 1.0 + 0.0 * s1), left, up, pitch, pen
+
+
+@njit
 def gimbal_angles(theta: Vec3, q_HS: Quat) -> Scalars3:
     """Inverse of `stylus_orientation`: gimbal angles that turn the stylus to q_HS, with −π/2 ≤ g2 ≤ π/2 [rad]."""
     s1, c1 = np.sin(0.5 * theta[0]), np.cos(0.5 * theta[0])

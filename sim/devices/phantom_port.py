@@ -15,6 +15,7 @@ from models.phantom.kinematics import (
     gimbal_reading,
     jacobian,
     joint_torques,
+    stylus_axes,
     stylus_orientation,
     vector_to_device_frame,
     vector_to_hand_frame,
@@ -38,7 +39,7 @@ class PhantomPort(NamedTuple):
     ----------
     qpos, qvel, ctrl, applied : Array
         Views of the world's MjData: positions, velocities, motor commands, external generalised forces.
-    arm_q, arm_v, gimbal_q, motor : tuple of three ints
+    arm_q, arm_v, gimbal_q, gimbal_v, motor : tuple of three ints
         Where the device's joints and motors stand in them.
     period : float
         Servo period [s].
@@ -59,6 +60,7 @@ class PhantomPort(NamedTuple):
     arm_q: tuple[int, int, int]
     arm_v: tuple[int, int, int]
     gimbal_q: tuple[int, int, int]
+    gimbal_v: tuple[int, int, int]
     motor: tuple[int, int, int]
     period: float
     smoothing: float
@@ -98,7 +100,8 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
     return PhantomPort(
         qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl, applied=data.qfrc_applied,
         arm_q=place(ARM_JOINTS, "q"), arm_v=place(ARM_JOINTS, "v"), gimbal_q=place(GIMBAL_JOINTS, "q"),
-        motor=place(MOTORS, "motor"), period=period, smoothing=math.exp(-2.0 * math.pi * cutoff * period),
+        gimbal_v=place(GIMBAL_JOINTS, "v"), motor=place(MOTORS, "motor"), period=period,
+        smoothing=math.exp(-2.0 * math.pi * cutoff * period),
         memory=np.zeros(13), hand=np.zeros(15), torque=np.zeros(3),
     )  # fmt: skip
 
@@ -213,3 +216,26 @@ def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> Non
     for k in range(3):
         p[k] = p_H[k]
         v[k] = jacobian_H[k, 0] * rate[0] + jacobian_H[k, 1] * rate[1] + jacobian_H[k, 2] * rate[2]
+
+
+@njit
+def true_turn(port: PhantomPort, orientation: Array, spin: Array, axes: Array) -> None:
+    """How the stylus is really turned and turning, in H: what the fingers feel, unquantised.
+
+    Parameters
+    ----------
+    port : PhantomPort
+        Read only.
+    orientation, spin : Array
+        Set: R_H as a unit quaternion wxyz, shape (4,), and ω [rad/s], shape (3,).
+    axes : Array
+        Set: unit vectors about which the three gimbal joints turn it, columns, shape (3, 3).
+    """
+    q, v, a, g = port.qpos, port.qvel, port.arm_q, port.gimbal_q
+    theta, gimbal = (q[a[0]], q[a[1]], q[a[2]]), (q[g[0]], q[g[1]], q[g[2]])
+    turret, forearm, first, second, third = stylus_axes(theta, gimbal)
+    r, t, n = v[port.arm_v[0]], v[port.arm_v[2]], port.gimbal_v
+    for i in range(3):
+        axes[i, 0], axes[i, 1], axes[i, 2] = first[i], second[i], third[i]
+        spin[i] = r * turret[i] + t * forearm[i] + v[n[0]] * first[i] + v[n[1]] * second[i] + v[n[2]] * third[i]
+    orientation[0], orientation[1], orientation[2], orientation[3] = stylus_orientation(theta, gimbal)

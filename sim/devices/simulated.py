@@ -9,7 +9,7 @@ from controllers.state import HandState, Vec3
 from sim.compiled import entry_point
 from sim.devices.base import DeviceError, checked_force
 from sim.devices.phantom_port import PhantomPort, actuate, phantom_port, sense
-from sim.plant import Hand, Plant, advance, make_hand, make_plant
+from sim.plant import Hand, Plant, advance, hand_torques, make_hand, make_plant
 from sim.users.arm import Arm
 from sim.world import World
 
@@ -48,7 +48,7 @@ class SimulatedPhantom:
         self._world = world
         self._plant, self._hand = make_plant(world), make_hand(arm)
         self._port = phantom_port(world.model, world.data, self.period, cutoff)
-        self._applied = np.zeros((self._plant.substeps, 3))
+        self._applied = np.zeros((self._plant.substeps, hand_torques(self._hand)))
         self._state: HandState | None = None
         self._tick = 0
         self._open = True

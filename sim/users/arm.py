@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numba import njit
 
 from sim.errors import SimError
-from sim.users.intent import Grab, Push, grab_table, push_table
+from sim.users.intent import Grab, Push, Turn, grab_table, push_table, turn_table
 
 Array = npt.NDArray[np.float64]
 
@@ -146,6 +146,9 @@ class CompiledArm(NamedTuple):
     grabs: Array
     held: Array
     switch: Array
+    turn_stiffness: float
+    turn_damping: float
+    turns: Array
 
 
 @njit
@@ -172,6 +175,11 @@ class Arm:
         What the hand does beside it.
     grabs : sequence of Grab
         When and where the hand takes hold, one after the other; for an arm without a path.
+    turns : sequence of Turn
+        How it turns the stylus; with any it also holds it upright in between, and without it lets the gimbal swing.
+    turn_stiffness, turn_damping : float
+        Of the fingers about the orientation they want [N m/rad], [N m s/rad]; unused without turns. The defaults
+        damp a stylus about critically.
 
     Raises
     ------
@@ -186,9 +194,13 @@ class Arm:
     period: float = 1e-3
     pushes: Sequence[Push] = ()
     grabs: Sequence[Grab] = ()
+    turns: Sequence[Turn] = ()
+    turn_stiffness: float = 0.1
+    turn_damping: float = 2.5e-3
 
     def __post_init__(self) -> None:
-        for name, value in (("stiffness", self.stiffness), ("damping", self.damping)):
+        for name in ("stiffness", "damping", "turn_stiffness", "turn_damping"):
+            value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise SimError(f"the arm's {name} is {value}; it must be finite and not negative")
         if not (math.isfinite(self.period) and self.period > 0.0):
@@ -203,4 +215,5 @@ class Arm:
         """The arm as the servo loop holds it."""
         return CompiledArm(self.stiffness, self.damping, np.ascontiguousarray(self.path), self.period,
                            push_table(self.pushes), np.full(len(self.pushes), np.nan),
-                           grab_table(self.grabs), np.full((len(self.grabs), 3), np.nan), np.zeros(1))  # fmt: skip
+                           grab_table(self.grabs), np.full((len(self.grabs), 3), np.nan), np.zeros(1),
+                           self.turn_stiffness, self.turn_damping, turn_table(self.turns))  # fmt: skip

@@ -1,6 +1,7 @@
 """What a simulated user means to do with the stylus.
 
-Nothing, trace a path of their own, push at a place and a time, or go to a place, press the switch and carry the stylus.
+Nothing, trace a path of their own, push at a place and a time, go to a place, press the switch and carry the stylus, or
+turn it.
 """
 
 import itertools
@@ -19,6 +20,9 @@ PUSH_COLUMNS = 11
 
 GRAB_COLUMNS = 10
 """A grab as a row: start, reach, place (3) or NaN, carry (3), duration, hold."""
+
+TURN_COLUMNS = 5
+"""A turn as a row: start, duration, rotation vector at its peak (3)."""
 
 
 @dataclass(frozen=True)
@@ -147,3 +151,49 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
         if after.start < before.end:
             raise SimError(f"a grab begins at {after.start:g} s, before another has ended at {before.end:g} s")
     return np.array([grab.row() for grab in ordered]).reshape(len(ordered), GRAB_COLUMNS)
+
+
+@dataclass(frozen=True)
+class Turn:
+    r"""Turn the stylus about an axis and back; between turns a hand that turns it means to hold it upright.
+
+    .. math:: R_d(t) = \exp\bigl(\textstyle\sum_i \alpha_i \sin^2(\pi (t - t_i) / T_i)\, n_i\bigr)
+
+    Parameters
+    ----------
+    start : float
+        t_i [s].
+    duration : float
+        T_i, of turning there and back [s].
+    angle : float
+        α_i, the farthest [rad]; at most half a turn either way.
+    axis : tuple of float
+        n_i in the hand frame, any length but zero: x rolls the pen, y points it down, z points it to the left.
+
+    Raises
+    ------
+    SimError
+        If a number is out of its interval or the axis has no length.
+    """
+
+    start: float
+    duration: float
+    angle: float
+    axis: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if not np.all(np.isfinite([self.start, self.duration, self.angle, *self.axis])):
+            raise SimError(f"a turn has a number that is not finite: {self}")
+        if self.duration <= 0.0 or self.start < 0.0 or abs(self.angle) > np.pi:
+            raise SimError(f"a turn needs start ≥ 0 s, duration > 0 s and an angle within ±π, got {self}")
+        if np.linalg.norm(self.axis) < 1e-12:
+            raise SimError(f"the axis of a turn has no length: {self.axis}")
+
+    def row(self) -> Array:
+        """The turn as numbers for the compiled hand, shape (5,)."""
+        return np.array([self.start, self.duration, *(self.angle * np.array(self.axis) / np.linalg.norm(self.axis))])
+
+
+def turn_table(turns: Sequence[Turn]) -> Array:
+    """Rows of all turns, shape (n, 5)."""
+    return np.array([turn.row() for turn in turns]).reshape(len(turns), TURN_COLUMNS)

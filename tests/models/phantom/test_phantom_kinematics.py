@@ -106,6 +106,19 @@ def test_gimbal_angles_undo_the_stylus_orientation(configurations):
         assert np.allclose(kinematics.gimbal_angles(theta, q_HS), gimbal, atol=1e-9)
 
 
+def test_each_joint_turns_the_stylus_about_its_axis(configurations):
+    rng, step = np.random.default_rng(7), 1e-6
+    for theta in configurations[:100]:
+        joints = np.concatenate([theta, rng.uniform(*np.array(PREMIUM_1_5.gimbal_limit).T)])
+        axes = kinematics.stylus_axes(joints[:3], joints[3:])
+        for axis, joint in zip(axes, (0, 2, 3, 4, 5), strict=True):
+            turned = [
+                Rotation.from_quat(kinematics.stylus_orientation(q[:3], q[3:]), scalar_first=True)
+                for q in (joints + step * np.eye(6)[joint], joints - step * np.eye(6)[joint])
+            ]
+            assert np.allclose((turned[0] * turned[1].inv()).as_rotvec() / (2.0 * step), axis, atol=1e-9)
+
+
 def test_hand_frame_is_upright_with_x_away_from_the_user():
     R_HP = np.array(kinematics.R_HP)
     assert np.linalg.det(R_HP) == pytest.approx(1.0)

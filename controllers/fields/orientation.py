@@ -1,0 +1,86 @@
+"""A field on the other half of SE(3): a spring and damper that turn the stylus as the curve is turned."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.closest_point import closest_phase
+from controllers.curves.orientation import curve_orientation
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.instructions import ORIENTATION, Program, checked, leave_trace, wrench_of
+from controllers.fields.window import window
+from controllers.rotations import logarithm, multiply
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array, HandState, Wrench
+
+
+@njit
+def orientation_wrench(
+    params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
+) -> None:
+    """Instruction ORIENTATION: parameters [k_o, b_o, 1/ε²], memory [t*]."""
+    p, q, w = hand[HAND_POSITION:], hand[HAND_QUATERNION:], hand[HAND_ANGULAR_VELOCITY:]
+    phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
+    memory[slot] = phase
+    (a, b, c, d), spin = curve_orientation(params, curve, phase)
+    error = logarithm(*multiply(a, b, c, d, q[0], -q[1], -q[2], -q[3]))
+    share = window(distance * distance * params[at + 2])
+    for i in range(3):
+        wrench[i] = 0.0
+        wrench[3 + i] = share * (params[at] * error[i] + params[at + 1] * (spin[i] - w[i]))
+    leave_trace(params, curve, memory, phase, distance, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    r"""Moment that turns the stylus to the orientation of the curve where the hand is nearest to it; no force.
+
+    .. math:: \tau = w(d/\varepsilon)\,\bigl(k_o \log(R_c R^T) + b_o\,(\omega_c - \omega)\bigr), \qquad R_c = R(t^*)
+
+    All in H; log gives the rotation vector of the shortest turn from R to R_c, so the spring pulls along the geodesic
+    of SO(3) and is −grad of ½ k_o α², α the angle between the two. t*, d and the window w are those of FOLLOW, ω_c is
+    the curve's angular velocity at t*. τ is finite everywhere, with |log| ≤ π. Its switching sets: α = π, where both
+    ways round are equally short and τ changes its sign, and where t* jumps (the medial axis of the curve).
+
+    A device with three motors, such as the Phantom, cannot give a moment: it is evaluated and recorded (the last
+    three numbers of the channel ``field``), and the limiter drops it. A device that can would take it as it is.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H, with its orientations.
+    k_o : float
+        Rotational stiffness [N m/rad].
+    b_o : float
+        Rotational damping [N m s/rad].
+    epsilon : float
+        ε, radius of the tube [m], may be infinite.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is negative or not finite, or ε below 1e-4 m.
+    """
+
+    curve: Trajectory
+    k_o: float
+    b_o: float
+    epsilon: float = 0.25
+
+    def __post_init__(self) -> None:
+        checked("k_o", self.k_o, "N m/rad")
+        checked("b_o", self.b_o, "N m s/rad")
+        checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
+
+    @cached_property
+    def _program(self) -> Program:
+        return Program.law(ORIENTATION, [self.k_o, self.b_o, self.epsilon**-2], [np.nan], self.curve)
+
+    def program(self) -> Program:
+        """Compiled form of the field."""
+        return self._program
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """τ at one hand state, by the compiled law; t* is found without a warm start."""
+        return wrench_of(orientation_wrench, self._program, hand)

@@ -1,0 +1,187 @@
+"""The field on orientation: the law against SciPy, its switching set, its energy, a stylus in it, the algebra."""
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy.spatial.transform import Rotation
+
+from controllers.curves.orientation import curve_orientation
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.follow import Follow
+from controllers.fields.orientation import Orientation
+from controllers.fields.program import evaluate
+from controllers.state import HandState
+
+RNG = np.random.default_rng(11)
+
+
+def wxyz(rotation):
+    return np.roll(rotation.as_quat(), 1, axis=-1)
+
+
+def rotation(q):
+    return Rotation.from_quat(np.roll(q, -1, axis=-1))
+
+
+def turning_circle(turns=1.0, samples=96):
+    """A circle along which the stylus turns about an oblique axis, and sways."""
+    times = np.linspace(0.0, 4.0, samples + 1)
+    lap = 0.5 * np.pi * times
+    sway = Rotation.from_rotvec(np.outer(np.sin(lap), [0.4, -0.2, 0.3]))
+    spun = Rotation.from_rotvec(np.outer(turns * lap, [0.6, 0.0, 0.8])) * sway
+    points = Trajectory.circle(0.05, 4.0).point(times)
+    points[-1] = points[0]
+    return Trajectory(times, points, wxyz(spun), periodic=True)
+
+
+CURVE = turning_circle()
+FIELD = Orientation(CURVE, 0.2, 3e-3, np.inf)
+
+
+def hand(q, p=None, w=(0.0, 0.0, 0.0)):
+    place = CURVE.point(1.0) if p is None else p
+    return HandState(0.0, place, wxyz(q), np.zeros(3), np.asarray(w, dtype=float))
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_the_compiled_orientation_and_its_velocity_are_the_curves(periodic):
+    curve = CURVE
+    if not periodic:
+        times = np.linspace(0.0, 2.0, 9)
+        curve = Trajectory(times, CURVE.point(times), CURVE.orientation(times))
+    blob, h = np.concatenate([np.full(5, np.nan), curve.packed()]), 1e-5
+    for t in RNG.uniform(0.01, curve.end - 0.01, 50):
+        q, w = curve_orientation(blob, 5, t)
+        np.testing.assert_allclose(abs(np.dot(q, curve.orientation(t))), 1.0, atol=1e-14)
+        assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-15)
+        near, far = (
+            (rotation(curve.orientation(t + s)) * rotation(curve.orientation(t - s)).inv()).as_rotvec() / (2 * s)
+            for s in (h, 2 * h)
+        )
+        np.testing.assert_allclose(w, (4.0 * near - far) / 3.0, atol=1e-8)
+        if periodic:
+            later, later_w = curve_orientation(blob, 5, t + 2 * curve.duration)
+            np.testing.assert_allclose(abs(np.dot(q, later)), 1.0, atol=1e-13)
+            np.testing.assert_allclose(w, later_w, atol=1e-10)
+
+
+def test_the_moment_is_a_spring_along_the_geodesic_and_a_damper():
+    at = rotation(CURVE.orientation(1.0))
+    _, spin = curve_orientation(CURVE.packed(), 0, 1.0)
+    for _ in range(200):
+        q, w = Rotation.random(random_state=RNG), RNG.normal(size=3)
+        wrench = FIELD.wrench(hand(q, w=w))
+        expected = 0.2 * (at * q.inv()).as_rotvec() + 3e-3 * (np.array(spin) - w)
+        np.testing.assert_allclose(wrench.torque, expected, atol=1e-9)
+        np.testing.assert_array_equal(wrench.force, 0.0)
+
+
+def test_a_stylus_that_turns_as_the_curve_does_feels_nothing():
+    for t in RNG.uniform(0.0, 4.0, 30):
+        _, spin = curve_orientation(CURVE.packed(), 0, t)
+        wrench = FIELD.wrench(hand(rotation(CURVE.orientation(t)), CURVE.point(t), spin))
+        np.testing.assert_allclose(wrench.torque, 0.0, atol=1e-9)
+
+
+def test_the_moment_is_finite_up_to_half_a_turn_and_changes_sides_only_there():
+    at, spring = rotation(CURVE.orientation(1.0)), Orientation(CURVE, 0.2, 0.0, np.inf)
+
+    def moment(vector):
+        return spring.wrench(hand(Rotation.from_rotvec(vector) * at)).torque
+
+    for axis in RNG.normal(size=(20, 3)):
+        axis /= np.linalg.norm(axis)
+        for angle in (0.0, 1e-200, 1e-9, 1.0, 3.0, np.pi * (1.0 - 1e-12)):
+            np.testing.assert_allclose(moment(angle * axis), -0.2 * angle * axis, atol=1e-9)
+        on_the_set = moment(np.pi * axis)
+        assert np.linalg.norm(on_the_set) == pytest.approx(0.2 * np.pi, rel=1e-9)
+        np.testing.assert_allclose(np.cross(on_the_set, axis), 0.0, atol=1e-8)
+        beyond = moment(np.pi * (1.0 + 1e-9) * axis)
+        np.testing.assert_allclose(beyond, 0.2 * np.pi * axis, atol=1e-8)
+        # Continuous along lines everywhere else: a step of 1e-11 moves it no more than its slope allows.
+        for angle in RNG.uniform(-3.1, 3.1, 20):
+            change = moment((angle + 1e-11) * axis) - moment(angle * axis)
+            assert np.abs(change).max() < 1e-9
+
+
+def test_the_tube_ends_the_moment_without_a_jump_and_nothing_is_felt_outside():
+    field, q = Orientation(CURVE, 0.2, 3e-3, 0.02), Rotation.from_rotvec([0.5, -1.0, 0.3])
+    for _ in range(20):
+        direction = RNG.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        centre = CURVE.point(RNG.uniform(0.0, 4.0))
+        for s in np.linspace(0.0, 0.03, 40):
+            near, far = (field.wrench(hand(q, centre + x * direction)).torque for x in (s, s + 1e-13))
+            assert np.abs(far - near).max() < 1e-9
+    np.testing.assert_array_equal(field.wrench(hand(q, np.array([0.0, 0.0, 0.03]))).torque, 0.0)
+    for place in ([1e6, -1e6, 1e6], [0.0, 0.0, 0.0]):
+        assert np.isfinite(FIELD.wrench(hand(q, np.array(place))).torque).all()
+
+
+def test_added_to_a_force_it_leaves_the_force_and_the_trace_as_they_are():
+    follow = Follow(CURVE, 300.0, 8.0)
+    both, alone = follow.program() + FIELD.program(), follow.program()
+    memory, memory_alone = both.fresh_memory(), alone.fresh_memory()
+    wrench, force = np.empty(6), np.empty(6)
+    for k in range(100):
+        turned = Rotation.random(random_state=RNG)
+        state = HandState(0.0, CURVE.point(0.02 * k) * 1.1, wxyz(turned), RNG.normal(size=3), RNG.normal(size=3))
+        evaluate(both.ops, both.params, memory, state.vector(), wrench)
+        evaluate(alone.ops, alone.params, memory_alone, state.vector(), force)
+        np.testing.assert_array_equal(wrench[:3], force[:3])
+        np.testing.assert_array_equal(memory[:8], memory_alone[:8])
+        # To the last bit what Python gives; t* is warm here and found anew there.
+        np.testing.assert_allclose(wrench[3:], FIELD.wrench(state).torque, atol=1e-9)
+
+
+def test_python_and_the_compiled_program_agree_to_the_last_bit():
+    program, wrench = FIELD.program(), np.empty(6)
+    for _ in range(50):
+        state = hand(Rotation.random(random_state=RNG), RNG.normal(scale=0.05, size=3), RNG.normal(size=3))
+        evaluate(program.ops, program.params, program.fresh_memory(), state.vector(), wrench)
+        np.testing.assert_array_equal(wrench, np.concatenate(FIELD.wrench(state)))
+
+
+@njit
+def _turn(ops, params, memory, state, inertia, steps, angles):
+    """A ball on the curve's point at t = 1, with the moment alone: semi-implicit steps of 0.1 ms."""
+    wrench, h = np.empty(6), 1e-4
+    for k in range(steps):
+        evaluate(ops, params, memory, state, wrench)
+        state[11:14] += h / inertia * wrench[3:]
+        half = 0.5 * h * state[11:14]
+        w, x, y, z = state[4], state[5], state[6], state[7]
+        state[4] -= half[0] * x + half[1] * y + half[2] * z
+        state[5] += half[0] * w + half[1] * z - half[2] * y
+        state[6] += half[1] * w + half[2] * x - half[0] * z
+        state[7] += half[2] * w + half[0] * y - half[1] * x
+        state[4:8] /= np.sqrt((state[4:8] ** 2).sum())
+        angles[k] = 2.0 * np.arccos(min(1.0, abs(state[4])))
+
+
+def test_a_stylus_let_go_turns_to_the_curve_the_short_way_and_never_away():
+    """With the curve upright and damping critical the angle falls, all along, from anywhere but half a turn."""
+    circle, inertia = Trajectory.circle(0.05, 4.0), 2e-5
+    field = Orientation(circle, 0.2, 2.0 * np.sqrt(0.2 * inertia), np.inf).program()
+    for axis in RNG.normal(size=(5, 3)):
+        q = Rotation.from_rotvec(3.0 * axis / np.linalg.norm(axis))
+        state = HandState(0.0, circle.point(1.0), wxyz(q), np.zeros(3), np.zeros(3)).vector()
+        angles = np.empty(2000)
+        _turn(field.ops, field.params, field.fresh_memory(), state, inertia, 2000, angles)
+        assert angles[0] == pytest.approx(3.0, abs=0.01)
+        assert (np.diff(angles) < 1e-9).all()
+        assert angles[-1] < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("numbers", "says"),
+    [
+        ((-1.0, 0.0, 0.1), "k_o must be finite and at least 0 N m/rad, got -1"),
+        ((1.0, np.nan, 0.1), "b_o must be finite and at least 0 N m s/rad"),
+        ((1.0, 0.0, 0.0), "epsilon must be at least 0.0001 m"),
+    ],
+)
+def test_gains_that_make_no_sense_are_refused(numbers, says):
+    with pytest.raises(ParameterError, match=says):
+        Orientation(CURVE, *numbers)

@@ -1,0 +1,53 @@
+"""A golden trajectory of the stylus's orientation: what the figure makes of turns, and a stylus turned by the field.
+
+``python tests/golden/test_golden_orientation.py`` writes the file anew, after a change that is meant.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.orientation import Orientation
+from controllers.haptic_map.composite import Composite
+from controllers.state import HandState
+from experiments.expression import expressive_figure, lap_turns
+from models.humanoid.skeleton import BODIES
+from models.mocap.library import embedded
+from sim.users.fingers import wanted_turn
+from sim.users.intent import turn_table
+
+GOLDEN = Path(__file__).with_name("orientation.csv")
+CURVE = Trajectory.circle(0.0477, 4.0)
+JOINTS = ("abdomen", "chest", "head")
+
+
+def _rows():
+    """Every 50 ms of three laps: time, quaternions of abdomen, chest and head, moment of the field."""
+    clips = [(embedded(name).poses, embedded(name).fps) for name in ("walk", "cheer", "angry")]
+    figure = expressive_figure(Composite(*clips, [BODIES.index(joint) for joint in JOINTS], (0.02, 0.07)))
+    turns = turn_table([turn for lap in range(3) for turn in lap_turns(4.0 * lap, 4.0, lap, 1.2)])
+    field, memory = Orientation(CURVE, 0.2, 3e-3), figure.compiled().memory
+    rows, turn, rate = [], np.empty(3), np.empty(3)
+    # Not from the lap's seam, where rounding would decide which lap it is.
+    for t in np.arange(0.025, 12.0, 0.05):
+        wanted_turn(turns, t, turn, rate)
+        q = np.roll(Rotation.from_rotvec(turn).as_quat(), 1)
+        pose = figure.pose(np.concatenate([CURVE.point(t), q]), memory)
+        hand = HandState(t, CURVE.point(t), q, CURVE.velocity(t), rate)
+        joints = np.concatenate([pose[3 + 4 * k : 7 + 4 * k] for k in map(BODIES.index, JOINTS)])
+        rows.append(np.concatenate([[t], joints, field.wrench(hand).torque]))
+    return np.array(rows)
+
+
+def test_turns_of_the_stylus_make_of_the_figure_and_of_the_field_what_they_ever_did():
+    golden, rows = np.loadtxt(GOLDEN, delimiter=",", skiprows=1), _rows()
+    np.testing.assert_allclose(rows, golden, atol=1e-9)
+    assert np.ptp(rows[:, 9:13], axis=0).max() > 0.5
+    assert np.ptp(rows[:, 13:], axis=0).min() > 0.3
+
+
+if __name__ == "__main__":
+    names = [f"{joint} {number}" for joint in JOINTS for number in "wxyz"] + [f"moment {axis}" for axis in "xyz"]
+    np.savetxt(GOLDEN, _rows(), fmt="%.12g", delimiter=",", header=",".join(["t", *names]))
