@@ -80,7 +80,7 @@ class Bench:
         self._clips, _ = load_clips(self._config.clips)
         session = self._session()
         self.curve = session.curve
-        self.speeds = speeds_along(session.haptic_map, self.curve)
+        self.speeds = speeds_along(session.clip_map, self.curve)
         phases = np.linspace(self.curve.start, self.curve.end, len(self.speeds))
         flying = phases[self.speeds[:, 0] > 0.0]
         self.flight = (float(flying[0]), float(flying[-1]))

@@ -56,13 +56,17 @@ MOST_PACE = 1.4  # times the clips' own that passes without a word
 
 @dataclass(frozen=True)
 class Session:
-    """A run that is wired up and has not begun: the servo, and what it was made of."""
+    """A run that is wired up and has not begun: the servo, and what it was made of.
+
+    The haptic map is that of the clips, or an expressive map about it.
+    """
 
     config: RunConfig
     clips: tuple[Clip, ...]
     remarks: tuple[str, ...]
     curve: Trajectory
     field: Field
+    clip_map: ClipMap
     haptic_map: HapticMap
     world: World
     figure: Figure
@@ -193,7 +197,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         figure_ticks=config.figure_ticks,
     )  # fmt: skip
     remarks += _pace_remark(curve.duration, blended.lap_seconds)
-    return Session(config, clips, remarks, curve, field, haptic_map, world, figure, servo)
+    return Session(config, clips, remarks, curve, field, blended, haptic_map, world, figure, servo)
 
 
 def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:
