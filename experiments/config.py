@@ -21,8 +21,9 @@ class RunConfig:
         Four motions for the corners of the map (inner low, outer low, inner high, outer high): names of embedded clips
         or files (BVH, AMC, DeepMimic). Fewer than four are repeated. For the composite map up to three: lower body,
         upper body inside, upper body outside; for the rivers' map one for each of the three rivers.
-    mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow"}
-        Field of force.
+    mode : {"follow", "bunny", "rivers", "stretch", "stretch-then-follow", "lead"}
+        Field of force. In the mode "lead" one clip walks where the hand leads it: the hand does so forward along an S,
+        then straight back; map and user are then not chosen.
     map : str
         Haptic map: "cylindrical", four clips round a cylinder; "composite", the lower body of one clip and the upper
         body blended between two; "rivers", a clip for each river; or a map's file (.npz), which has its own clips.
@@ -65,6 +66,11 @@ class RunConfig:
         Whether a hand too slow or too fast for the flights of the animation meets a force, and in rivers is not taken.
     governor_drag : float
         b of that force [N s/m].
+    leash : float
+        k_l, which keeps the hand from running ahead of a figure that is led [N/m].
+    floor_scale : float, optional
+        Metres of floor for one of the stylus, where a figure is led; by default such that it goes along the default S
+        in five seconds.
     seek : float
         k_f, with which stretchy tubes draw the hand to the curve [N/m].
     rubber : float
@@ -104,7 +110,7 @@ class RunConfig:
     """
 
     clips: tuple[str, ...] = ()
-    mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow"] = "follow"
+    mode: Literal["follow", "bunny", "rivers", "stretch", "stretch-then-follow", "lead"] = "follow"
     map: str = "cylindrical"
     curve: str = ""
     expressive: bool = False
@@ -124,6 +130,8 @@ class RunConfig:
     blend: float = 0.4
     governor: bool = False
     governor_drag: float = 8.0
+    leash: float = 120.0
+    floor_scale: float | None = None
     seek: float = 150.0
     rubber: float = 150.0
     rubber_tube: float = 0.008
@@ -145,7 +153,8 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         if not self.clips:
-            object.__setattr__(self, "clips", MAP_CLIPS.get(self.map, FIGURE_CLIPS))
+            clips = ("walk",) if self.mode == "lead" else MAP_CLIPS.get(self.map, FIGURE_CLIPS)
+            object.__setattr__(self, "clips", clips)
 
 
 @dataclass(frozen=True)

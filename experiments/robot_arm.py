@@ -152,6 +152,7 @@ def wire_arm(config: ArmConfig) -> tuple[Servo, RobotWorld, Trajectory]:
         reference=make_reference(world.arm, haptic_map.compiled(), period * config.arm_ticks, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
+        argument=port.hand[1:8],
     )  # fmt: skip
     return servo, world, curve
 

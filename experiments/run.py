@@ -16,9 +16,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.fields.leading import Leading
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.compiling import compile_once
 from experiments.config import STRETCHING, RunConfig
+from experiments.lead import walker_argument
+from experiments.lead_measures import lead_summary
 from experiments.measures import BLOCK_FRAMES, summarise
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
 from experiments.summary import RunSummary, SpeedSummary
@@ -187,9 +190,12 @@ def _peak_memory_mb() -> float:
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings())
+        memory, field = session.servo.field.memory, session.field
+        if isinstance(field, Leading):
+            scene, fell_at = session.config.scene, summary.figure.fell_at
+            return replace(summary, lead=lead_summary(recording, field, memory, scene, fell_at))
     if not isinstance(session.field, StretchyTubes):
         return summary
-    memory = session.servo.field.memory
     save_curve(session.field.edited(memory), out / CURVE_FILE)
     return replace(summary, stretch=stretch_summary(session.field, memory))
 
@@ -202,12 +208,15 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
     if session.config.map == "rivers":
         return _clips_of_rivers(session, stride)
     kind, params, memory = session.haptic_map.compiled()
+    led = isinstance(session.field, Leading)
+    if led:
+        memory = session.servo.field.memory.copy()
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.
         points = session.curve.point(phases) if session.config.mode in STRETCHING else nearest
         poses = np.empty((len(points), session.haptic_map.nq))
-        poses_along(kind, params, memory, stylus_path(points), poses)
+        poses_along(kind, params, memory, walker_argument(phases) if led else stylus_path(points), poses)
         return poses
 
     return poses_at
@@ -251,6 +260,7 @@ def _write_animations(out: Path, session: Session) -> None:
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording, also of a run that was cut short."""
     from experiments.figures import draw_figures
+    from experiments.lead_figure import draw_lead
     from experiments.report import write_report
     from experiments.stretch_figure import draw_stretch
 
@@ -260,6 +270,9 @@ def write_report_of(folder: Path) -> None:
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")
             draw_stretch(recording, folder, figures[0])
+        if config.mode == "lead":
+            figures.insert(0, folder / FIGURES / "lead.png")
+            draw_lead(recording, figures[0])
         title = f"{config.mode.upper()} over {', '.join(Path(clip).stem for clip in config.clips)}"
         write_report(folder / REPORT, recording, world_model(config.scene), title, _lines(recording), figures)
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from experiments.changes import RiverChange
+from experiments.lead_measures import LeadSummary
 from experiments.stretch import StretchSummary
 
 
@@ -133,7 +134,10 @@ class SpeedSummary:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it; `lines` says it in five sentences, one more for a bent curve, changes of river, a tank that acted."""
+    """All of it; `lines` says it in five sentences, one more for a bent curve, changes of river, a tank that acted.
+
+    Where a figure was led, two sentences tell of that instead of the curve.
+    """
 
     path: PathSummary
     animation: AnimationSummary
@@ -143,6 +147,7 @@ class RunSummary:
     warnings: dict[str, int]
     stretch: StretchSummary | None = None
     changes: tuple[RiverChange, ...] = ()
+    lead: LeadSummary | None = None
 
     def lines(self) -> list[str]:
         """What happened, a sentence each."""
@@ -154,14 +159,17 @@ class RunSummary:
         bent = [] if self.stretch is None else [self.stretch.line()]
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
-        return [
-            *bent,
-            *changed,
-            *([held] if self.tank.scaled_ticks else []),
+        on_curve = [
             f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "
             f"{self.animation.unpushed_deg:.2f}° elsewhere.",
+        ]
+        return [
+            *bent,
+            *changed,
+            *([held] if self.tank.scaled_ticks else []),
+            *(on_curve if self.lead is None else self.lead.lines()),
             ("" if figure.fell_at is None else f"The physical figure fell at {figure.fell_at:.1f} s. Until then: ")
             + f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
             f"{figure.root_error_rms_cm:.2f} cm at the root; residual force {100 * figure.residual_force_rms:.1f} % "

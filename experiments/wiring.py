@@ -11,10 +11,13 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import ARGUMENT, PATH, Leading
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.led import Led
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
@@ -24,6 +27,8 @@ from experiments.budget import energy_tank
 from experiments.config import STRETCHING, RunConfig
 from experiments.expression import expressive_figure, lap_turns, oriented
 from experiments.governor import governed_law
+from experiments.lead import law as lead_law
+from experiments.lead import lead_static, leading_hand, led_map, s_curve, walker_argument
 from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.modes import Field, default_rivers
@@ -66,7 +71,7 @@ class Session:
     remarks: tuple[str, ...]
     curve: Trajectory
     field: Field
-    clip_map: ClipMap
+    clip_map: ClipMap | Led
     haptic_map: HapticMap
     world: World
     figure: Figure
@@ -87,6 +92,7 @@ class Session:
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),
+            **(lead_static(self.field) if isinstance(self.field, Leading) else {}),
             **self._rivers(),
         }
 
@@ -145,11 +151,15 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     if config.governor and config.mode in STRETCHING:
         raise ParameterError(f"a curve that is bent has no governor; leave out --governor, or --mode {config.mode}")
     world = World(config.scene)
-    curve = Trajectory.circle(config.radius, config.lap)
+    leading = config.mode == "lead"
+    curve = s_curve() if leading else Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
-    rivers = None
-    if config.map.endswith(MAP_SUFFIX):
+    rivers, led = None, None
+    if leading:
+        blended, gait = led_map(_only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
+        led = lead_law(config, gait)
+    elif config.map.endswith(MAP_SUFFIX):
         blended, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)
         if isinstance(blended, Lifted):
@@ -159,35 +169,44 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         blended = _haptic_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
-    haptic_map = expressive_figure(blended) if config.expressive else blended
+    haptic_map = expressive_figure(blended) if config.expressive and not isinstance(blended, Led) else blended
+    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
+    urged = 0.0
+    if led is not None:
+        field = led
+    elif config.mode in STRETCHING:
+        field = stretch_law(config, curve, grabs)
+    else:
+        assert not isinstance(blended, Led)
+        field, urged = governed_law(config, curve, blended, rivers)
+    program = field.program() if leading else oriented(field.program(), config, curve)
+    if config.walls:
+        walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
+        program = program + walls.program()
+    memory, period = program.fresh_memory(), config.scene.servo_period
     compiled = haptic_map.compiled()
-    period = config.scene.servo_period
+    if leading:
+        # The path that the figure is on is the one that the field lays.
+        compiled = compiled._replace(memory=memory)
     reference = make_reference(
         world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend, packed_legs(world.figure)
     )
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
-    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
     poses = np.empty((1, haptic_map.nq))
-    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), stylus_path(start[None]), poses)
-    user = _user(config, curve, grabs)
+    argument = walker_argument(np.zeros(1)) if leading else stylus_path(start[None])
+    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
+    user = _user(config, curve, grabs) if led is None else leading_hand(led)
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
-    if config.mode in STRETCHING:
-        field, urged = stretch_law(config, curve, grabs), 0.0
-    else:
-        field, urged = governed_law(config, curve, blended, rivers)
-    program = oriented(field.program(), config, curve)
-    if config.walls:
-        walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
-        program = program + walls.program()
     limiter = ForceLimiter(period)
     tank = energy_tank(config, curve, limiter, grabs, urged)
+    port = phantom_port(world.model, world.data, period, config.cutoff)
     servo = Servo(
         plant=make_plant(world),
-        port=phantom_port(world.model, world.data, period, config.cutoff),
+        port=port,
         field=CompiledField(
-            ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
+            ops=program.ops, params=program.params, memory=memory, limits=limiter.limits(),
             limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
@@ -195,9 +214,17 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
+        argument=memory[TRACE_SIZE + ARGUMENT :][:7] if leading else port.hand[1:8],
     )  # fmt: skip
-    remarks += _pace_remark(curve.duration, blended.lap_seconds)
+    if not isinstance(blended, Led):
+        remarks += _pace_remark(curve.duration, blended.lap_seconds)
     return Session(config, clips, remarks, curve, field, blended, haptic_map, world, figure, servo)
+
+
+def _only(clips: tuple[Clip, ...]) -> Clip:
+    if len(clips) != 1:
+        raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
+    return clips[0]
 
 
 def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:

@@ -50,7 +50,11 @@ class Field(NamedTuple):
 
 
 class Servo(NamedTuple):
-    """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks."""
+    """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
+
+    `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or of the
+    field's memory, where a walker is that the field moves.
+    """
 
     plant: Plant
     port: PhantomPort
@@ -59,6 +63,7 @@ class Servo(NamedTuple):
     reference: CompiledReference
     figure: BodyState
     figure_ticks: int
+    argument: Array
 
 
 class TickLog(NamedTuple):
@@ -133,9 +138,9 @@ def field_force(servo: Servo) -> None:
 
 @njit
 def move_figure(servo: Servo) -> None:
-    """Update the animation at the measured stylus, and the torques that follow it."""
+    """Update the animation at the map's argument, and the torques that follow it."""
     reference = servo.reference
-    update_reference(reference, servo.port.hand[1:8], servo.field.memory[:TRACE_SIZE])
+    update_reference(reference, servo.argument, servo.field.memory[:TRACE_SIZE])
     drive(servo.figure, reference.pose, reference.velocity, reference.acceleration)
 
 

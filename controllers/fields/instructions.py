@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from controllers.fields.python_law import PythonLaw
 
 FOLLOW, BUNNY, EXTERNAL, ADD, HIGHER_ORDER, RECORDED, GATE, BLEND, LIMIT, STRETCHY = range(10)
-GOVERNOR, SOFT_WALL, ORIENTATION = 11, 12, 13
+LEADING, GOVERNOR, SOFT_WALL, ORIENTATION = 10, 11, 12, 13
 STACK = 16
 
 # What an instruction adds to the stack; a law adds its wrench.

@@ -18,6 +18,7 @@ from controllers.fields.instructions import (
     GATE,
     GOVERNOR,
     HIGHER_ORDER,
+    LEADING,
     LIMIT,
     ORIENTATION,
     RECORDED,
@@ -28,6 +29,7 @@ from controllers.fields.instructions import (
     TRACE_ROW,
     Program,
 )
+from controllers.fields.leading import leading_wrench
 from controllers.fields.orientation import orientation_wrench
 from controllers.fields.soft_wall import soft_wall_wrench
 from controllers.fields.stretchy_tubes import stretchy_wrench
@@ -74,6 +76,9 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
             top += 1
         elif opcode == SOFT_WALL:
             soft_wall_wrench(params, at, curve, memory, slot, hand, stack[top])
+            top += 1
+        elif opcode == LEADING:
+            leading_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
         elif opcode == GOVERNOR:
             governor_wrench(params, at, curve, memory, slot, hand, stack[top])

@@ -6,6 +6,7 @@ from numba import njit
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express
+from controllers.haptic_map.led import LED, led_map
 from controllers.haptic_map.lifted import LIFTED, lifted_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
@@ -25,6 +26,8 @@ def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array
         robot_arm_map(params, x, memory, pose, jacobian)
     elif kind == RIVER_CLIPS:
         river_clips_map(params, x, memory, pose, jacobian)
+    elif kind == LED:
+        led_map(params, x, memory, pose, jacobian)
 
 
 @njit

@@ -51,7 +51,7 @@ def _rotations(channels: Array, joint: int) -> Rotation:
     return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
 
 
-def end_lag(places: Array, drifts: Array) -> Array:
+def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array:
     """λ of an end at equal steps of the lap: the share of the lap's movement that it has done, less that of the lap.
 
     Parameters
@@ -60,13 +60,15 @@ def end_lag(places: Array, drifts: Array) -> Array:
         Of the end in the remainders of m clips [m].
     drifts : Array, shape (m, 3)
         Their ξ.
+    weights : Array, shape (m,), optional
+        How much each clip counts; by default as much as it turns, for only then does λ matter to a blend.
 
     Returns
     -------
     Array, shape (n,)
     """
     n = len(places)
-    weights = np.abs(drifts[:, 2])
+    weights = np.abs(drifts[:, 2]) if weights is None else weights
     if not weights.any():
         return np.zeros(n)
     rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]

@@ -33,10 +33,13 @@ class Contacts(NamedTuple):
         the body.
     touching : array of bool, shape (n, m)
         Which of them are taken to bear load.
+    resting : array of bool, shape (n, m)
+        Which of them do so at rest: of these, one that skids over the floor in the middle of its swing is none.
     """
 
     heights: Array
     touching: Mask
+    resting: Mask
 
     @property
     def clearance(self) -> Array:
@@ -52,6 +55,11 @@ class Contacts(NamedTuple):
     def standing(self) -> Mask:
         """Whether each foot bears load, left and right, shape (n, 2)."""
         return np.stack([self.touching[:, :4].any(axis=1), self.touching[:, 4:8].any(axis=1)], axis=1)
+
+    @property
+    def planted(self) -> Mask:
+        """Whether each foot stands at rest, left and right, shape (n, 2)."""
+        return np.stack([self.resting[:, :4].any(axis=1), self.resting[:, 4:8].any(axis=1)], axis=1)
 
 
 def contacts(clip: Clip) -> Contacts:
@@ -77,7 +85,7 @@ def contacts(clip: Clip) -> Contacts:
     reach[len(FOOT_CONTACTS) : len(spheres)] = _HAND_REACH
     rests = (heights < reach) & (speeds < _SLOW)
     skids = (heights < _LOW) & (slides < _LEVEL)
-    return Contacts(heights, (heights < _CERTAIN) | rests | skids)
+    return Contacts(heights, (heights < _CERTAIN) | rests | skids, rests)
 
 
 def _slower_side(speeds: Array) -> Array:

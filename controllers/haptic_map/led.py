@@ -1,0 +1,235 @@
+r"""The led figure: a clip that walks straight on walks on a path instead, and its feet stand where they were put.
+
+.. math:: X_{root}(s) = A(s)\,\rho(s/\ell), \qquad X_{foot}(s) = A(s + \ell\,\lambda(s/\ell))\,\rho_{foot}(s/\ell)
+
+A(s) ∈ SE(2) is the figure's path (`controllers.curves.walked_path`), ℓ the length of the clip's lap, ρ what is left of
+a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓλ rests, and advances while it swings
+(`limbs`): so a foot that stands stays where it is, however path and pelvis turn over it. The legs follow. Bends are
+walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.walked_path import (
+    PATH_HEADING,
+    PATH_LEAN,
+    PATH_X,
+    PATH_Y,
+    ROWS,
+    STEP,
+    path_value,
+    straight_path,
+)
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
+from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
+from controllers.haptic_map.loops import checked_clip, closed_loop, turned, yawed
+from controllers.haptic_map.splines import basis, basis_slope, control_points
+from controllers.rotations import multiply, relative
+from controllers.state import Array, Pose
+
+LED = 7
+_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _HEADER = range(7)
+
+_LEAST_TRAVEL = 0.5  # [m] of a lap
+_LARGEST_TURN = np.deg2rad(30.0)  # of a lap
+
+
+@njit
+def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array) -> None:
+    """Channels at a phase of the lap, and their derivatives by it, from uniform cubic B-splines."""
+    place = (lap - np.floor(lap)) * samples
+    row = min(int(place), samples - 1)
+    b0, b1, b2, b3 = basis(place - row)
+    d0, d1, d2, d3 = basis_slope(place - row)
+    n = value.shape[0]
+    for k in range(n):
+        at = row * n + k
+        p0, p1, p2, p3 = rows[at], rows[at + n], rows[at + 2 * n], rows[at + 3 * n]
+        value[k] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+        slope[k] = samples * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+
+
+@njit
+def _carried(
+    memory: Array, path: int, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
+    slope: Array, p: Array, q: Array, spin: Array,
+) -> None:  # fmt: skip
+    """Carry what stands at a place in the frame A(s), leaning to the left about the path on the floor.
+
+    Parameters
+    ----------
+    memory, path, s
+        The path, and the arc length of the frame [m].
+    pace, rate : float
+        Derivatives of s and of the lap by the figure's arc length [1, 1/m].
+    lean, leaning : float
+        φ [rad] and its derivative by the same [rad/m].
+    value, slope : Array, shape (7,)
+        Place and quaternion, and their derivatives by the lap.
+    p, q, spin : Array, shapes (2, 3), (4,), (3, 1)
+        Written: place and its derivative by the figure's arc length, unit quaternion, local angular velocity by it.
+    """
+    (x, d_x), (y, d_y) = path_value(memory, path, s, PATH_X), path_value(memory, path, s, PATH_Y)
+    heading, turn = path_value(memory, path, s, PATH_HEADING)
+    c, sine = np.cos(heading), np.sin(heading)
+    upright, over = np.cos(lean), np.sin(lean)
+    side, high = upright * value[1] + over * value[2], upright * value[2] - over * value[1]
+    d_side = rate * (upright * slope[1] + over * slope[2]) + leaning * high
+    p[0, 0], p[0, 1], p[0, 2] = c * value[0] - sine * side, sine * value[0] + c * side, high
+    p[1, 0] = pace * (d_x - turn * p[0, 1]) + rate * c * slope[0] - sine * d_side
+    p[1, 1] = pace * (d_y + turn * p[0, 0]) + rate * sine * slope[0] + c * d_side
+    p[1, 2] = rate * (upright * slope[2] - over * slope[1]) - leaning * side
+    p[0, 0] += x
+    p[0, 1] += y
+    _unit(value[3:], slope[3:], rate, q, spin)
+    q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * lean), -np.sin(0.5 * lean), 0.0, 0.0, q[0], q[1], q[2], q[3])
+    spin[0, 0] -= leaning * (1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
+    spin[1, 0] -= leaning * 2.0 * (q[1] * q[2] - q[0] * q[3])
+    spin[2, 0] -= leaning * 2.0 * (q[1] * q[3] + q[0] * q[2])
+    up_x, up_y = 2.0 * (q[1] * q[3] - q[0] * q[2]), 2.0 * (q[2] * q[3] + q[0] * q[1])
+    spin[0, 0] += pace * turn * up_x
+    spin[1, 0] += pace * turn * up_y
+    spin[2, 0] += pace * turn * (1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
+    q[0], q[1], q[2], q[3] = multiply(
+        np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading), q[0], q[1], q[2], q[3]
+    )  # fmt: skip
+
+
+@njit
+def _unit(value: Array, slope: Array, rate: float, q: Array, spin: Array) -> None:
+    """Unit quaternion of four channels and its local angular velocity (3, 1), 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
+    scale = 1.0 / np.sqrt(max(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2, 1e-12))
+    for j in range(4):
+        q[j] = scale * value[j]
+    _, x, y, z = relative(q[0], q[1], q[2], q[3], slope[0], slope[1], slope[2], slope[3])
+    spin[0, 0], spin[1, 0], spin[2, 0] = 2.0 * rate * scale * x, 2.0 * rate * scale * y, 2.0 * rate * scale * z
+
+
+@njit
+def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Led`: h(s) with s = x[0], and h_* unless `jacobian` has no rows; the memory is only read."""
+    stride, path = params[_STRIDE], int(params[_PATH])
+    samples, rotations, limbs = int(params[_SAMPLES]), int(params[_ROTATIONS]), int(params[_LIMBS])
+    n, s = 3 + 4 * rotations + END * limbs, x[0]
+    value, slope = np.empty(n), np.empty(n)
+    _channels(params[_HEADER + LIMB * limbs :], samples, s / stride + params[_PHASE], value, slope)
+    q, spins, root, end = np.empty((rotations, 4)), np.empty((rotations, 3, 1)), np.empty((2, 3)), np.empty((2, 3))
+    rate, tangents = 1.0 / stride, 1 if jacobian.shape[0] > 0 else 0
+    lean, leaning = path_value(memory, path, s, PATH_LEAN)
+    _carried(memory, path, s, 1.0, rate, lean, leaning, value, slope, root, q[0], spins[0])
+    for joint in range(1, rotations):
+        at = 3 + 4 * joint
+        _unit(value[at : at + 4], slope[at : at + 4], rate, q[joint], spins[joint])
+    part, change = np.empty(7), np.empty(7)
+    for i in range(limbs):
+        limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
+        last, at = int(limb[2]), 3 + 4 * rotations + END * i
+        part[:3], change[:3] = value[at : at + 3], slope[at : at + 3]
+        part[3:], change[3:] = value[3 + 4 * last : 7 + 4 * last], slope[3 + 4 * last : 7 + 4 * last]
+        there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
+        _carried(memory, path, there, pace, rate, 0.0, 0.0, part, change, end, q[last], spins[last])
+        place_limb(limb, q, spins, root, end, tangents)
+    pose[:3] = root[0]
+    for joint in range(rotations):
+        pose[3 + 4 * joint : 7 + 4 * joint] = q[joint]
+    if tangents:
+        jacobian[:] = 0.0
+        jacobian[:3, 0] = root[1]
+        for joint in range(rotations):
+            jacobian[3 + 3 * joint : 6 + 3 * joint, 0] = spins[joint, :, 0]
+
+
+class Led(HapticMap):
+    r"""A clip that travels, on the path of a figure that is led (see `controllers.fields.leading`).
+
+    The map's argument is not the stylus but the walker: ``[s, 0, 0, 1, 0, 0, 0]``, s the arc length [m]. The memory
+    is the field's, in which the path lies; `compiled` gives one of its own, with a path straight on from the origin.
+
+    Parameters
+    ----------
+    clip : (Array, float)
+        Poses (n, nq) and frames per second. A clip that does not close is closed (`closed_loop`).
+    limbs : sequence of Limb
+        Legs whose feet stand.
+    phase : float
+        Share of the lap at which the figure is at s = 0.
+    at : int
+        Where the packed path begins in the memory.
+
+    Raises
+    ------
+    ParameterError
+        If the clip does not travel by 0.5 m a lap, or turns by more than 30° meanwhile.
+    """
+
+    def __init__(self, clip: tuple[Array, float], limbs: Sequence[Limb], phase: float = 0.0, at: int = 0) -> None:
+        poses, fps = clip
+        loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
+        self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
+        self.duration = loop.duration
+        if self.stride < _LEAST_TRAVEL or abs(loop.drift[2]) > _LARGEST_TURN:
+            raise ParameterError(
+                f"a clip that is led must go somewhere: {_LEAST_TRAVEL} m or more a lap, turning by at most "
+                f"{np.degrees(_LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
+                f"{np.degrees(loop.drift[2]):.0f}°. Walk and run do"
+            )
+        samples = int(np.clip(len(poses) - 1, 64, 2048))
+        channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
+        # The path is along x, whichever way the figure faces while it goes.
+        course = -np.arctan2(loop.drift[1], loop.drift[0])
+        channels[:, :2] = turned(course, channels[:, :2])
+        channels[:, 3:7] = yawed(course, channels[:, 3:7])
+        drift = np.array([[self.stride, 0.0, loop.drift[2]]])
+        rows = channels
+        for limb in limbs:
+            lag = end_lag(end_poses(channels[:, None], limb)[0], drift, np.ones(1))
+            quaternions, ends = end_channels(channels[:, None], drift, limb, lag)
+            column = 3 + 4 * limb.joints[2]
+            rows = np.concatenate([rows, ends[:, 0]], axis=1)
+            rows[:, column : column + 4] = quaternions[:, 0]
+        self._rotations = (channels.shape[1] - 3) // 4
+        lags = rows[:, channels.shape[1] + 3 :: END]
+        self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
+        signs = np.ones(rows.shape[1])
+        for first in range(3, channels.shape[1], 4):
+            signs[first : first + 4] = 1.0 if rows[-1, first : first + 4] @ rows[0, first : first + 4] >= 0.0 else -1.0
+        header = [self.stride, phase, at, samples, self._rotations, len(limbs)]
+        self._params = np.concatenate(
+            [header, *(limb.packed() for limb in limbs), control_points(rows, signs).ravel()]
+        )  # fmt: skip
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return 3 + 4 * self._rotations
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent."""
+        return 3 + 3 * self._rotations
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with a straight path through the origin along x, 30 m to both sides."""
+        at, half = int(self._params[_PATH]), 0.5 * ROWS * STEP
+        return CompiledMap(LED, self._params, np.concatenate([np.zeros(at), straight_path(0.0, 0.0, 0.0, half)]))
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration at x = [s, …], shape (nq,), on the memory's path, or on a straight one."""
+        return self._evaluate(x, memory, 0)[0]
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative by x, shape (nv, 6): the first column is the one by s, the others are zero."""
+        return self._evaluate(x, memory, self.nv)[1]
+
+    def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:
+        walker = np.asarray(x, dtype=np.float64)
+        if walker.shape != (STYLUS,):
+            raise ParameterError(f"the walker of a map has shape ({STYLUS},), got {walker.shape}")
+        pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
+        led_map(self._params, walker, self.compiled().memory if memory is None else memory, pose, jacobian)
+        return pose, jacobian

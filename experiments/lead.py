@@ -1,0 +1,120 @@
+"""LEADING as a run: gait, field, and the hand that leads forward along an S and then straight back."""
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.leading import Gait, Leading
+from controllers.haptic_map.led import Led
+from controllers.haptic_map.limbs import Limb
+from experiments.config import RunConfig
+from models.mocap.clip import Clip
+from models.mocap.contacts import contacts
+from sim.users.arm import Arm
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+FORTH = 5.0  # [s] along the S at the clip's own pace
+PAUSE, BACK_PACE = 0.8, 0.5
+STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
+_BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
+_FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
+_PHASES = 256
+
+
+def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
+    """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
+
+    Raises
+    ------
+    ParameterError
+        If the clip does not travel, or has no frame in which a foot stands.
+    """
+    standing = contacts(clip).planted.sum(axis=1)
+    phases = np.linspace(0.0, 1.0, _PHASES, endpoint=False)
+    support = standing[np.round(phases * (clip.n_frames - 1)).astype(int)].astype(np.int64)
+    if not support.any():
+        raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
+    first = _middle_of_longest(support == support.max())
+    led = Led((clip.poses, clip.fps), legs, phases[first], at)
+    return led, Gait(led.stride, led.stride / led.duration, np.roll(support, -first), led.reach)
+
+
+def _middle_of_longest(mask: npt.NDArray[np.bool_]) -> int:
+    """Middle of the longest run of a mask that goes round."""
+    n = len(mask)
+    if mask.all():
+        return 0
+    start = int(np.argmin(mask))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], np.roll(mask, -start).astype(int), [0]))))
+    k = int(np.argmax(edges[1::2] - edges[::2]))
+    return int((edges[2 * k] + edges[2 * k + 1]) // 2 + start) % n
+
+
+def s_curve() -> Trajectory:
+    """The S along which the default hand leads, in the plane z = 0 of H: two arcs, by arc length [m]."""
+    radius = (_TO - _FROM) / (4.0 * np.sin(_BEND))
+    turn = np.linspace(-_BEND, _BEND, 65)
+    headings = np.concatenate([turn, turn[-2::-1]])
+    steps = radius * (turn[1] - turn[0])
+    middle = 0.5 * (headings[1:] + headings[:-1])
+    ways = np.stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))], axis=1) * steps
+    points = np.array([_FROM, 0.0, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
+    return Trajectory(steps * np.arange(len(points)), points)
+
+
+def law(config: RunConfig, gait: Gait) -> Leading:
+    """Field of the mode "lead".
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval.
+    """
+    if config.map != "cylindrical" or config.user == "push" or config.walls or config.governor or config.expressive:
+        raise ParameterError(
+            "in the mode lead the map is the led figure's and the hand leads; leave --map, --user push, --walls, "
+            "--governor and --expressive away"
+        )
+    curve = s_curve()
+    x, y, _ = curve.point(curve.start)
+    scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
+    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping)
+
+
+def leading_hand(field: Leading, period: float = 0.01) -> Arm:
+    """The default hand: a pause, along the S at the gait's own pace, a pause, straight back more slowly."""
+    curve = s_curve()
+    seconds = field.scale * curve.length / field.gait.speed
+    start, end = curve.point(curve.start), curve.point(curve.end)
+    away = float(np.linalg.norm(end - start)) / curve.length
+    forth, back = _eased(seconds, period), _eased(seconds * away / BACK_PACE, period)
+    path = np.concatenate([
+        np.tile(start, (round(PAUSE / period), 1)), curve.point(curve.start + curve.duration * forth),
+        np.tile(end, (round(PAUSE / period), 1)), end + back[:, None] * (start - end),
+    ])  # fmt: skip
+    return Arm(STIFFNESS, path=path, period=period)
+
+
+def walker_argument(s: Array) -> Array:
+    """What the led figure's map is evaluated at, for arc lengths s (n,); shape (n, 7)."""
+    argument = np.zeros((len(s), 7))
+    argument[:, 0], argument[:, 3] = s, 1.0
+    return argument
+
+
+def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
+    """Progress from 0 to 1 at an even pace that sets in and dies down within `ease` seconds."""
+    t = np.arange(period, seconds + ease, period)
+    pace = np.clip(np.minimum(t, seconds + ease - t) / ease, 0.0, 1.0)
+    pace = pace * pace * (3.0 - 2.0 * pace)
+    total = np.cumsum(pace)
+    return total / total[-1]
+
+
+def lead_static(field: Leading) -> dict[str, npt.ArrayLike]:
+    """What a recording keeps of a field that leads: its scale, and the feet that bear over a lap of its gait."""
+    gait = field.gait
+    return {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}

@@ -1,0 +1,110 @@
+"""What is measured of a led run, on motions whose answer is known; and what of a configuration is refused."""
+
+import numpy as np
+import pytest
+
+from controllers.errors import ParameterError
+from controllers.fields.leading import Gait
+from experiments.cli import main
+from experiments.config import RunConfig
+from experiments.lead import law, leading_hand, led_map, s_curve, walker_argument
+from experiments.lead_measures import LeadSummary, _Retrace, _Soles, support_at
+from experiments.wiring import figure_legs, load_clips, wire
+from models.humanoid.skeleton import figure_model, rest_pose
+from models.mocap.clip import PlanarDisplacement
+from models.mocap.library import embedded
+from models.scene import SceneConfig
+from sim.world import phantom_angles
+
+GAIT = Gait(1.4, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.45)
+
+
+def poses_along(places: np.ndarray, aside: float = 0.0, turned: float = 0.0) -> np.ndarray:
+    """Rest poses on a circle of 3 m, at arc lengths [m]."""
+    angles = places / 3.0
+    radius = 3.0 - aside
+    return np.array([
+        PlanarDisplacement(radius * np.sin(a), 3.0 - radius * np.cos(a), a + turned).moved(rest_pose()) for a in angles
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize(("aside", "turned"), [(0.0, 0.0), (0.02, 0.0), (-0.03, np.radians(4.0))])
+def test_how_far_a_figure_is_from_the_way_on_which_it_came(aside: float, turned: float) -> None:
+    measure = _Retrace()
+    forth, back = np.arange(0.0, 4.0, 0.01), np.arange(3.5, 0.5, -0.013)
+    measure.add(forth[:150], poses_along(forth[:150]), -np.inf)
+    measure.add(forth[150:], poses_along(forth[150:]), float(forth[149]))
+    assert measure.result() == (None, None)
+    measure.add(back, poses_along(back, aside, turned), float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance == pytest.approx(100.0 * abs(aside), abs=0.02)
+    assert turn == pytest.approx(np.degrees(turned), abs=0.05)
+
+
+def test_how_far_soles_slide_while_they_touch() -> None:
+    measure, standing = _Soles(SceneConfig()), rest_pose()
+    lowest = _Soles(SceneConfig())
+    lowest.add(standing[None])
+    moved = np.tile(standing, (5, 1))
+    moved[:, 0] += [0.0, 0.01, 0.02, 0.0, 0.0]
+    moved[3, 2] += 0.1
+    measure.add(moved)
+    assert measure.slide == pytest.approx(0.02, abs=1e-9)
+
+
+def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
+    field = law(RunConfig(mode="lead"), GAIT)
+    path = leading_hand(field).path
+    for place in path[::50]:
+        phantom_angles(place)
+    np.testing.assert_allclose(path[[0, -1], :2], [field.start] * 2, atol=1e-9)
+    np.testing.assert_allclose(path[len(path) // 2, 2], 0.0, atol=1e-12)
+    curve = s_curve()
+    assert np.hypot(*np.ptp(path[:, :2], axis=0)) == pytest.approx(0.14, rel=0.1)
+    assert field.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
+
+
+@pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
+def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
+    led, gait = led_map(embedded(name), figure_legs(figure_model()), 0)
+    assert gait.support[0] == most
+    field = law(RunConfig(mode="lead"), gait)
+    assert support_at(field, np.array([0.0]))[0] == most
+    assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
+
+
+def test_the_lines_tell_it() -> None:
+    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 0.2, 0.1, 2.0, 1.0)
+    assert summary.lines() == [
+        "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
+        "by up to 1.5 cm.",
+        "Back it retraced its way within 0.20 cm and 0.10°, the physical figure within 2.0 cm and 1.0°. The hand felt "
+        "up to 1.1 N.",
+    ]
+    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, None, None, None, None)
+    assert never.lines()[1].startswith("The figure was not led back.")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"map": "composite"}, "leave --map"),
+        ({"user": "push"}, "--user push"),
+        ({"walls": True}, "--walls"),
+        ({"clips": ("walk", "run")}, "one clip is led, got 2"),
+        ({"clips": ("cheer",)}, "must go somewhere"),
+        ({"floor_scale": -1.0}, "scale must be finite"),
+        ({"leash": -1.0}, "k_l must be finite"),
+    ],
+)
+def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
+    config = RunConfig(mode="lead", **options)
+    with pytest.raises(ParameterError, match=says):
+        wire(config, load_clips(config.clips)[0])
+
+
+def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:
+    code = main(["run", "--mode", "lead", "--clips", "cheer", "--out", str(tmp_path / "run")])
+    assert code == 2
+    assert "hvf: a clip that is led must go somewhere" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,51 @@
+"""LEADING: the default hand on a mass leads a walk along the S and straight back; both go where they ever went.
+
+Run this file to write their ways anew, after a change that means to change them.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import ARGUMENT, Gait
+from controllers.fields.program import evaluate
+from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
+from experiments.config import RunConfig
+from experiments.lead import law, leading_hand
+from sim.users.arm import hand_force
+
+GOLDEN = Path(__file__).with_name("lead.json")
+GAIT = Gait(1.375, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.47)
+MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 19.0, 250
+
+
+def _run() -> dict[str, list]:
+    field = law(RunConfig(mode="lead"), GAIT)
+    program, arm = field.program(), leading_hand(field).compiled()
+    memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
+    p, v, ways = np.array([*field.start, 0.001]), np.zeros(3), []
+    for k in range(round(SECONDS / PERIOD)):
+        hand[0] = k * PERIOD
+        hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
+        evaluate(program.ops, program.params, memory, hand, wrench)
+        hand_force(arm, k * PERIOD, p, v, user)
+        if k % EVERY == 0:
+            ways.append([*p.tolist(), float(memory[TRACE_SIZE + ARGUMENT])])
+        v = v + PERIOD / MASS * (wrench[:3] + user)
+        p = p + PERIOD * v
+    return {"ways": ways}
+
+
+def test_the_hand_leads_and_the_figure_follows_as_they_did() -> None:
+    golden, now = np.array(json.loads(GOLDEN.read_text(encoding="utf-8"))["ways"]), np.array(_run()["ways"])
+    np.testing.assert_allclose(now[:, :3], golden[:, :3], atol=1e-8)
+    np.testing.assert_allclose(now[:, 3], golden[:, 3], atol=1e-6)
+    # Along the S and back again.
+    assert now[:, 3].max() > 5.0
+    assert abs(now[-1, 3]) < 0.1
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text(json.dumps(_run()) + "\n", encoding="utf-8")
