@@ -1,0 +1,112 @@
+"""Rivers that play clips: which clip, which frame, its derivative, and where the figure stands after a change."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from clips_for_maps import LEG, difference, matrices, swinging
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.haptic_map.river_clips import RIVER, RiverClips, change_clip, heading_between, place_clip, takes_over
+
+CLIPS = [(swinging(1, travel=1.3), 30.0), (swinging(2, turns=1.0), 30.0)]
+RNG = np.random.default_rng(5)
+BESIDE = np.array([0.0, 0.002, 0.0])
+
+
+def _eight() -> Trajectory:
+    angle = np.linspace(0.0, 2.0 * np.pi, 129)
+    points = np.stack((0.06 * np.sin(angle), 0.03 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
+    points[-1] = points[0]
+    return Trajectory(4.0 * angle / (2.0 * np.pi), points, periodic=True)
+
+
+CURVES = [Trajectory.circle(0.05, 4.0), _eight()]
+MAP = RiverClips(CURVES, CLIPS, 0.02, [LEG])
+
+
+def _stylus(p: np.ndarray) -> np.ndarray:
+    return np.concatenate([p, [1.0, 0.0, 0.0, 0.0]])
+
+
+def _memory(river: int, phase: float = np.nan) -> np.ndarray:
+    memory = MAP.compiled().memory.copy()
+    change_clip(memory, float(river), phase)
+    return memory
+
+
+def test_a_lap_of_the_river_is_a_lap_of_its_clip() -> None:
+    memory = _memory(0)
+    for k in range(0, 121, 8):
+        pose = MAP.pose(_stylus(CURVES[0].point(4.0 * k / 120.0) * 1.1), memory)
+        expected = CLIPS[0][0][k % 120, 7:]
+        np.testing.assert_allclose(matrices(pose[7:].reshape(-1, 4)), matrices(expected.reshape(-1, 4)), atol=1e-6)
+
+
+def test_a_river_that_crosses_itself_keeps_its_frame_at_the_crossing() -> None:
+    memory = _memory(1, 1.9)
+    steps = []
+    last = MAP.pose(_stylus(CURVES[1].point(1.9)), memory)
+    for t in np.linspace(1.9, 2.1, 41)[1:]:
+        # A hand that is a little off, on either side.
+        pose = MAP.pose(_stylus(CURVES[1].point(t) + BESIDE), memory)
+        steps.append(np.abs(difference(pose, last)).max())
+        last = pose
+    assert max(steps) < 0.15
+    # Without what was before, the nearest point of all counts: it is on the other branch half of the time.
+    lost = [MAP.pose(_stylus(CURVES[1].point(t) + BESIDE), _memory(1)) for t in np.linspace(1.9, 2.1, 41)]
+    jumps = [np.abs(difference(b, a)).max() for a, b in pairwise(lost)]
+    assert max(jumps) > 0.3
+
+
+def test_the_derivative_is_that_of_the_pose() -> None:
+    for river in (0, 1):
+        for t in (0.3, 1.1, 3.3):
+            p = CURVES[river].point(t) + RNG.normal(size=3) * 0.003
+            jacobian = MAP.jacobian(_stylus(p), _memory(river, t))
+            for k in range(3):
+                step = np.zeros(3)
+                step[k] = 1e-6
+                ends = [MAP.pose(_stylus(p + sign * step), _memory(river, t)) for sign in (1.0, -1.0)]
+                np.testing.assert_allclose(jacobian[:, k], difference(*ends) / 2e-6, atol=2e-5 * np.abs(jacobian).max())
+            np.testing.assert_array_equal(jacobian[:, 3:], 0.0)
+
+
+def test_a_clip_is_placed_where_the_figure_stands_and_faces() -> None:
+    stylus = _stylus(CURVES[1].point(0.7))
+    memory = _memory(1, 0.7)
+    pose = MAP.pose(stylus, memory)
+    before = pose.copy()
+    place_clip(memory, pose, 2.0, -1.0, 0.8)
+    placed = MAP.pose(stylus, memory)
+    np.testing.assert_allclose(placed[:2], [2.0, -1.0], atol=1e-12)
+    assert placed[2] == before[2]
+    assert heading_between(before, placed) == pytest.approx(0.8, abs=1e-12)
+    np.testing.assert_allclose(placed[7:], before[7:], atol=1e-15)
+
+
+def test_no_river_and_none_that_there_is_not_take_over() -> None:
+    params = MAP.compiled().params
+    memory = _memory(0)
+    assert [takes_over(params, memory, river) for river in (-1.0, 0.0, 1.0, 2.0, np.nan)] == [0, 0, 1, 0, 0]
+    assert memory[RIVER] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("curves", "clips", "tube", "says"),
+    [
+        (CURVES, CLIPS[:1], 0.02, "1 clips and 2 rivers"),
+        ([], [], 0.02, "0 rivers"),
+        (
+            [CURVES[0], Trajectory([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])],
+            CLIPS,
+            0.02,
+            "river 1 is open",
+        ),
+        (CURVES, CLIPS, 0.0, "tube"),
+    ],
+)
+def test_what_makes_no_map_of_rivers_is_refused(curves, clips, tube, says) -> None:
+    with pytest.raises(ParameterError, match=says):
+        RiverClips(curves, clips, tube)

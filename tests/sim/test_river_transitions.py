@@ -1,0 +1,124 @@
+"""From one river's clip to another's: no jump of pose or velocity, feet that step, and the same again."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.haptic_map.river_clips import RiverClips
+from experiments.modes import river_bundle
+from experiments.wiring import figure_legs, load_clips, packed_legs, stylus_path
+from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
+from models.mocap.clip import pose_difference
+from sim.reference import make_reference, reference_along
+
+GOLDEN = Path(__file__).parent.parent / "golden" / "river_clips.csv"
+PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4
+FIGURE = figure_model()
+CURVES = [river.curve for river in river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, 0.015).rivers]
+CHANGES = ((1.4, 1), (2.9, 2), (4.3, 0), (5.8, 2))
+
+
+@pytest.fixture(scope="module")
+def clips_of_rivers() -> RiverClips:
+    clips = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
+    return RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE))
+
+
+def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.ndarray:
+    """Poses of a hand that glides from river to river, every 8 ms for 7.2 s."""
+    t = np.arange(900) * PERIOD
+    river, share = np.zeros(len(t)), np.zeros((3, len(t)))
+    share[0] = 1.0
+    for moment, number in CHANGES:
+        river[t >= moment] = number
+        s = np.clip((t - moment) / 0.3 + 0.5, 0.0, 1.0)
+        s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        share *= 1.0 - s
+        share[number] += s
+        if none_between:
+            river[(t >= moment - 0.1) & (t < moment)] = -1.0
+    points = sum(w[:, None] * curve.point(t % LAP) for w, curve in zip(share, CURVES, strict=True))
+    traces = np.zeros((len(t), TRACE_SIZE))
+    traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = river, t % LAP
+    reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, blend, packed_legs(FIGURE))
+    poses = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(points), traces, poses)
+    return poses
+
+
+def _at_changes(values: np.ndarray) -> np.ndarray:
+    """Largest of rows from three before to three behind each change."""
+    rows = [round(moment / PERIOD) for moment, _ in CHANGES]
+    return np.array([values[k - 3 : k + 3].max() for k in rows])
+
+
+def _rates(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest rate of a joint [rad/s] and of the root [m/s], each step."""
+    rate = np.abs(pose_difference(poses[:-1], poses[1:])) / PERIOD
+    return rate[:, 6:].max(axis=1), rate[:, :3].max(axis=1)
+
+
+def test_pose_and_velocity_are_continuous_at_a_change_and_without_inertialisation_they_are_not(clips_of_rivers) -> None:
+    joint, root = _rates(_played(clips_of_rivers, BLEND))
+    jumping_joint, jumping_root = _rates(_played(clips_of_rivers, 0.0))
+    # Within what the clips themselves do elsewhere.
+    assert _at_changes(joint).max() < 12.0
+    assert _at_changes(root).max() < 2.0
+    assert _at_changes(jumping_joint).min() > 60.0
+    poses = _played(clips_of_rivers, BLEND)
+    velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
+    jump = np.abs(np.diff(velocity, axis=0)).max(axis=1)
+    velocity = pose_difference(*(p for p in (_played(clips_of_rivers, 0.0)[:-1], _played(clips_of_rivers, 0.0)[1:])))
+    control = np.abs(np.diff(velocity / PERIOD, axis=0)).max(axis=1)
+    assert _at_changes(jump).max() < 5.0
+    assert _at_changes(control).min() > 60.0
+    assert jumping_root.max() > root.max()
+
+
+def test_the_figure_goes_on_where_it_stands(clips_of_rivers) -> None:
+    poses = _played(clips_of_rivers, BLEND)
+    ground = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1) / PERIOD
+    # It walked more than a metre before, and is not pulled back.
+    assert np.linalg.norm(poses[-1, :2] - poses[0, :2]) > 0.5
+    assert ground.max() < 2.0
+
+
+def test_feet_step_instead_of_sliding(clips_of_rivers) -> None:
+    poses, data = _played(clips_of_rivers, BLEND), mujoco.MjData(FIGURE)
+    ids = [FIGURE.geom(name).id for name in FOOT_CONTACTS]
+    points = np.empty((len(poses), len(ids), 3))
+    for pose, row in zip(poses, points, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(FIGURE, data)
+        row[:] = data.geom_xpos[ids]
+    height = points[..., 2] - FIGURE.geom_size[ids, 0]
+    step = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
+    for moment, _ in CHANGES:
+        first, last = round(moment / PERIOD), round((moment + BLEND) / PERIOD)
+        assert height[first:last].min() > -0.02
+        for side in ("left", "right"):
+            of_side = [k for k, name in enumerate(FOOT_CONTACTS) if name.startswith(side)]
+            lowest = height[first:last, of_side].argmin(axis=1)
+            rows = np.arange(last - first)
+            low = height[first:last, of_side][rows, lowest] < 0.01
+            assert step[first:last, of_side][rows, lowest][low].sum() < 0.08
+
+
+def test_while_no_river_has_the_hand_the_last_clip_plays(clips_of_rivers) -> None:
+    np.testing.assert_array_equal(_played(clips_of_rivers, BLEND, True), _played(clips_of_rivers, BLEND))
+
+
+def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
+    poses = _played(clips_of_rivers, BLEND)[::15]
+    np.testing.assert_allclose(poses, np.loadtxt(GOLDEN, delimiter=","), atol=1e-7)
+
+
+if __name__ == "__main__":
+    made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "walk", "angry"))[0]]
+    np.savetxt(
+        GOLDEN, _played(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), BLEND)[::15], fmt="%.10g", delimiter=","
+    )
