@@ -15,6 +15,7 @@ from controllers.certificates.energy import energy
 from controllers.certificates.hand import HandRange
 from controllers.certificates.laws import FOLLOW_LAW, LAWS
 from controllers.certificates.passivity import passivity
+from controllers.certificates.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
 from controllers.certificates.stability import River, boundary, stability
 from controllers.safety import ForceLimiter
@@ -34,6 +35,7 @@ from sim.world import phantom_angles
 Array = npt.NDArray[np.float64]
 
 CERTIFICATE, PAGE, PLOT = "certificate.json", "certificate.html", "stability.png"
+REGION_PLOT = "region.png"
 
 
 def phantom_device() -> Device:
@@ -70,13 +72,15 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
 
 
 def certify(rivers: Mapping[str, River], hands: HandRange, push: float) -> dict[str, Verdict]:
-    """Stability with hands within intervals, passivity, and the bound for a push [N]; energy is FOLLOW's alone."""
+    """Stability and region with hands within intervals, passivity; and the bound for a push [N], FOLLOW's alone."""
     verdicts: dict[str, Verdict] = {}
     for name, river in rivers.items():
         verdicts["stability" + name] = stability(river, hands.hands())
         verdicts["passivity" + name] = passivity(river)
+        ceiling = ForceLimiter(river.sampling.period).peak
+        verdicts["region" + name] = region(river, hands, ceiling, verdicts["stability" + name])
         if river.law is FOLLOW_LAW:
-            verdicts["energy" + name] = energy(river, push, ForceLimiter(river.sampling.period).peak)
+            verdicts["energy" + name] = energy(river, push, ceiling)
     return verdicts
 
 
@@ -90,7 +94,7 @@ def certify_into(
     config : RunConfig
         Of the run.
     out : Path
-        Folder; written are ``certificate.json``, ``certificate.html`` and ``stability.png``.
+        Folder; written are ``certificate.json``, ``certificate.html``, ``stability.png``, ``region.png``.
     delay : float
         Of the torques [s].
     hands : HandRange, optional
@@ -117,6 +121,8 @@ def certify_into(
     certificate = Certificate(certify(rivers, hands, push), hash_of(inputs), hashes_of(inputs))
     out.mkdir(parents=True, exist_ok=True)
     stability_figure(rivers[""], certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
+    if "ellipse" in certificate.verdicts["region"].figures:
+        region_figure(certificate.verdicts["region"]).savefig(out / REGION_PLOT, dpi=150)
     (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
     file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return certificate
@@ -143,6 +149,24 @@ def stability_figure(river: River, verdict: Verdict) -> Figure:
     return figure
 
 
+def region_figure(verdict: Verdict) -> Figure:
+    """Edge of the region and of the ball over offset and wrong speed, for the lightest and the heaviest hand."""
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
+    masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
+    certain = verdict.verdict == "certified"
+    for axes, (outer, inner), mass in zip(figure.subplots(1, 2), edges, masses, strict=True):
+        label = "region" if certain else "V decreases, the inertia frozen"
+        axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4" if certain else "#eeeeee", label=label)
+        axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3" if certain else "#9aa0aa")
+        if certain:
+            axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
+        axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
+        axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
+        axes.legend(frameon=False, fontsize=8, loc="upper right")
+    return figure
+
+
 def certificate_page(certificate: Certificate) -> str:
     """A readable page of a certificate, with the plot beside it."""
     colour = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
@@ -164,4 +188,6 @@ def certificate_page(certificate: Certificate) -> str:
         if verdict.counterexample:
             parts.append(f"<p>Counterexample: <code>{escape(str(dict(verdict.counterexample)))}</code></p>")
     parts.append(f"<img src='{PLOT}' alt='stability boundary'>")
+    if "region" in certificate.verdicts and "ellipse" in certificate.verdicts["region"].figures:
+        parts.append(f"<img src='{REGION_PLOT}' alt='region of attraction'>")
     return "\n".join(parts)
