@@ -1,7 +1,7 @@
 """The experiment that could refute a region: the linkage in MuJoCo from random states at its edge, inside and outside.
 
-Phase, hand and direction are drawn; the state is scaled to where V has the value wanted. Coulomb friction acts, encoders
-round, the river moves along its curve. What is certified: no distance beyond the region's, and in the end the ball.
+Phase, hand and direction are drawn; the state is scaled to where V has the value wanted. Coulomb friction acts,
+encoders round, the river moves along its curve. Certified: no distance beyond the region's, and in the end the ball.
 """
 
 from collections.abc import Mapping

@@ -1,14 +1,14 @@
 r"""A Lyapunov function of the sampled loop about its curve, found by IPOPT and checked on cells by interval bounds.
 
-State at a tick: x = (e, ν, y, f_1 … f_m): e = p − φ(t*); ν = v − λφ̇ and y = v̂ − λφ̇, velocity and filtered
-velocity less the pace that the hand comes to; f the forces of the last m ticks that are still on their way. With Λ(θ) the mass of
-linkage and hand at the tip,
+State at a tick: x = (e, ν, y, f_1 … f_m). e = p − φ(t*); ν and y are the velocity and the filtered velocity less
+λφ̇, the pace that the hand comes to; f are the forces of the last m ticks that are still on their way. With Λ(θ) the
+mass of linkage and hand at the tip,
 
 .. math:: V(x) = \sum_{ab} x_a^T (\alpha_{ab} I + \beta_{ab} \Lambda(\theta))\, x_b
 
-In the eigenvectors of Λ the loop falls apart into single axes of a mass μ, an eigenvalue: x⁺ = A(μ) x, P(μ) = α + βμ.
-Only e's share along the curve, which the nearest point takes away, τ = φ̇·e⁺/|φ̇|, couples them. With p_e(μ) = P(μ)ε_e, a_e the
-row of A that gives e⁺ less ε_e, q ≥ p_ee, and any σ > 0 and γ, taking it away costs at most
+In the eigenvectors of Λ the loop falls apart into single axes of a mass μ, an eigenvalue, with x⁺ = A(μ) x and
+P(μ) = α + βμ. Only e's share along the curve, which the nearest point takes away, τ = φ̇·e⁺/|φ̇|, couples them. With
+p_e(μ) = P(μ)ε_e, a_e the row of A that gives e⁺ less ε_e, q ≥ p_ee, and any σ > 0 and γ, taking it away costs at most
 
 .. math:: V(x^+) - V(\tilde x^+) \le \tfrac{1}{4\sigma} \textstyle\sum_i (h(\mu_i)^T x_i)^2, \qquad
           h = (\sigma + q)\,a_e - 2A^T p_e + \gamma\,\varepsilon_e

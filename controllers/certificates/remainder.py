@@ -4,8 +4,9 @@ With ‖x‖ = √V ≤ ℓ, the loop that runs obeys
 
 .. math:: \|x^+\| \le \bigl(1 - T\,(r - r_0 - r_1 \ell)\bigr)\,\|x\| + T\,\delta
 
-r is the form's rate; r_0 and r_1 ℓ are what the nonlinearity takes of it, δ what does not vanish on the curve. Every
-term is the largest it can be in the tube, with the form's worst mass and hand. Terms of second order in T are made good by `SAFE`.
+r is the form's rate; r_0 and r_1 ℓ are what the nonlinearity takes of it, δ what does not vanish on the curve.
+Every term is the largest it can be in the tube, with the form's worst mass and hand. Terms of second order in T are
+made good by `SAFE`.
 """
 
 from typing import NamedTuple

@@ -1,0 +1,131 @@
+"""Bounds hold what they bound, a form's cells are no weaker than its points, and the region says what it knows."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from controllers.certificates.device import kinematics_function, plant_function
+from controllers.certificates.hand import NO_HANDS, HandRange
+from controllers.certificates.intervals import bounds, spectral_bound
+from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.lyapunov import Axis, Cell, Limits, check_form, decrease, find_form
+from controllers.certificates.region import region
+from controllers.certificates.report import CertificateError, Verdict
+from controllers.certificates.sampling import Sampling
+from controllers.certificates.stability import River
+from controllers.certificates.tube_bounds import tube_bounds
+from controllers.curves.trajectory import Trajectory
+from experiments.certify import phantom_device
+
+SLOW = Trajectory.circle(0.0477, 12.0)
+RIVER = River(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))
+AXIS = Axis(300.0, 8.0, 1e-3, RIVER.sampling.keep, 0, True)
+STABLE = Verdict("certified", "")
+
+
+def test_no_value_leaves_its_interval():
+    x = ca.SX.sym("x", 2)
+    entries = [ca.sin(x[0]) * x[1], 1 / x[1], x[0] ** 2 - ca.cos(3 * x[0]), ca.sqrt(x[1]) - 2 * x[0]]
+    function = ca.Function("f", [x], [ca.reshape(ca.vertcat(*entries), 2, 2)])
+    rng = np.random.default_rng(1)
+    low = rng.uniform([-4.0, 0.5], [4.0, 2.0], (60, 2))
+    high = low + rng.uniform(0.0, 1.5, (60, 2))
+    least, most = bounds(function, low, high)
+    for i in range(60):
+        for place in rng.uniform(low[i], high[i], (40, 2)):
+            value = np.array(function(place))
+            assert np.all(least[i] <= value)
+            assert np.all(value <= most[i])
+            assert np.linalg.norm(value, 2) <= spectral_bound(least[i : i + 1], most[i : i + 1])[0]
+    with pytest.raises(CertificateError, match="holds zero"):
+        bounds(function, np.array([[0.0, -1.0]]), np.array([[1.0, 1.0]]))
+
+
+@pytest.mark.parametrize("z", [(0.03, 8.0, 500.0, 0.9), (0.3, 0.0, 0.0, 1.0)])
+def test_an_axis_is_the_sampled_mass_on_its_spring(z):
+    mass, drag, spring, share = z
+    plant = np.zeros((3, 3))
+    plant[0, 1], plant[1] = 1.0, [-spring / mass, -drag / mass, 1.0 / mass]
+    step = expm(plant * AXIS.period)
+    felt = np.array([-share * 300.0, 0.0, -share * 8.0])
+    after = np.vstack([np.append(step[i, :2], 0.0) + step[i, 2] * felt for i in range(2)])
+    filtered = (1.0 - AXIS.keep) / AXIS.period * (after[0] - np.eye(3)[0]) + AXIS.keep * np.eye(3)[2]
+    found = AXIS.numbers(z) * AXIS.scale[:, None] / AXIS.scale
+    np.testing.assert_allclose(found, np.vstack([after, filtered]), rtol=1e-10, atol=1e-12)
+
+
+def test_a_form_decreases_between_the_corners_where_its_cells_say_so():
+    cell = Cell(np.array([0.15, 2.0, 0.0, 0.99]), np.array([0.3, 4.0, 100.0, 1.0]))
+    form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5), 6.0)
+    assert form is not None
+    slower = form._replace(rate=5.5)
+    checked = check_form(AXIS, slower, cell, (30, 4, 2, 1))
+    assert checked.least > 0.0
+    rng = np.random.default_rng(2)
+    for z in rng.uniform(cell.low, cell.high, (300, 4)):
+        rows = decrease(AXIS, AXIS.numbers(z).tolist(), slower.numbers(z).tolist(), slower)
+        assert np.linalg.eigvalsh(np.array(rows, dtype=float))[0] >= checked.least
+    # One that is asked to fall faster than the slowest axis by itself fails the same check.
+    assert check_form(AXIS, form._replace(rate=60.0), cell, (30, 4, 2, 1)).least < 0.0
+
+
+def test_what_the_nearest_point_takes_away_costs_no_more_than_is_allowed_for():
+    cell = Cell(np.array([0.03, 0.0, 0.0, 1.0]), np.array([0.15, 0.0, 0.0, 1.0]))
+    form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5), 10.0)
+    assert form is not None
+    rng = np.random.default_rng(3)
+    fall = np.exp(-2.0 * 10.0 * AXIS.period)
+    for _ in range(400):
+        masses = np.exp(rng.uniform(np.log(0.03), np.log(0.15), 3))
+        along = rng.normal(size=3)
+        along /= np.linalg.norm(along)
+        x = rng.normal(size=(3, 3))
+        x[0] -= along * (along @ x[0])
+        maps = [AXIS.numbers((mass, 0.0, 0.0, 1.0)) for mass in masses]
+        forms = [form.numbers((mass, 0.0, 0.0, 1.0)) for mass in masses]
+        after = np.stack([a @ x[:, i] for i, a in enumerate(maps)], axis=1)
+        after[0] -= along * (along @ after[0])
+        before, later = (sum(z[:, i] @ p @ z[:, i] for i, p in enumerate(forms)) for z in (x, after))
+        assert later <= fall * before * (1.0 + 1e-9)
+
+
+def test_the_tubes_bounds_hold_at_its_points():
+    device, radius = RIVER.device, 0.006
+    tube = tube_bounds(device, SLOW, radius)
+    kinematics, plant, still = kinematics_function(device), plant_function(device), np.zeros(3)
+
+    def inertia(p):
+        theta = np.array(device.angles(p))
+        back = np.linalg.inv(np.array(kinematics(theta, 0.0)[0]))
+        return back.T @ np.array(plant(theta, still, still, still, still, still)[0]) @ back
+
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        away, way = rng.normal(size=(2, 3))
+        p = SLOW.point(rng.uniform(0.0, 12.0)) + 0.999 * radius * away / np.linalg.norm(away)
+        way *= 1e-6 / np.linalg.norm(way)
+        here = inertia(p)
+        values = np.linalg.eigvalsh(here)
+        assert tube.mass_low <= values[0]
+        assert values[-1] <= tube.mass_high
+        root = np.linalg.inv(np.linalg.cholesky(here))
+        change = root @ (inertia(p + way) - inertia(p - way)) @ root.T / 2e-6
+        assert np.linalg.norm(change, 2) <= tube.mass_slope
+
+
+def test_a_slow_river_in_a_firm_hand_has_a_region_and_what_is_too_much_is_said():
+    firm = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
+    good = region(RIVER, firm, 8.5, STABLE)
+    assert good.verdict == "certified"
+    assert 3e-3 < good.margin < 9e-3
+    assert good.figures["ball"] < good.figures["largest_distance"] < 9e-3
+    assert good.figures["cell_least"] > 0.0
+    assert good.figures["remainder_rate"] < good.figures["rate"]
+    bare = region(RIVER, NO_HANDS, 8.5, STABLE)
+    assert bare.verdict == "unknown"
+    assert "too much to be certain" in bare.reason
+    assert region(RIVER._replace(law=BUNNY_LAW), firm, 8.5, STABLE).verdict == "unknown"
+    assert region(RIVER._replace(sampling=Sampling(1e-3, 5e-4)), firm, 8.5, STABLE).verdict == "unknown"
+    unstable = Verdict("refuted", "", -0.5, (), {"state": [1.0]})
+    assert region(RIVER, firm, 8.5, unstable).counterexample == {"state": [1.0]}

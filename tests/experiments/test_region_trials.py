@@ -1,0 +1,16 @@
+"""Simulations from the edge of a certified region: none leaves it, and all end in the ball."""
+
+import numpy as np
+import pytest
+
+from experiments.region_trials import HANDS, certified_region, simulate_from
+
+
+@pytest.mark.slow
+def test_nothing_that_begins_in_the_region_leaves_it():
+    river, verdict = certified_region()
+    assert verdict.verdict == "certified"
+    rng = np.random.default_rng(5)
+    outcomes = np.array([simulate_from(river, verdict.figures, HANDS, 1.0, rng) for _ in range(150)])
+    assert outcomes[:, 0].max() < verdict.figures["largest_distance"]
+    assert outcomes[:, 1].max() < verdict.figures["ball"]
