@@ -7,8 +7,13 @@ from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
+from controllers.state import Array
 from experiments.config import RunConfig
+from sim.users.intent import Grab
 from sim.world import phantom_angles
+
+_LEAD = 0.41  # [rad] before and behind a transition, between which a hand changes over
+_OVERSHOOT = 0.9  # of the distance of the curves
 
 
 def curve_number(haptic_map: Lifted, curve: str) -> int:
@@ -63,3 +68,31 @@ def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
     return RiverBundle(
         tuple(River(curve, config.river_tube, tau, config.damping) for curve in curves), haptic_map.names
     )
+
+
+def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float) -> Grab:
+    """A hand that carries the stylus from one curve to another past the transition between them.
+
+    From `_LEAD` before the transition on the first curve to `_LEAD` behind it on the second, and beyond it, because an
+    arm yields: it stays behind where it means to be.
+
+    Parameters
+    ----------
+    haptic_map : Lifted
+    first, second : int
+        The curves.
+    angle : float
+        θ of the transition [rad].
+    start : float
+        When the stylus is at the first place [s].
+    """
+    before, behind = angle - _LEAD, angle + _LEAD
+    here, there = _point(haptic_map, first, before), _point(haptic_map, second, behind)
+    beyond = _OVERSHOOT * (there - _point(haptic_map, first, behind))
+    x, y, z = (float(value) for value in there + beyond - here)
+    return Grab(start, (x, y, z), duration=0.4, hold=0.05)
+
+
+def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:
+    r, z = haptic_map.site(curve, np.array(angle))
+    return np.array([r * np.cos(angle), r * np.sin(angle), z])
