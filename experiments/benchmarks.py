@@ -17,12 +17,15 @@ from numba import njit
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.haptic_map.lifted import Lifted
 from controllers.state import HandState
 from experiments.config import RunConfig
 from experiments.modes import heaviest_field, tick_microseconds
 from experiments.run import SUMMARY
 from experiments.walls import figure_walls
-from experiments.wiring import Session, load_clips, stylus_path, wire
+from experiments.wiring import Session, figure_legs, load_clips, stylus_path, wire
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded, embedded_names
 from sim.compiled import entry_point
 from sim.loop import make_logs
 from sim.servo import FrameLog, TickLog, run_block
@@ -47,6 +50,9 @@ def bench() -> None:
     print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
     print(f"soft walls of 17 joints, with the limiter: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
+    four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))
+    print(f"lifted map, h(p) with h_*, four clips near: {four:.1f} µs (≤ 20)")
+    print(f"lifted map, 10 → 100 clips: {ten:.1f} → {hundred:.1f} µs: ×{hundred / ten:.2f} (≤ 2)")
 
 
 def closed_loop_over_replay(make: Callable[[], Session]) -> tuple[float, float, bool]:
@@ -146,6 +152,23 @@ def map_microseconds(session: Session) -> float:
     kind, params, memory = session.haptic_map.compiled()
     pose, jacobian = np.empty(session.haptic_map.nq), np.empty((session.haptic_map.nv, 6))
     points = stylus_path(session.curve.point(np.linspace(0.0, session.config.lap, 2000)))
+    _map_many(kind, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
+
+
+def lifted_microseconds(m: int) -> float:
+    """Mean time of h with h_* of a lifted map of m clips on a lattice of curves, at random places between them [µs]."""
+    clips = [embedded(name) for name in embedded_names()]
+    motions = [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(m)]
+    side, lap, k = int(np.ceil(np.sqrt(m))), np.arange(64)[:, None] * np.pi / 32.0, np.arange(m)
+    step = 0.04 / (side - 1)
+    r, z = 0.03 + step * (k % side) + 0.1 * step * np.sin(lap + k), -0.02 + step * (k // side) + 0.0 * lap
+    angles = [np.linspace(0.0, 2.0 * np.pi, len(poses)) for poses, _ in motions]
+    lifted = Lifted(motions, [True] * m, angles, np.stack([r, z], axis=-1), figure_legs(figure_model()))
+    kind, params, memory = lifted.compiled()
+    pose, jacobian = np.empty(lifted.nq), np.empty((lifted.nv, 6))
+    theta, radius, height = np.random.default_rng(0).uniform([0.0, 0.03, -0.02], [6.28, 0.07, 0.02], (2000, 3)).T
+    points = stylus_path(np.column_stack([radius * np.cos(theta), radius * np.sin(theta), height]))
     _map_many(kind, params, points[:2], memory, pose, jacobian)
     return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
 

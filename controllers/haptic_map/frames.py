@@ -21,6 +21,7 @@ from controllers.state import Array
 
 CLOSES = 1e-6  # [m], in quaternions half of [rad]: how nearly the frames of a closed clip must close
 LEAST_GAP = 0.05  # [rad] that an open clip leaves of the lap
+WIDEST_STEP = 0.5 * np.pi  # [rad] between two frames
 
 _TURN = 2.0 * np.pi
 _COAST = 0.4  # [rad] of θ over which an open clip coasts out and in, at most the gap
@@ -76,6 +77,11 @@ def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array
         raise ParameterError(f"{name} has {frames} frames, its angles have shape {array.shape}; expected ({frames},)")
     if not (np.isfinite(array).all() and (np.diff(array) > 0.0).all()):
         raise ParameterError(f"{name}: the angles of its frames must be finite and increase")
+    if np.diff(array).max() > WIDEST_STEP:
+        raise ParameterError(
+            f"{name}: two of its frames are {np.diff(array).max():.2f} rad apart, and a curve must go round the axis "
+            f"between them; expected {WIDEST_STEP:.2f} rad or less: give it a shorter arc, or more frames"
+        )
     span = float(array[-1] - array[0])
     if closed:
         if frames < 4:

@@ -32,7 +32,7 @@ def lifted(clips):
     for i, (clip, closes) in enumerate(zip(clips, closed, strict=True)):
         s = np.linspace(0.0, 1.0, clip.n_frames)
         s += 0.02 * np.sin(TURN * s)
-        angles.append((0.6 * i) % 6.0 + TURN * s if closes else 0.2 + (TURN - 0.8) * s)
+        angles.append((0.6 * i) % 6.0 + TURN * s if closes else 0.2 + min(TURN - 0.8, len(s) - 1.0) * s)
     motions = [(clip.poses, clip.fps) for clip in clips]
     return Lifted(motions, closed, angles, sites, LEGS, [f"{i} {clip.name}" for i, clip in enumerate(clips)])
 
