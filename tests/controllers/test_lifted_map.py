@@ -82,7 +82,10 @@ def test_a_clip_is_moved_over_the_ground_as_a_whole():
         ({"angles": [*ANGLES[:3], ANGLES[3][:-1]]}, r"clip cut has 140 frames, its angles have shape \(139,\)"),
         ({"angles": [*ANGLES[:3], ANGLES[3][::-1]]}, "must be finite and increase"),
         ({"angles": [*ANGLES[:3], once_round(140, 0.3, TURN)]}, "leave a gap of 0.05 rad or more"),
-        ({"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]}, "clip cut: two of its frames are 3.2"),
+        (
+            {"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]},
+            "clip cut: two of its frames are 3.12 rad apart",
+        ),
         ({"sites": ring(4)[:4]}, r"sites must have shape \(rows ≥ 8, 4 clips, 2: r and z\), got \(4, 4, 2\)"),
         ({"sites": ring(4) * np.nan}, "sites must be finite"),
         ({"sites": ring(4, centre=(0.012, 0.0))}, "from the axis, where the phase is not defined"),
