@@ -80,6 +80,7 @@ class Bench:
         self._clips, _ = load_clips(self._config.clips)
         session = self._session()
         self.curve = session.curve
+        assert isinstance(session.clip_map, ClipMap)
         self.speeds = speeds_along(session.clip_map, self.curve)
         phases = np.linspace(self.curve.start, self.curve.end, len(self.speeds))
         flying = phases[self.speeds[:, 0] > 0.0]

@@ -23,6 +23,7 @@ from numba import njit
 from controllers.energy_tank import TANK_ENERGY, guard_energy
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.program import evaluate
+from controllers.fields.soft_wall import raise_walls
 from controllers.safety import limit_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from sim.body import BodyState, drive
@@ -129,6 +130,7 @@ class FrameLog(NamedTuple):
 def field_force(servo: Servo) -> None:
     """Evaluate and limit the field at the measured hand, within the tank's budget, and command the motors."""
     field, hand = servo.field, servo.port.hand
+    raise_walls(field.ops, field.params, field.memory, hand)
     evaluate(field.ops, field.params, field.memory, hand, field.wrench)
     limit_force(field.limits, field.limiter, field.wrench, field.force)
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]

@@ -31,7 +31,6 @@ from controllers.fields.instructions import (
 )
 from controllers.fields.leading import leading_wrench
 from controllers.fields.orientation import orientation_wrench
-from controllers.fields.soft_wall import soft_wall_wrench
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.state import Array, IntArray
 
@@ -74,9 +73,6 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
         elif opcode == STRETCHY:
             stretchy_wrench(params, at, memory, slot, hand, stack[top])
             top += 1
-        elif opcode == SOFT_WALL:
-            soft_wall_wrench(params, at, curve, memory, slot, hand, stack[top])
-            top += 1
         elif opcode == LEADING:
             leading_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
@@ -86,7 +82,7 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
         elif opcode == ORIENTATION:
             orientation_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
-        elif opcode == EXTERNAL:
+        elif opcode == EXTERNAL or opcode == SOFT_WALL:
             for i in range(6):
                 stack[top, i] = memory[slot + i]
             top += 1

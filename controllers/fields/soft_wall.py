@@ -8,6 +8,9 @@ With q = h(x), its rates q̇ = h_* ẋ and for every joint angle or component of
 with U'(e) = k e²/2m up to e = m, k (e − m/2) beyond, 0 below: a spring that sets in softly, m [rad] before the limit
 itself. The first part is −∇(P∘h): a potential, which gives back what it took. The second only takes: its power is
 −Σ d (|ω_j| − ω_max)_+ |ω_j|.
+
+Only where a map is at hand can a wall be evaluated: the servo calls `raise_walls` before `evaluate`, whose instruction
+SOFT_WALL takes the wrench from the memory. So the laws of force do not depend on the maps.
 """
 
 from dataclasses import dataclass
@@ -21,8 +24,9 @@ from controllers.fields.instructions import SOFT_WALL, Program, checked, wrench_
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.rotations import logarithm, rotation_vector_rate
-from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_VELOCITY, Array, HandState, IntArray, Wrench
 
+WRENCH = 6
 _KIND, _SIZE, _NQ, _NV, _JOINTS, _STIFFNESS, _MARGIN, _DAMPING, _SPEED, _HEADER = range(10)
 _COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9  # of a joint: three intervals follow; a hinge has one
 
@@ -61,14 +65,14 @@ def _torque(params: Array, joint: int, pose: Array, rates: Array, torque: Array)
 
 @njit
 def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction SOFT_WALL: parameters see the module, memory that of the map; `curve` is not used."""
+    """Wrench of a wall: parameters see `SoftWall`, memory [wrench (6), memory of the map]; `curve` is not used."""
     wall = params[at:]
     nv, joints = int(wall[_NV]), int(wall[_JOINTS])
     first = _HEADER + joints * _JOINT
     haptic_map = wall[first : first + int(wall[_SIZE])]
     pose, jacobian = np.empty(int(wall[_NQ])), np.empty((nv, STYLUS_TANGENT))
     stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
-    evaluate_map_jacobian(int(wall[_KIND]), haptic_map, stylus, memory[slot:], pose, jacobian)
+    evaluate_map_jacobian(int(wall[_KIND]), haptic_map, stylus, memory[slot + WRENCH :], pose, jacobian)
     rates, torque = np.zeros(3), np.empty(3)
     wrench[:] = 0.0
     for n in range(joints):
@@ -84,6 +88,15 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
             if torque[i] != 0.0:
                 for j in range(STYLUS_TANGENT):
                     wrench[j] -= jacobian[row + i, j] * torque[i]
+
+
+@njit
+def raise_walls(ops: IntArray, params: Array, memory: Array, hand: Array) -> None:
+    """Write the wrench of every wall of a field into its memory, where `evaluate` finds it."""
+    for row in range(ops.shape[0]):
+        if ops[row, 0] == SOFT_WALL:
+            slot = ops[row, 2]
+            soft_wall_wrench(params, ops[row, 1], ops[row, 3], memory, slot, hand, memory[slot : slot + WRENCH])
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +171,9 @@ class SoftWall:
         for joint, column, row, limit in zip(table, self.columns, self.rows, self.limits, strict=True):
             joint[:_LIMITS] = column, row, len(limit) == 3
             joint[_LIMITS : _LIMITS + limit.size] = np.ravel(limit)
-        return Program.law(SOFT_WALL, np.concatenate([header, gains, table.ravel(), params]), list(memory))
+        return Program.law(
+            SOFT_WALL, np.concatenate([header, gains, table.ravel(), params]), [*[0.0] * WRENCH, *memory]
+        )
 
     def program(self) -> Program:
         """Compiled form of the field."""

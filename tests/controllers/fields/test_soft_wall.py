@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.fields.program import evaluate
-from controllers.fields.soft_wall import SoftWall
+from controllers.fields.soft_wall import SoftWall, raise_walls
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
 from experiments.robot_arm import robot_arm_map
@@ -166,6 +166,7 @@ def test_the_compiled_sum_with_another_field_is_the_same_to_the_last_bit():
     memory, wrench = program.fresh_memory(), np.empty(6)
     for angle in np.linspace(0.0, 6.0, 30):
         hand = HandState.at(place(0.065, angle, 0.02), (0.2, -0.1, 0.05))
+        raise_walls(program.ops, program.params, memory, hand.vector())
         evaluate(program.ops, program.params, memory, hand.vector(), wrench)
         np.testing.assert_array_equal(wrench[:3], WALL.wrench(hand).force + BRAKE.wrench(hand).force)
 
