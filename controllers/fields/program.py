@@ -82,7 +82,7 @@ def evaluate(ops: IntArray, params: Array, memory: Array, hand: Array, wrench: A
         elif opcode == ORIENTATION:
             orientation_wrench(params, at, curve, memory, slot, hand, stack[top])
             top += 1
-        elif opcode == EXTERNAL or opcode == SOFT_WALL:
+        elif opcode in (EXTERNAL, SOFT_WALL):
             for i in range(6):
                 stack[top, i] = memory[slot + i]
             top += 1
