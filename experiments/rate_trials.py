@@ -18,6 +18,7 @@ from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER, Program
 from controllers.fields.river import River
+from controllers.haptic_map.animation import ClipMap
 from experiments.config import RunConfig
 from experiments.figures import STYLE
 from experiments.governor import speeds_along
