@@ -84,7 +84,7 @@ def test_a_clip_is_moved_over_the_ground_as_a_whole():
         ({"angles": [*ANGLES[:3], once_round(140, 0.3, TURN)]}, "leave a gap of 0.05 rad or more"),
         (
             {"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]},
-            "clip cut: two of its frames are 3.12 rad apart",
+            "clip cut: two of its frames are 3.12 rad",
         ),
         ({"sites": ring(4)[:4]}, r"sites must have shape \(rows ≥ 8, 4 clips, 2: r and z\), got \(4, 4, 2\)"),
         ({"sites": ring(4) * np.nan}, "sites must be finite"),
