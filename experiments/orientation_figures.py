@@ -30,7 +30,7 @@ CONFIG = RunConfig(
 )
 BASE_COLOUR, PHYSICAL_COLOUR = "#a8adb8", "#23272f"
 SIZE = (300, 420)  # of one picture of the figure
-DISTANCE, AZIMUTH, ELEVATION = 2.5, 205.0, -8.0  # of the camera, from ahead of the figure [m], [deg], [deg]
+DISTANCE, AZIMUTH, ELEVATION = 3.0, 205.0, -8.0  # of the camera, from ahead of the figure [m], [deg], [deg]
 
 
 class Bearing(NamedTuple):
@@ -82,7 +82,8 @@ def turning_figure(recording: Recording) -> Figure:
     axes[0].set(title="turn of the stylus, measured [°]")
     axes[4].set(title="moment of the field, recorded and not given [mN m]", xlabel="time [s]")
     for ax in axes:
-        ax.legend(loc="upper left", ncols=3)
+        # In the row of the title, where no curve is.
+        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3)
     return figure
 
 
@@ -102,7 +103,7 @@ def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
             mujoco.mj_forward(model, data)
             w, _, _, z = data.qpos[root + 3 : root + 7]
             camera.azimuth = AZIMUTH + np.degrees(2.0 * np.arctan2(z, w))
-            camera.lookat[:] = data.qpos[root], data.qpos[root + 1], 0.95
+            camera.lookat[:] = data.qpos[root], data.qpos[root + 1], 1.05
             renderer.update_scene(data, camera)
             pictures.append(renderer.render().copy())
     return np.hstack(pictures)

@@ -11,7 +11,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, stylus_turn, yielded
+from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
 BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))
@@ -143,6 +143,14 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
         np.testing.assert_array_equal(pose, MAP.pose(x))
         np.testing.assert_array_equal(other, pose)
         np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
+
+
+def test_what_is_wrapped_can_be_asked_for_what_it_does_apart_from_poses():
+    base, whole = BASE.compiled(), MAP.compiled()
+    for asked in (whole, base):
+        kind, params = base_of(asked.kind, asked.params)
+        assert kind == base.kind
+        np.testing.assert_array_equal(params, base.params)
 
 
 def test_the_lap_of_the_base_goes_on():

@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
 from experiments.config import RunConfig
-from experiments.expression import expressive_figure
+from experiments.expression import expressive_figure, oriented
 from experiments.wiring import FOOT_CONTACTS, load_clips, wire
 from models.humanoid.skeleton import BODIES, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded, embedded_names
@@ -75,3 +78,17 @@ def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name
         vectors = rotations(poses, BODIES.index(joint)).as_rotvec()
         assert (vectors > low).all()
         assert (vectors < high).all()
+
+
+def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_bent():
+    curve = Trajectory.circle(0.05, 4.0)
+    program = Follow(curve, 300.0, 8.0).program()
+    assert oriented(program, RunConfig(), curve) is program
+    assert len(oriented(program, RunConfig(orientation_damping=1e-3), curve).ops) == len(program.ops) + 2
+    for config, says in (
+        (RunConfig(mode="stretch", orientation_stiffness=0.1), "needs a curve that stays; stretch bends it"),
+        (RunConfig(orientation_stiffness=-0.1), "k_o must be finite and at least 0"),
+        (RunConfig(orientation_damping=np.nan), "b_o must be finite"),
+    ):
+        with pytest.raises(ParameterError, match=says):
+            oriented(program, config, curve)
