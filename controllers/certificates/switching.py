@@ -16,7 +16,7 @@ The discrete field keeps the hand if S < r + h and S < h + s_j: it never changes
 
 Dwell time: between two opposite changes of rivers s_j − s_i moves by 2 h, and from admission to release s_i by h. m is
 the distance of (e, 0) from the line along (Y, |φ̇|), so |Δm| ≤ |Δe| + |e| |ΔY|/|φ̇|; and √g is Lipschitz in d. With
-`hysteresis_dwell` that bounds the dwell time from below wherever the hand is within half a tube of the curves.
+`hysteresis_dwell` that bounds the dwell time from below wherever the hand is near the curves.
 """
 
 import math
@@ -37,7 +37,7 @@ from controllers.curves.closest_point import closest_phases
 from controllers.fields.window import window
 from controllers.state import Array
 
-CORE = 0.5  # of a tube's radius, within which the hysteresis bounds the dwell time
+CORE = 0.1  # of a tube's radius, within which the hysteresis bounds the dwell time
 _RISE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))  # steepest ε/σ · d√g/dd in the core
 
 
