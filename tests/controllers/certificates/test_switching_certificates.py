@@ -10,8 +10,11 @@ from controllers.certificates.hand import HandRange
 from controllers.certificates.sampling import Sampling
 from controllers.certificates.switching import Keeping, Sharing, hysteresis_dwell, switching
 from controllers.certificates.switching_search import SECONDS, Push, counterexample, failure
-from experiments.certified_rivers import certified_bundle, held_common, meetings
+from experiments.certified_field import certified_curve, certified_sampling
+from experiments.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
 from experiments.certify import phantom_device
+from experiments.config import RunConfig
+from experiments.modes import law
 from experiments.switching_trials import simulated_course, straight_pair, trials
 
 CLOCK = Sampling(1e-3)
@@ -153,6 +156,28 @@ def test_failures_are_told_apart():
     assert failure(once, 1e-3, 0, False).kind == "taken over"
     assert failure(np.repeat([0.0, -1.0], 50), 1e-3, 0, True).kind == "thrown out"
     assert failure(np.tile([0.0, 1.0], 50), 1e-3, 0, True).kind == "chatters"
+
+
+@pytest.mark.slow
+def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
+    config = RunConfig(mode="rivers")
+    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
+    verdict = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)["switching"]
+    assert verdict.verdict == "refuted"
+    assert verdict.figures["common_rate"] < 1.0
+    found, field = verdict.counterexample, law(config, curve)
+    way = _in_mujoco(field, clock, found)
+    ended = failure(way.river, clock.period, found["river"], any(found["force"]))
+    assert ended.kind == found["kind"]
+    assert ended.time == pytest.approx(found["time"], abs=0.1)
+
+
+@pytest.mark.slow
+def test_summed_rivers_are_certified_for_a_hand_that_holds_on():
+    config = RunConfig(mode="rivers", crossing="sum")
+    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
+    verdicts = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)
+    assert verdicts["switching"].verdict == "certified"
 
 
 @pytest.mark.slow
