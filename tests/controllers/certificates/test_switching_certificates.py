@@ -71,14 +71,10 @@ def test_what_is_no_function_is_not_taken_for_one():
     assert contraction(np.eye(2), [a, 1.5 * np.eye(2)]) >= 1.5
 
 
-@pytest.mark.slow
-def test_a_hand_that_holds_on_makes_any_switching_stable():
-    rivers = _rivers(straight_pair(60.0, "smooth", 0.15, 8.0))
-    found = held_common(rivers, meetings(rivers)[0], HandRange(), "smooth")
-    assert found is not None
-    assert found.rate < 1.0
-    assert np.linalg.eigvalsh(found.p)[0] > 0.0
-    assert held_common(rivers, meetings(rivers)[0], HandRange((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), "smooth") is None
+def test_without_a_hand_that_holds_on_no_common_function_is_sought():
+    rivers = _rivers(straight_pair(60.0, "smooth", 0.15))
+    loose = HandRange((0.0, 0.3), (0.0, 8.0), (0.0, 0.0))
+    assert held_common(rivers, meetings(rivers)[0], loose, "smooth") is None
 
 
 def test_a_wide_hysteresis_and_a_slow_filter_certify_a_shallow_crossing_and_mujoco_keeps_the_hand():
@@ -165,6 +161,7 @@ def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
     verdict = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)["switching"]
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
+    assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
     found, field = verdict.counterexample, law(config, curve)
     way = _in_mujoco(field, clock, found)
     ended = failure(way.river, clock.period, found["river"], any(found["force"]))
