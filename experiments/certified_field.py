@@ -19,7 +19,7 @@ from experiments.config import RunConfig
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compiled import source_hash
 
-CERTIFIED_MODES = ("follow", "bunny", "stretch", "stretch-then-follow")
+CERTIFIED_MODES = ("follow", "bunny", "rivers", "stretch", "stretch-then-follow")
 
 
 class CertifiedLaw(NamedTuple):
@@ -65,6 +65,10 @@ def certified_laws(config: RunConfig) -> dict[str, CertifiedLaw]:
             "_held": CertifiedLaw("hold", config.rubber, StretchyTubes.b, float("inf")),
         }
         return tubes | ({"_then": follow} if config.mode == "stretch-then-follow" else {})
+    if config.mode == "rivers":
+        if config.governor or config.map.endswith(".npz"):
+            raise ParameterError("rivers are certified without --governor, and not those of a map's file")
+        return {"": follow._replace(width=config.river_tube)}
     raise ParameterError(
         f"no certificate is known for mode {config.mode!r}; there are those of {', '.join(CERTIFIED_MODES)}"
     )
@@ -94,9 +98,11 @@ def certificate_inputs(config: RunConfig, delay: float, hands: HandRange, push: 
     push : float
         Largest force of the hand [N].
     """
-    sampling, makers = certified_sampling(config, delay), sorted(Path(__file__).parent.glob("certif*.py"))
+    sampling, folder = certified_sampling(config, delay), Path(__file__).parent
+    makers = [*sorted(folder.glob("certif*.py")), folder / "modes.py"]
     return {
         "gains": certified_laws(config),
+        "crossing": (config.crossing, config.reach) if config.mode == "rivers" else None,
         "curve": certified_curve(config).packed(),
         "period": sampling.period,
         "delay": sampling.delay,

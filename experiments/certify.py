@@ -26,6 +26,7 @@ from experiments.certified_field import (
     certified_sampling,
     read_certificate,
 )
+from experiments.certified_rivers import certify_rivers
 from experiments.config import RunConfig
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
@@ -118,7 +119,10 @@ def certify_into(
         except CertificateError:
             pass  # of another river, or of none: certified anew
     rivers = certified_rivers(config, delay)
-    certificate = Certificate(certify(rivers, hands, push), hash_of(inputs), hashes_of(inputs))
+    verdicts, main = certify(rivers, hands, push), rivers[""]
+    if config.mode == "rivers":
+        verdicts |= certify_rivers(config, main.curve, main.device, main.sampling, hands, push)
+    certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
     out.mkdir(parents=True, exist_ok=True)
     stability_figure(rivers[""], certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
     if "ellipse" in certificate.verdicts["region"].figures:

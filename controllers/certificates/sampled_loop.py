@@ -66,6 +66,11 @@ class SampledLoop:
         row[:, 0:3], row[:, 6:9], row[:, 9:12] = share * np.eye(3), -share * np.eye(3), keep * np.eye(3)
         return row
 
+    @property
+    def measured_velocity(self) -> Array:
+        """Velocity of the tip as filtered [m/s], by the state, shape (n, 3, size)."""
+        return self.linear.jacobian @ self._omega
+
     def force(self, k_r: float, b_d: float) -> Array:
         """Force at the tip [N] that the law asks for, by the state, shape (n, 3, size)."""
         linear = self.linear

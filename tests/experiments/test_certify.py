@@ -119,8 +119,9 @@ def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_i
     assert [(name, river.k_r, river.law.slides) for name, river in tubes.items()] == [
         ("", 140.0, True), ("_held", 160.0, False), ("_then", 300.0, True),
     ]  # fmt: skip
-    with pytest.raises(ParameterError, match="'rivers'"):
-        certified_rivers(RunConfig(mode="rivers"))
+    assert certified_rivers(RunConfig(mode="rivers"))[""].width == RunConfig().river_tube
+    with pytest.raises(ParameterError, match="governor"):
+        certified_rivers(RunConfig(mode="rivers", governor=True))
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])

@@ -1,0 +1,111 @@
+r"""Common quadratic Lyapunov function of several linear maps: a certificate of every switching between them.
+
+If P > 0 and A_iᵀ P A_i ≤ ρ² P for every i, then |A x|_P ≤ ρ |x|_P for every A in the convex hull of the maps, since
+A ↦ Aᵀ P A is convex: however fast one switches or blends, the state decays as ρ^k (Liberzon, *Switching in Systems and
+Control*, 2003, section 2.1). There is no solver of semidefinite programs here: P = L Lᵀ and the decrease P − A_iᵀ P A_i
+− t = R_i R_iᵀ with t as large as it gets is a smooth program for IPOPT (Burer & Monteiro 2003). What it finds is a
+proposal; `contraction` judges it by itself.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from controllers.state import Array
+
+_ROUNDING = 10.0  # times the terms summed and the machine's precision: of a product of three matrices and its spectrum
+
+
+class Common(NamedTuple):
+    """A common Lyapunov function.
+
+    Attributes
+    ----------
+    p : Array
+        P, shape (n, n), positive definite.
+    rate : float
+        ρ, with the bound of the rounding added.
+    """
+
+    p: Array
+    rate: float
+
+
+def contraction(p: Array, maps: Sequence[Array]) -> float:
+    r"""Upper bound on the largest ρ_i with A_iᵀ P A_i ≤ ρ_i² P; infinite if P is not positive definite.
+
+    With P = L Lᵀ it is the largest singular value of Lᵀ A_i L⁻ᵀ. A bound of the rounding errors, 10 n² ε κ(L) times
+    the value, is added, so that ρ < 1 is meant in exact arithmetic.
+    """
+    if not np.all(np.isfinite(p)) or not np.allclose(p, p.T, rtol=1e-12, atol=0.0):
+        return float("inf")
+    values = np.linalg.eigvalsh(p)
+    if values[0] <= len(p) ** 2 * np.finfo(float).eps * values[-1]:
+        return float("inf")
+    factor = np.linalg.cholesky(p)
+    largest = max(np.linalg.norm(np.linalg.solve(factor, (factor.T @ a).T).T, 2) for a in maps)
+    slack = _ROUNDING * len(p) ** 2 * np.finfo(float).eps * np.linalg.cond(factor)
+    return float(largest * (1.0 + slack))
+
+
+def common_lyapunov(maps: Sequence[Array]) -> Common | None:
+    """Common quadratic Lyapunov function of stable maps, or None if none was found.
+
+    Tried first is the mean of the maps' own functions; where that does not decrease along all, IPOPT goes on from it.
+
+    Parameters
+    ----------
+    maps : sequence of Array
+        A_i, shape (n, n) each.
+    """
+    if max(float(np.abs(np.linalg.eigvals(a)).max()) for a in maps) >= 1.0:
+        return None
+    # In units in which the modes are alike, or rates would drown angles.
+    scale = np.sqrt(np.diag(solve_discrete_lyapunov(maps[-1], np.eye(len(maps[-1])))))
+    scaled = [a * scale / scale[:, None] for a in maps]
+    own = [solve_discrete_lyapunov(a.T, np.eye(len(a))) for a in scaled]
+    mean = np.sum([p / np.linalg.norm(p, 2) for p in own], axis=0)
+    start = np.linalg.cholesky(0.5 * (mean + mean.T))
+    # In the mean's own coordinates it is the unit matrix.
+    turned = [np.linalg.solve(start, (start.T @ a).T).T for a in scaled]
+    found = np.eye(len(mean))
+    if contraction(found, turned) >= 1.0:
+        found = _improved(turned)
+    p = (start @ found @ start.T) / np.outer(scale, scale)
+    p = 0.5 * (p + p.T)
+    rate = contraction(p, maps)
+    return Common(p, rate) if rate < 1.0 else None
+
+
+def _improved(maps: Sequence[Array]) -> Array:
+    """P of mean diagonal 1 with the largest least decrease that IPOPT finds from the unit matrix."""
+    n = len(maps[0])
+    rows, columns = np.tril_indices(n)
+    size = len(rows)
+    variables = casadi.SX.sym("x", size * (len(maps) + 1) + 1)
+
+    def triangle(k: int) -> casadi.SX:
+        matrix = casadi.SX(n, n)
+        for entry, (i, j) in enumerate(zip(rows, columns, strict=True)):
+            matrix[int(i), int(j)] = variables[size * k + entry]
+        return matrix
+
+    factor, least = triangle(0), variables[size * (len(maps) + 1)]
+    p = factor @ factor.T
+    equations = [casadi.trace(p) - n]
+    for k, a in enumerate(maps):
+        root = triangle(k + 1)
+        gap = p - casadi.DM(a.T) @ p @ casadi.DM(a) - root @ root.T - least * casadi.DM.eye(n)
+        equations += [gap[int(i), int(j)] for i, j in zip(rows, columns, strict=True)]
+    options = {"ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}, "print_time": False}
+    problem = {"x": variables, "f": -least, "g": casadi.vertcat(*equations)}
+    solver = casadi.nlpsol("common_lyapunov", "ipopt", problem, options)
+    unit = np.eye(n)[rows, columns]
+    begin = np.concatenate([unit, *(0.3 * unit for _ in maps), [0.0]])
+    values = np.array(solver(x0=begin, lbg=0.0, ubg=0.0)["x"]).ravel()
+    lower = np.zeros((n, n))
+    lower[rows, columns] = values[:size]
+    return lower @ lower.T

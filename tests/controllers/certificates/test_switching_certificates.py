@@ -1,0 +1,185 @@
+"""Switching of rivers: Lyapunov functions judged independently, bounds that hold in MuJoCo, hands lost there."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controllers.certificates.common_lyapunov import common_lyapunov, contraction
+from controllers.certificates.hand import HandRange
+from controllers.certificates.sampling import Sampling
+from controllers.certificates.switching import Keeping, Sharing, hysteresis_dwell, switching
+from controllers.certificates.switching_search import SECONDS, Push, counterexample, failure
+from experiments.certified_field import certified_curve, certified_sampling
+from experiments.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
+from experiments.certify import phantom_device
+from experiments.config import RunConfig
+from experiments.modes import law
+from experiments.switching_trials import simulated_course, straight_pair, trials
+
+CLOCK = Sampling(1e-3)
+SLOW_FILTER = Sampling(1e-3, 0.0, 50.0)
+
+
+def _rivers(field, clock=CLOCK):
+    return certified_bundle(field.bundle, phantom_device(), clock)
+
+
+def _keepings(field, clock=CLOCK):
+    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+    first, second = _rivers(field, clock)
+    return [Keeping(first, (second,), sharing), Keeping(second, (first,), sharing)]
+
+
+def _lost(field, clock, newtons):
+    rivers = _rivers(field, clock)
+    place = meetings(rivers)[0]
+    towards = rivers[place.other].curve.velocity(0.8)
+    return counterexample(field, place.own, rivers[place.own], place.phase, towards, (newtons,))
+
+
+def _in_mujoco(field, clock, found):
+    push = Push(found["force"], found["push_start"], found["push_duration"])
+    return simulated_course(field, clock, found["p"], found["v"], SECONDS, push)
+
+
+def test_maps_that_share_a_function_get_one_that_eigenvalues_confirm():
+    rng = np.random.default_rng(3)
+    maps = [0.8 * np.linalg.qr(rng.normal(size=(4, 4)))[0] for _ in range(3)]
+    basis = rng.normal(size=(4, 4))
+    maps = [basis @ a @ np.linalg.inv(basis) for a in maps]
+    found = common_lyapunov(maps)
+    assert found is not None
+    assert np.linalg.eigvalsh(found.p)[0] > 0.0
+    for a in maps:
+        assert np.linalg.eigvalsh(found.rate**2 * found.p - a.T @ found.p @ a)[0] > -1e-9
+    assert 0.8 - 1e-9 <= found.rate < 1.0
+
+
+def test_maps_whose_product_grows_have_none():
+    # Each is stable; taken in turn they are not.
+    first, second = np.array([[0.6, 2.0], [0.0, 0.6]]), np.array([[0.6, 0.0], [2.0, 0.6]])
+    assert np.abs(np.linalg.eigvals(first @ second)).max() > 1.0
+    assert common_lyapunov([first, second]) is None
+
+
+def test_what_is_no_function_is_not_taken_for_one():
+    a = 0.5 * np.eye(2)
+    assert contraction(np.diag([1.0, -1.0]), [a]) == math.inf
+    assert contraction(np.array([[1.0, 0.5], [0.0, 1.0]]), [a]) == math.inf
+    assert 0.5 <= contraction(np.diag([1.0, 4.0]), [a]) < 0.5 + 1e-9
+    assert contraction(np.eye(2), [a, 1.5 * np.eye(2)]) >= 1.5
+
+
+def test_without_a_hand_that_holds_on_no_common_function_is_sought():
+    rivers = _rivers(straight_pair(60.0, "smooth", 0.15))
+    loose = HandRange((0.0, 0.3), (0.0, 8.0), (0.0, 0.0))
+    assert held_common(rivers, meetings(rivers)[0], loose, "smooth") is None
+
+
+def test_a_wide_hysteresis_and_a_slow_filter_certify_a_shallow_crossing_and_mujoco_keeps_the_hand():
+    field = straight_pair(10.0, "discrete", 2.0, 8.0)
+    keepings = _keepings(field, SLOW_FILTER)
+    verdict = switching(keepings, 0.1, 5.0, {}, None)
+    assert verdict.verdict == "certified"
+    assert verdict.margin == pytest.approx(verdict.figures["push_allowed"] - 0.1)
+    allowed, river = verdict.figures["push_allowed"], keepings[0].held
+    bounds = keepings[0].bounds(0.99 * allowed)
+    for direction in np.concatenate([np.eye(3), -np.eye(3)]):
+        push = Push(tuple(0.99 * allowed * direction), 0.3, 0.5)
+        way = simulated_course(field, SLOW_FILTER, river.curve.point(0.2), river.curve.velocity(0.2), 1.2, push)
+        assert np.all(way.river[1:] == 0.0)
+        assert np.linalg.norm(way.p[:, 1:], axis=1).max() < bounds.distance
+
+
+def test_the_search_confirms_no_certificate_of_narrow_hysteresis():
+    field = straight_pair(10.0, "discrete", 0.15)
+    verdict = switching(_keepings(field), 0.0, 5.0, {}, None)
+    assert verdict.verdict == "unknown"
+    assert verdict.figures["velocity_noise"] > field.hysteresis  # rounding alone outweighs it
+
+
+def test_without_hysteresis_a_hand_between_shallow_rivers_chatters_in_mujoco_too():
+    field = straight_pair(10.0, "discrete", 0.0)
+    found = _lost(field, CLOCK, 0.0)
+    assert found["kind"] == "chatters"
+    assert switching(_keepings(field), 0.0, 5.0, found, None).verdict == "refuted"
+    way = _in_mujoco(field, CLOCK, found)
+    assert failure(way.river, CLOCK.period, found["river"], True).kind == "chatters"
+    # The same start with the hysteresis that is certified: it does not.
+    calm = _in_mujoco(straight_pair(10.0, "discrete", 2.0), CLOCK, found)
+    assert failure(calm.river, CLOCK.period, found["river"], True) is None
+
+
+def test_a_hand_that_is_pushed_hard_is_thrown_out_in_mujoco_too():
+    field = straight_pair(20.0, "discrete", 0.15)
+    found = _lost(field, CLOCK, 1.0)
+    assert found["kind"] == "thrown out"
+    way = _in_mujoco(field, CLOCK, found)
+    ended = failure(way.river, CLOCK.period, found["river"], True)
+    assert ended.kind == "thrown out"
+    assert ended.time == pytest.approx(found["time"], abs=0.05)
+
+
+def test_the_smooth_form_throws_a_hand_out_at_a_shallow_crossing_in_mujoco_too():
+    field = straight_pair(30.0, "smooth", 0.15)
+    found = _lost(field, CLOCK, 0.0)
+    assert found
+    verdict = switching(_keepings(field), 0.0, 5.0, found, None)
+    assert verdict.verdict == "refuted"
+    # Forgiveness leaves the rival nearly all of its weight there, and none of it at a right angle.
+    assert verdict.figures["rival_weight"] > 0.5
+    steep = switching(_keepings(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
+    assert steep.figures["rival_weight"] < 1e-6
+    way = _in_mujoco(field, CLOCK, found)
+    assert failure(way.river, CLOCK.period, found["river"], False, smooth=True) is not None
+
+
+def test_the_dwell_time_falls_with_the_push_and_is_a_period_without_hysteresis():
+    slow = Sampling(2e-5, 0.0, 2.0)
+    without, narrow = (_keepings(straight_pair(45.0, "discrete", h), slow) for h in (0.0, 0.5))
+    assert hysteresis_dwell(without, 0.2) == slow.period
+    assert hysteresis_dwell(narrow, 0.2) > hysteresis_dwell(narrow, 5.0) > slow.period
+    # At the clock of a run a hand can be accelerated through the hysteresis within a tick.
+    assert hysteresis_dwell(_keepings(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
+
+
+def test_failures_are_told_apart():
+    calm = np.zeros(100)
+    assert failure(calm, 1e-3, 0, True) is None
+    once = np.repeat([0.0, 1.0], 50)
+    assert failure(once, 1e-3, 0, True) is None
+    assert failure(once, 1e-3, 0, False).kind == "taken over"
+    assert failure(np.repeat([0.0, -1.0], 50), 1e-3, 0, True).kind == "thrown out"
+    assert failure(np.tile([0.0, 1.0], 50), 1e-3, 0, True).kind == "chatters"
+
+
+@pytest.mark.slow
+def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
+    config = RunConfig(mode="rivers")
+    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
+    verdict = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)["switching"]
+    assert verdict.verdict == "refuted"
+    assert verdict.figures["common_rate"] < 1.0
+    assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
+    found, field = verdict.counterexample, law(config, curve)
+    way = _in_mujoco(field, clock, found)
+    ended = failure(way.river, clock.period, found["river"], any(found["force"]))
+    assert ended.kind == found["kind"]
+    assert ended.time == pytest.approx(found["time"], abs=0.1)
+
+
+@pytest.mark.slow
+def test_summed_rivers_are_certified_for_a_hand_that_holds_on():
+    config = RunConfig(mode="rivers", crossing="sum")
+    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
+    verdicts = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)
+    assert verdicts["switching"].verdict == "certified"
+
+
+@pytest.mark.slow
+def test_nothing_certified_is_lost_in_mujoco():
+    counts = trials(40)
+    assert counts[True, False] == 0
+    assert counts[True, True] >= 8
+    assert counts[False, False] >= 3  # the trials could have refuted it
