@@ -77,8 +77,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     console = Console(stderr=True)
     check_folder(out, overwrite)
     clips, remarks = load_clips(config.clips)
-    compile_once(console)
-    session = wire(config, clips, remarks)
+    session = wire(config, clips, remarks, lambda: compile_once(console))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     clear_folder(out)

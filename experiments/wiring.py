@@ -1,6 +1,6 @@
 """Where concrete parts are put together: from a configuration to a servo that runs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -127,8 +127,19 @@ def load_clips(names: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[str, ...]]
     return tuple(clips), tuple(remarks)
 
 
-def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = ()) -> Session:
+def wire(
+    config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = (), ready: Callable[[], None] = lambda: None
+) -> Session:
     """Put a run together.
+
+    Parameters
+    ----------
+    config : RunConfig
+        What to run.
+    clips, remarks
+        Of `load_clips`.
+    ready : callable
+        Called when everything has been checked and before compiled code is needed.
 
     Raises
     ------
@@ -194,8 +205,9 @@ def wire(config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = 
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     poses = np.empty((1, haptic_map.nq))
     argument = walker_argument(np.zeros(1)) if leading else stylus_path(start[None])
-    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     user = _user(config, curve, grabs) if led is None else leading_hand(led)
+    ready()
+    poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
