@@ -170,16 +170,8 @@ def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
 
 
 @pytest.mark.slow
-def test_summed_rivers_are_certified_for_a_hand_that_holds_on():
-    config = RunConfig(mode="rivers", crossing="sum")
-    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
-    verdicts = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)
-    assert verdicts["switching"].verdict == "certified"
-
-
-@pytest.mark.slow
 def test_nothing_certified_is_lost_in_mujoco():
-    counts = trials(24)
+    counts = trials(40)
     assert counts[True, False] == 0
     assert counts[True, True] >= 8
     assert counts[False, False] >= 3  # the trials could have refuted it
