@@ -206,14 +206,14 @@ def wire(
     poses = np.empty((1, haptic_map.nq))
     argument = walker_argument(np.zeros(1)) if leading else stylus_path(start[None])
     user = _user(config, curve, grabs) if led is None else leading_hand(led)
+    limiter = ForceLimiter(period)
+    tank = energy_tank(config, curve, limiter, grabs, urged)
+    port = phantom_port(world.model, world.data, period, config.cutoff)
     ready()
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
-    limiter = ForceLimiter(period)
-    tank = energy_tank(config, curve, limiter, grabs, urged)
-    port = phantom_port(world.model, world.data, period, config.cutoff)
     servo = Servo(
         plant=make_plant(world),
         port=port,
