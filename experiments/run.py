@@ -1,9 +1,7 @@
 """A run from a configuration to a folder: recording, summary, animations, figures, page."""
 
 import json
-import resource
 import shutil
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -32,6 +30,7 @@ from models.scene import P_WH, SceneConfig, world_model
 from sim.clock import RealTime
 from sim.errors import SimError
 from sim.loop import BLOCK_SECONDS, Loop, groups, record_into
+from sim.memory import peak_memory_mb
 from sim.recorder import Recorder
 from sim.recording import Recording
 from sim.reference import make_reference, poses_along, reference_along
@@ -173,17 +172,12 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
 
         times = loop.run(seconds - first, progress)
     page.close()
-    return SpeedSummary(times.real_time_factor, first_tick, _peak_memory_mb())
+    return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
 
 
 def _live_page(session: Session) -> Page:
     static = session.static()
     return LivePage(session.world.model, np.asarray(static["curve"]), session.config.reach, P_WH)
-
-
-def _peak_memory_mb() -> float:
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
