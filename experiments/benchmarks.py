@@ -21,11 +21,15 @@ from controllers.fields.soft_wall import raise_walls
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import HandState
+from experiments.clips import load_clips
 from experiments.config import RunConfig
+from experiments.figure_maps import figure_legs
+from experiments.hands import stylus_path
 from experiments.modes import heaviest_field, tick_microseconds
 from experiments.run import SUMMARY
+from experiments.session import Session
 from experiments.walls import figure_walls
-from experiments.wiring import Session, figure_legs, load_clips, stylus_path, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from sim.compiled import entry_point

@@ -34,7 +34,8 @@ def _compile(body: str) -> None:
         servo, world, _ = wire_arm(ArmConfig())
         Loop(servo, world).run(servo.plant.period * servo.figure_ticks)
     else:
-        from experiments.wiring import load_clips, wire
+        from experiments.clips import load_clips
+        from experiments.wiring import wire
 
         config = RunConfig()
         session = wire(config, load_clips(config.clips)[0])

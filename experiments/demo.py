@@ -1,7 +1,7 @@
 """The demo: the four-clip cylinder of the paper's Fig. 3 (Donald & Henle 2000)."""
 
 from experiments.config import RunConfig
-from experiments.wiring import lap_pushes
+from experiments.hands import lap_pushes
 
 _LAP = 4.0
 _RELAXED = 2.2 * _LAP  # two laps: the device's friction makes them a little longer than the curve's own

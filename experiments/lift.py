@@ -14,10 +14,11 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting import Lifting, Room, closes, lift
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.motion_features import Motion
+from experiments.clips import load_clips
+from experiments.figure_maps import figure_legs
 from experiments.in_betweens import MotionMeasure
 from experiments.map_files import MAP_SUFFIX, save_map
 from experiments.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
-from experiments.wiring import figure_legs, load_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip

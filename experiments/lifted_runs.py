@@ -9,6 +9,7 @@ from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
 from experiments.config import RunConfig
+from experiments.modes import river_time
 from sim.users.intent import Grab
 from sim.world import phantom_angles
 
@@ -59,11 +60,7 @@ def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
     ParameterError
         If a gain is out of its interval.
     """
-    if config.damping <= 0.0 or config.stiffness <= 0.0:
-        raise ParameterError(
-            f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"
-        )
-    tau = config.damping / config.stiffness
+    tau = river_time(config)
     curves = [haptic_map.curve(i) for i in range(len(haptic_map.names))]
     return RiverBundle(
         tuple(River(curve, config.river_tube, tau, config.damping) for curve in curves), haptic_map.names

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifting import Room
+from experiments.figure_maps import figure_legs
 from experiments.in_betweens import MotionMeasure
 from experiments.lift import LiftedClips, lift_clips
 from experiments.map_quality import SAMPLES, Layout, MapQuality, measure_map
-from experiments.wiring import figure_legs
 from models.humanoid.skeleton import figure_model
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -78,11 +78,22 @@ def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
     ParameterError
         If a gain is out of its interval.
     """
+    return river_bundle(curve, config.reach, river_time(config), config.damping, config.river_tube)
+
+
+def river_time(config: RunConfig) -> float:
+    """τ = b_d / k_r of a river with a configuration's gains [s].
+
+    Raises
+    ------
+    ParameterError
+        If a gain is not positive.
+    """
     if config.damping <= 0.0 or config.stiffness <= 0.0:
         raise ParameterError(
             f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"
         )
-    return river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
+    return config.damping / config.stiffness
 
 
 def _pace(curve: Trajectory, rivers: RiverBundle | None) -> float:

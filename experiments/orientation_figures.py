@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from controllers.rotations import logarithm, multiply, rotate
 from experiments.config import RunConfig
 from experiments.figures import AXES, STYLE
+from experiments.hands import stylus_path
 from experiments.run import RECORDING, clips_of, config_of, run
-from experiments.wiring import stylus_path, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE
 from models.scene import FIGURE, world_model
 from sim.recording import Recording

@@ -6,8 +6,10 @@ import numpy as np
 
 from controllers.energy_tank import EnergyTank
 from controllers.fields.instructions import Program
+from experiments.clips import load_clips
 from experiments.config import RunConfig
-from experiments.wiring import Session, load_clips, wire
+from experiments.session import Session
+from experiments.wiring import wire
 from sim.loop import Loop, Observer
 
 

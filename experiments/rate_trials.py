@@ -19,11 +19,13 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER, Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.figures import STYLE
 from experiments.governor import speeds_along
 from experiments.modes import GATE, HYSTERESIS, SIGMA
-from experiments.wiring import Session, load_clips, wire
+from experiments.session import Session
+from experiments.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.scene import FIGURE
 from sim.loop import Loop

@@ -22,9 +22,9 @@ from experiments.budget import fastest, tank_for
 from experiments.compiling import compile_once
 from experiments.config import ArmConfig
 from experiments.figures import STYLE
+from experiments.hands import lap_pushes
 from experiments.report import write_report
 from experiments.run import RECORDING, REPORT, SUMMARY, check_folder
-from experiments.wiring import lap_pushes
 from models.phantom.parameters import PREMIUM_1_5
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm_model
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT

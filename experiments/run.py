@@ -16,14 +16,18 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.leading import Leading
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.clips import load_clips
 from experiments.compiling import compile_once
 from experiments.config import STRETCHING, RunConfig
+from experiments.figure_maps import packed_legs
+from experiments.hands import stylus_path
 from experiments.lead import walker_argument
 from experiments.lead_measures import lead_summary
 from experiments.measures import BLOCK_FRAMES, summarise
+from experiments.session import Session
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
 from experiments.summary import RunSummary, SpeedSummary
-from experiments.wiring import Session, load_clips, packed_legs, stylus_path, wire
+from experiments.wiring import wire
 from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from rich.console import Console
 
-from experiments.wiring import load_clips
+from experiments.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.compiled import is_cached
 from sim.tracking import track

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from controllers.state import HandState
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.run import config_dict
-from experiments.wiring import load_clips, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from sim.devices.base import Device, DeviceError
 from sim.devices.replay import ReplayDevice

@@ -8,8 +8,8 @@ from clips_for_maps import LEG, difference, swinging
 from controllers.curves.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
+from experiments.figure_maps import figure_legs
 from experiments.lead import led_map
-from experiments.wiring import figure_legs
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
 from models.mocap.contacts import contacts

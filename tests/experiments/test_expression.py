@@ -9,10 +9,11 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.expression import expressive_figure, oriented
-from experiments.wiring import FOOT_CONTACTS, load_clips, wire
-from models.humanoid.skeleton import BODIES, JOINTS, figure_model, joint_range
+from experiments.wiring import wire
+from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded, embedded_names
 
 FIGURE = figure_model()

@@ -6,10 +6,11 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from experiments.ballistics import clip_ballistics
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.governor import Governed, animation_along
 from experiments.rate_trials import DRAG, Bench
-from experiments.wiring import load_clips, wire
+from experiments.wiring import wire
 from models.mocap.library import embedded
 
 

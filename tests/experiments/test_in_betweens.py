@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from experiments.balance import nearest_supported
+from experiments.clips import load_clips
 from experiments.config import FIGURE_CLIPS, RunConfig
-from experiments.wiring import load_clips, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.balance import supported
 from models.mocap.clip import pose_difference

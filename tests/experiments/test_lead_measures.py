@@ -6,10 +6,12 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
 from experiments.cli import main
+from experiments.clips import load_clips
 from experiments.config import RunConfig
+from experiments.figure_maps import figure_legs
 from experiments.lead import law, leading_hand, led_map, s_curve, walker_argument
 from experiments.lead_measures import LeadSummary, _Retrace, _Soles, support_at
-from experiments.wiring import figure_legs, load_clips, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import PlanarDisplacement
 from models.mocap.library import embedded

@@ -12,8 +12,9 @@ from controllers.haptic_map.lifted import Lifted
 from experiments.archives import read_archive, write_archive
 from experiments.config import RunConfig
 from experiments.field_files import save_field
+from experiments.figure_maps import figure_legs
 from experiments.map_files import load_figure_map, load_map, save_map
-from experiments.wiring import figure_legs, wire
+from experiments.wiring import wire
 from models.mocap.library import embedded
 from models.scene import SceneConfig
 from sim.errors import SimError

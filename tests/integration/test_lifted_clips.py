@@ -7,7 +7,7 @@ import pytest
 
 from controllers.haptic_map.frames import CLOSES, closing_gap
 from controllers.haptic_map.lifted import Lifted
-from experiments.wiring import figure_legs
+from experiments.figure_maps import figure_legs
 from models.errors import ModelError
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, embedded_names, load_clip

@@ -9,8 +9,10 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
+from experiments.clips import load_clips
+from experiments.figure_maps import figure_legs, packed_legs
+from experiments.hands import stylus_path
 from experiments.modes import river_bundle
-from experiments.wiring import figure_legs, load_clips, packed_legs, stylus_path
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
 from sim.reference import make_reference, reference_along

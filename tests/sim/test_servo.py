@@ -5,8 +5,11 @@ import pytest
 
 from controllers.fields.program import evaluate
 from controllers.safety import limit_force
+from experiments.clips import load_clips
 from experiments.config import RunConfig
-from experiments.wiring import Session, lap_pushes, load_clips, wire
+from experiments.hands import lap_pushes
+from experiments.session import Session
+from experiments.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, jacobian

@@ -10,10 +10,13 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.clips import load_clips
 from experiments.config import RunConfig
+from experiments.hands import stylus_path
+from experiments.session import Session
 from experiments.stretch import CURVE_FILE, law, load_curve, save_curve, stretch_grabs, stretch_summary
 from experiments.stretch_figure import draw_stretch
-from experiments.wiring import Session, load_clips, stylus_path, wire
+from experiments.wiring import wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError
 from sim.loop import Loop, groups

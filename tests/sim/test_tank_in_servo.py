@@ -8,9 +8,11 @@ import pytest
 
 from controllers.energy_tank import TANK_ENERGY, EnergyTank
 from controllers.fields.python_law import PythonLaw
+from experiments.clips import load_clips
 from experiments.config import RunConfig
+from experiments.hands import lap_pushes
 from experiments.own_law import loop_with
-from experiments.wiring import lap_pushes, load_clips, wire
+from experiments.wiring import wire
 from sim.loop import Loop
 from sim.users.intent import Push
 

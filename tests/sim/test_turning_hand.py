@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from experiments.clips import load_clips
 from experiments.config import RunConfig
-from experiments.wiring import load_clips, wire
+from experiments.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.scene import PHANTOM
 from sim.devices.phantom_port import phantom_port, true_turn

@@ -1,0 +1,68 @@
+"""A run that is wired up: its parts, and what of them a recording keeps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.leading import Leading
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.led import Led
+from experiments.config import RunConfig
+from experiments.lead import lead_static
+from experiments.modes import Field
+from models.mocap.clip import Clip
+from models.phantom.parameters import PREMIUM_1_5
+from models.scene import P_WH
+from sim.figure import Figure
+from sim.servo import Servo
+from sim.world import World
+
+
+@dataclass(frozen=True)
+class Session:
+    """A run that is wired up and has not begun: the servo, and what it was made of.
+
+    The haptic map is that of the clips, or an expressive map about it.
+    """
+
+    config: RunConfig
+    clips: tuple[Clip, ...]
+    remarks: tuple[str, ...]
+    curve: Trajectory
+    field: Field
+    clip_map: ClipMap | Led
+    haptic_map: HapticMap
+    world: World
+    figure: Figure
+    servo: Servo
+
+    def static(self) -> dict[str, npt.ArrayLike | str]:
+        """What the recording keeps beside the channels."""
+        phases = np.linspace(self.curve.start, self.curve.end, 241)
+        return {
+            "curve": self.curve.point(phases),
+            "curve_span": np.array([self.curve.start, self.curve.end]),
+            "curve_closed": float(self.curve.periodic),
+            "tube_radius": self.config.reach,
+            "p_WH": P_WH,
+            "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
+            "motor_peak": np.array(PREMIUM_1_5.peak_torque),
+            "body_weight": self.figure.state.weight,
+            "clip_names": "\n".join(clip.name for clip in self.clips),
+            **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
+            "clip_fps": np.array([clip.fps for clip in self.clips]),
+            **(lead_static(self.field) if isinstance(self.field, Leading) else {}),
+            **self._rivers(),
+        }
+
+    def _rivers(self) -> dict[str, npt.ArrayLike | str]:
+        """Names and curves of the rivers of a field that gives the hand to one of them."""
+        if not isinstance(self.field, HigherOrder):
+            return {}
+        bundle, share = self.field.bundle, np.linspace(0.0, 1.0, 241)
+        curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
+        return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
