@@ -1,5 +1,6 @@
 """Haptic maps in files: what a map was made of as a NumPy archive, from which it is made again to the last bit."""
 
+import hashlib
 from pathlib import Path
 
 from controllers.errors import ControllerError
@@ -61,3 +62,8 @@ def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple
         raise SimError(f"{path}: its poses have {haptic_map.nq} numbers, the figure's have {N_POSE}")
     clips = zip(haptic_map.clips, haptic_map.names, strict=True)
     return haptic_map, tuple(Clip(poses, fps, name) for (poses, fps), name in clips)
+
+
+def map_digest(path: Path) -> str:
+    """SHA-256 of a map's file, in hexadecimal; raises OSError if it cannot be read."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

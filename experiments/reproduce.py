@@ -5,8 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.config import RunConfig
+from experiments.map_files import map_digest
 from experiments.run import RECORDING, clips_of, config_of
 from experiments.wiring import wire
+from sim.errors import SimError
 from sim.loop import Loop, tick_channels
 from sim.recording import Recording
 from sim.servo import FrameLog, TickLog
@@ -30,13 +33,35 @@ class _Comparison:
         self.rows += n
 
 
+def _check_map(config: RunConfig, recording: Recording) -> None:
+    """Refuse a map whose file is not the one that was recorded with."""
+    recorded = recording.texts.get("map_sha256")
+    if recorded is None:
+        return
+    found = map_digest(Path(config.map))
+    if found != recorded:
+        raise SimError(
+            f"{config.map}: the map has changed since the run was recorded: its SHA-256 is {found[:12]}…, expected "
+            f"{recorded[:12]}…; put the file back that the run was made with, or make it again by the same hvf lift"
+        )
+
+
 def reproduce(folder: Path) -> int:
-    """Run a recording's configuration again, say whether every tick is the same, and return an exit code."""
+    """Run a recording's configuration again, say whether every tick is the same, and return an exit code.
+
+    Raises
+    ------
+    SimError
+        If it is no recording, or the file of its map has changed.
+    OSError
+        If a file cannot be read.
+    """
     with Recording(folder / RECORDING) as recording:
         for package, recorded in recording.versions.items():
             if package != "python" and version(package) != recorded:
                 print(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
         config = config_of(recording)
+        _check_map(config, recording)
         session = wire(config, clips_of(recording))
         comparison = _Comparison(recording)
         recorded_ticks = len(recording.channel("ticks", "t"))

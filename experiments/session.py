@@ -1,6 +1,7 @@
 """A run that is wired up: its parts, and what of them a recording keeps."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.led import Led
 from experiments.config import RunConfig
 from experiments.lead import lead_static
+from experiments.map_files import MAP_SUFFIX, map_digest
 from experiments.modes import Field
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
@@ -55,6 +57,7 @@ class Session:
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),
+            **({"map_sha256": map_digest(Path(self.config.map))} if self.config.map.endswith(MAP_SUFFIX) else {}),
             **(lead_static(self.field) if isinstance(self.field, Leading) else {}),
             **self._rivers(),
         }

@@ -51,18 +51,6 @@ def cylinder(x: Array, chain: Array) -> tuple[float, float]:
     return radius, angle
 
 
-@njit
-def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, float]:
-    """A coordinate held near an interval, and its derivative: x within, constant from a margin beyond on; C²."""
-    beyond = max(x - high, low - x)
-    if beyond <= 0.0:
-        return x, 1.0
-    edge, sign = (high, 1.0) if x > high else (low, -1.0)
-    u = min(beyond / margin, 1.0)
-    # Integral of 1 − 3u² + 2u³, which leaves 1 and reaches 0 without a kink.
-    return edge + sign * margin * (u - u**3 + 0.5 * u**4), 1.0 - u * u * (3.0 - 2.0 * u)
-
-
 def checked_interval(name: str, interval: tuple[float, float], least: float) -> tuple[float, float]:
     """An interval [m] that increases from more than `least`, or what is wrong with it."""
     low, high = interval

@@ -10,7 +10,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
 from controllers.haptic_map.combination import combine, figure_channels, packed_figure
-from controllers.haptic_map.cylinder import clamped, cylinder
+from controllers.haptic_map.cylinder import cylinder
 from controllers.haptic_map.frames import (
     CLOSES,
     PlacedClip,
@@ -24,6 +24,7 @@ from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
+from controllers.haptic_map.saturation import clamped
 from controllers.haptic_map.sites import box, checked_sites
 from controllers.haptic_map.splines import basis, basis_slope, control_points, round_lap
 from controllers.state import Array, IntArray

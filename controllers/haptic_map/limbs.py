@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.rotations import multiply, rotate
+from controllers.haptic_map.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
 from controllers.state import Array, Vec3
 
 LIMB = 18  # numbers of a packed limb
@@ -28,9 +28,6 @@ END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
 _STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
 _SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
 _SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
-
-_Vector = tuple[float, float, float]
-_Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,46 +86,6 @@ def flexion(c: float) -> tuple[float, float]:
 
 
 @njit
-def _dot(a: _Vector, b: _Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit
-def _cross(a: _Vector, b: _Vector) -> _Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit
-def _plus(a: _Vector, b: _Vector) -> _Vector:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@njit
-def _minus(a: _Vector, b: _Vector) -> _Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@njit
-def _turn(q: _Quaternion, v: _Vector) -> _Vector:
-    return rotate(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
-
-
-@njit
-def _back(q: _Quaternion, v: _Vector) -> _Vector:
-    return rotate(q[0], -q[1], -q[2], -q[3], v[0], v[1], v[2])
-
-
-@njit
-def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    return multiply(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-
-
-@njit
-def _vector(array: Array, at: int) -> _Vector:
-    return array[at], array[at + 1], array[at + 2]
-
-
-@njit
 def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
     """Correct the joints of a limb so that its end is where it should be.
 
@@ -147,66 +104,66 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
         k, or 0 to leave the rates alone.
     """
     first, second, last = int(limb[0]), int(limb[1]), int(limb[2])
-    a, b, axis, point = _vector(limb, 6), _vector(limb, 9), _vector(limb, 12), _vector(limb, 15)
+    a, b, axis, point = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12), vector_at(limb, 15)
     q_root = rotations[0, 0], rotations[0, 1], rotations[0, 2], rotations[0, 3]
     q_first = rotations[first, 0], rotations[first, 1], rotations[first, 2], rotations[first, 3]
     q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
     q_end = rotations[last, 0], rotations[last, 1], rotations[last, 2], rotations[last, 3]
 
     # The last joint as the root sees it, from its own origin and from the first joint's.
-    from_root = _back(q_root, _minus(_minus(_vector(end[0], 0), _turn(q_end, point)), _vector(root[0], 0)))
-    line = _minus(from_root, _vector(limb, 3))
-    m, normal = _back(q_second, a), _cross(axis, b)
-    b_axis, m_axis = _dot(b, axis), _dot(m, axis)
-    k_cos, k_sin = 2.0 * (_dot(m, b) - m_axis * b_axis), 2.0 * _dot(m, normal)
+    from_root = turned_back(q_root, minus(minus(vector_at(end[0], 0), turned(q_end, point)), vector_at(root[0], 0)))
+    line = minus(from_root, vector_at(limb, 3))
+    m, normal = turned_back(q_second, a), cross(axis, b)
+    b_axis, m_axis = dot(b, axis), dot(m, axis)
+    k_cos, k_sin = 2.0 * (dot(m, b) - m_axis * b_axis), 2.0 * dot(m, normal)
     size = max(np.sqrt(k_cos * k_cos + k_sin * k_sin), 1e-12)
-    c = (_dot(line, line) - _dot(a, a) - _dot(b, b) - 2.0 * m_axis * b_axis) / size
+    c = (dot(line, line) - dot(a, a) - dot(b, b) - 2.0 * m_axis * b_axis) / size
     wanted, wanted_slope = flexion(c)
     blended, blended_slope = flexion(k_cos / size)
     half = 0.5 * (wanted - blended)
     sine = np.sin(half)
     bend = np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
-    n_second = _product(q_second, bend)
+    n_second = product(q_second, bend)
 
-    to_last = _plus(a, _turn(n_second, b))
-    u = _turn(q_first, to_last)
-    length, distance = max(np.sqrt(_dot(u, u)), 1e-9), max(np.sqrt(_dot(line, line)), 1e-9)
+    to_last = plus(a, turned(n_second, b))
+    u = turned(q_first, to_last)
+    length, distance = max(np.sqrt(dot(u, u)), 1e-9), max(np.sqrt(dot(line, line)), 1e-9)
     # Half-angle form of the shortest rotation from u to the line; not defined half a turn apart.
-    scalar, vector = length * distance + _dot(u, line), _cross(u, line)
-    norm = max(np.sqrt(scalar * scalar + _dot(vector, vector)), 1e-12)
+    scalar, vector = length * distance + dot(u, line), cross(u, line)
+    norm = max(np.sqrt(scalar * scalar + dot(vector, vector)), 1e-12)
     swing = scalar / norm, vector[0] / norm, vector[1] / norm, vector[2] / norm
-    n_first = _product(swing, q_first)
-    shank = _product(_product(q_root, n_first), n_second)
-    n_last = _product((shank[0], -shank[1], -shank[2], -shank[3]), q_end)
+    n_first = product(swing, q_first)
+    shank = product(product(q_root, n_first), n_second)
+    n_last = product((shank[0], -shank[1], -shank[2], -shank[3]), q_end)
 
     for k in range(tangents):
         w_root = rates[0, 0, k], rates[0, 1, k], rates[0, 2, k]
         w_first = rates[first, 0, k], rates[first, 1, k], rates[first, 2, k]
         w_second = rates[second, 0, k], rates[second, 1, k], rates[second, 2, k]
         w_end = rates[last, 0, k], rates[last, 1, k], rates[last, 2, k]
-        v = _minus(_minus(_vector(end[1 + k], 0), _turn(q_end, _cross(w_end, point))), _vector(root[1 + k], 0))
-        d_line = _minus(_back(q_root, v), _cross(w_root, from_root))
-        d_m = _cross(m, w_second)
-        d_axis = _dot(d_m, axis)
-        d_cos, d_sin = 2.0 * (_dot(d_m, b) - d_axis * b_axis), 2.0 * _dot(d_m, normal)
+        v = minus(minus(vector_at(end[1 + k], 0), turned(q_end, cross(w_end, point))), vector_at(root[1 + k], 0))
+        d_line = minus(turned_back(q_root, v), cross(w_root, from_root))
+        d_m = cross(m, w_second)
+        d_axis = dot(d_m, axis)
+        d_cos, d_sin = 2.0 * (dot(d_m, b) - d_axis * b_axis), 2.0 * dot(d_m, normal)
         d_size = (k_cos * d_cos + k_sin * d_sin) / size
-        d_c = (2.0 * _dot(line, d_line) - 2.0 * d_axis * b_axis - c * d_size) / size
+        d_c = (2.0 * dot(line, d_line) - 2.0 * d_axis * b_axis - c * d_size) / size
         turn = wanted_slope * d_c - blended_slope * (d_cos - k_cos / size * d_size) / size
-        w_second = _plus(_back(bend, w_second), (turn * axis[0], turn * axis[1], turn * axis[2]))
-        d_u = _turn(q_first, _plus(_cross(w_first, to_last), _turn(n_second, _cross(w_second, b))))
-        d_scalar = _dot(u, d_u) * distance / length + _dot(line, d_line) * length / distance
-        d_scalar += _dot(d_u, line) + _dot(u, d_line)
-        d_vector = _plus(_cross(d_u, line), _cross(u, d_line))
+        w_second = plus(turned_back(bend, w_second), (turn * axis[0], turn * axis[1], turn * axis[2]))
+        d_u = turned(q_first, plus(cross(w_first, to_last), turned(n_second, cross(w_second, b))))
+        d_scalar = dot(u, d_u) * distance / length + dot(line, d_line) * length / distance
+        d_scalar += dot(d_u, line) + dot(u, d_line)
+        d_vector = plus(cross(d_u, line), cross(u, d_line))
         # 2 Im(Q⁻¹ ⊗ Q̇), whatever the length of Q.
-        across, share = _cross(vector, d_vector), 2.0 / (norm * norm)
+        across, share = cross(vector, d_vector), 2.0 / (norm * norm)
         w_swing = (
             share * (scalar * d_vector[0] - d_scalar * vector[0] - across[0]),
             share * (scalar * d_vector[1] - d_scalar * vector[1] - across[1]),
             share * (scalar * d_vector[2] - d_scalar * vector[2] - across[2]),
         )
-        w_first = _plus(_back(q_first, w_swing), w_first)
-        w_shank = _plus(_back(n_second, _plus(_back(n_first, w_root), w_first)), w_second)
-        w_last = _minus(w_end, _back(n_last, w_shank))
+        w_first = plus(turned_back(q_first, w_swing), w_first)
+        w_shank = plus(turned_back(n_second, plus(turned_back(n_first, w_root), w_first)), w_second)
+        w_last = minus(w_end, turned_back(n_last, w_shank))
         for i in range(3):
             rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
     for i in range(4):

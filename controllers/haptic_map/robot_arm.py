@@ -27,7 +27,8 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
 from controllers.haptic_map.saturation import saturate_vector
-from controllers.rotations import exponential, logarithm, multiply, rotate
+from controllers.haptic_map.vectors import Quaternion, Vector, cross, product, turned, turned_back
+from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.state import Array, Pose
 
 ROBOT_ARM = 4
@@ -37,33 +38,15 @@ _HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 
 _FAR, _NEARLY_BACK = 1e3, 3.1  # [m], [rad] where a saturated stylus is on the edge of its domain
 _LEAST_BEND = np.radians(8.0)  # of the joints at whose zero shoulder, elbow or wrist are singular
 
-_Vector = tuple[float, float, float]
-_Quaternion = tuple[float, float, float, float]
-
 
 @njit
-def _cross(a: _Vector, b: _Vector) -> _Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit
-def _about_y(angle: float) -> _Quaternion:
+def _about_y(angle: float) -> Quaternion:
     return np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0
 
 
 @njit
-def _about_z(angle: float) -> _Quaternion:
+def _about_z(angle: float) -> Quaternion:
     return np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)
-
-
-@njit
-def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    return multiply(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-
-
-@njit
-def _turned(q: _Quaternion, v: _Vector) -> _Vector:
-    return rotate(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
 
 
 @njit
@@ -72,7 +55,7 @@ def _wrapped(angle: float) -> float:
 
 
 @njit
-def _zyz(q: _Quaternion, sign: float) -> _Vector:
+def _zyz(q: Quaternion, sign: float) -> Vector:
     """Angles of R_z(a) R_y(b) R_z(c), b of a given sign; at b = 0 only a + c is defined."""
     w, x, y, z = q
     total, difference = np.arctan2(z, w), np.arctan2(-sign * x, sign * y)
@@ -81,33 +64,11 @@ def _zyz(q: _Quaternion, sign: float) -> _Vector:
 
 
 @njit
-def _zyz_rates(a: float, b: float, omega: _Vector) -> _Vector:
+def _zyz_rates(a: float, b: float, omega: Vector) -> Vector:
     """Rates of the three angles for an angular velocity in the frame in which the first turns."""
     sine, cosine = np.sin(a), np.cos(a)
     rate_c = (cosine * omega[0] + sine * omega[1]) / np.copysign(max(abs(np.sin(b)), 1e-9), b)
     return omega[2] - np.cos(b) * rate_c, cosine * omega[1] - sine * omega[0], rate_c
-
-
-@njit
-def _left_jacobian(r: Array, inverse: bool, v: _Vector) -> _Vector:
-    """J(r) v or J(r)⁻¹ v, where the angular velocity of exp(r) is J(r) ṙ."""
-    square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
-    angle = np.sqrt(square)
-    if inverse:
-        first = -0.5
-        half = 0.5 * angle
-        second = (1.0 - half / np.tan(half)) / square if angle > 1e-2 else 1.0 / 12.0 + square / 720.0
-    else:
-        first = (1.0 - np.cos(angle)) / square if angle > 1e-2 else 0.5 - square / 24.0
-        second = (1.0 - np.sin(angle) / angle) / square if angle > 1e-2 else 1.0 / 6.0 - square / 120.0
-    axis = r[0], r[1], r[2]
-    once = _cross(axis, v)
-    twice = _cross(axis, once)
-    return (
-        v[0] + first * once[0] + second * twice[0],
-        v[1] + first * once[1] + second * twice[1],
-        v[2] + first * once[2] + second * twice[2],
-    )
 
 
 @njit
@@ -121,9 +82,9 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     saturate_vector(turn, params[_TURN], params[_TURN + 1], turn_slope)
     led = exponential(turn[0], turn[1], turn[2])
     home = params[_ORIENTATION], params[_ORIENTATION + 1], params[_ORIENTATION + 2], params[_ORIENTATION + 3]
-    tool = _product(led, home)
+    tool = product(led, home)
     base, upper, fore, hand = params[_LENGTHS], params[_LENGTHS + 1], params[_LENGTHS + 2], params[_LENGTHS + 3]
-    lever = _turned(tool, (0.0, 0.0, hand))
+    lever = turned(tool, (0.0, 0.0, hand))
 
     scale = params[_SCALE]
     px = params[_HOME] + scale * place[0] - lever[0]
@@ -138,31 +99,32 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     sine = np.sqrt(1.0 - cosine * cosine)
     elbow = np.arctan2(sine, cosine)
     beta = np.arctan2(fore * sine, upper + fore * cosine)
-    to_wrist = _product(_about_z(azimuth), _about_y(elevation))
-    plane = _product(to_wrist, _about_z(params[_ARM_ANGLE]))
-    shoulder = _product(plane, _about_y(-beta))
-    arm = _product(shoulder, _about_y(elbow))
-    wrist = _product((arm[0], -arm[1], -arm[2], -arm[3]), tool)
+    to_wrist = product(_about_z(azimuth), _about_y(elevation))
+    plane = product(to_wrist, _about_z(params[_ARM_ANGLE]))
+    shoulder = product(plane, _about_y(-beta))
+    arm = product(shoulder, _about_y(elbow))
+    wrist = product((arm[0], -arm[1], -arm[2], -arm[3]), tool)
     pose[0], pose[1], pose[2] = _zyz(shoulder, 1.0)
     pose[3] = elbow
     pose[4], pose[5], pose[6] = _zyz(wrist, -1.0)
 
-    y_elevation, y_beta = _turned(_about_z(azimuth), (0.0, 1.0, 0.0)), _turned(plane, (0.0, 1.0, 0.0))
-    y_elbow = _turned(shoulder, (0.0, 1.0, 0.0))
+    y_elevation, y_beta = turned(_about_z(azimuth), (0.0, 1.0, 0.0)), turned(plane, (0.0, 1.0, 0.0))
+    y_elbow = turned(shoulder, (0.0, 1.0, 0.0))
     for j in range(STYLUS_TANGENT if jacobian.shape[0] > 0 else 0):
         v, w_tool = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if j < 3:
             v = scale * place_slope[0, j], scale * place_slope[1, j], scale * place_slope[2, j]
         else:
             unit = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
-            rate = _left_jacobian(stylus, True, unit)
+            # Angular velocities are not local here, hence the minus signs.
+            rate = rotation_vector_rate(-stylus[0], -stylus[1], -stylus[2], unit[0], unit[1], unit[2])
             led_rate = (
                 turn_slope[0, 0] * rate[0] + turn_slope[0, 1] * rate[1] + turn_slope[0, 2] * rate[2],
                 turn_slope[1, 0] * rate[0] + turn_slope[1, 1] * rate[1] + turn_slope[1, 2] * rate[2],
                 turn_slope[2, 0] * rate[0] + turn_slope[2, 1] * rate[1] + turn_slope[2, 2] * rate[2],
             )
-            w_tool = _left_jacobian(turn, False, led_rate)
-            swing = _cross(w_tool, lever)
+            w_tool = angular_velocity(-turn[0], -turn[1], -turn[2], led_rate[0], led_rate[1], led_rate[2])
+            swing = cross(w_tool, lever)
             v = -swing[0], -swing[1], -swing[2]
         rate_azimuth = (px * v[1] - py * v[0]) / flat2
         rate_flat = (px * v[0] + py * v[1]) / flat
@@ -184,7 +146,7 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
         )
         jacobian[0, j], jacobian[1, j], jacobian[2, j] = _zyz_rates(pose[0], pose[1], w_shoulder)
         jacobian[3, j] = rate_elbow
-        in_arm = _turned((arm[0], -arm[1], -arm[2], -arm[3]), w_wrist)
+        in_arm = turned_back(arm, w_wrist)
         jacobian[4, j], jacobian[5, j], jacobian[6, j] = _zyz_rates(pose[4], pose[5], in_arm)
 
 
@@ -278,14 +240,14 @@ class RobotArm(HapticMap):
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
         for place in _FAR * directions:
-            for turned in _NEARLY_BACK * directions:
-                x = np.concatenate([place, exponential(*turned)])
+            for turn in _NEARLY_BACK * directions:
+                x = np.concatenate([place, exponential(*turn)])
                 q = self.pose(x)
                 straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
                 if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
                     raise ParameterError(
                         f"the arm cannot follow a stylus at {np.round(1e3 * place)} mm turned by "
-                        f"{np.round(np.degrees(turned))}°: joint angles {np.round(np.degrees(q))}°; expected "
+                        f"{np.round(np.degrees(turn))}°: joint angles {np.round(np.degrees(q))}°; expected "
                         f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
                         f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
                     )

@@ -1,9 +1,9 @@
 r"""Smooth saturation: what leaves a domain is led back onto its edge, with two continuous derivatives.
 
-.. math:: f(r) = r \;(r \le a), \qquad
-          f(r) = a + (b - a)\,\frac{x}{(1 + x^3)^{1/3}},\; x = \frac{r - a}{b - a} \;(r > a)
+.. math:: f(x) = x \;(x \le a), \qquad
+          f(x) = a + m\,(u - u^3 + \tfrac12 u^4),\; u = \min\Bigl(\frac{x - a}{m}, 1\Bigr) \;(x > a)
 
-f leaves the identity at a with f' = 1 and f'' = 0, increases, and tends to b.
+f leaves the identity at a with f' = 1 and f'' = 0, and is constant, a + m/2, from a + m on.
 """
 
 import numpy as np
@@ -13,14 +13,15 @@ from controllers.state import Array
 
 
 @njit
-def saturated(r: float, inner: float, outer: float) -> tuple[float, float]:
-    """f(r) and f'(r) of a length r ≥ 0, for 0 < inner < outer."""
-    if r <= inner:
-        return r, 1.0
-    width = outer - inner
-    x = (r - inner) / width
-    root = np.cbrt(1.0 + x**3)
-    return inner + width * x / root, root**-4
+def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, float]:
+    """A coordinate held near an interval, and its derivative: x within, constant from a margin beyond on; C²."""
+    beyond = max(x - high, low - x)
+    if beyond <= 0.0:
+        return x, 1.0
+    edge, sign = (high, 1.0) if x > high else (low, -1.0)
+    u = min(beyond / margin, 1.0)
+    # Integral of 1 − 3u² + 2u³, which leaves 1 and reaches 0 without a kink.
+    return edge + sign * margin * (u - u**3 + 0.5 * u**4), 1.0 - u * u * (3.0 - 2.0 * u)
 
 
 @njit
@@ -30,7 +31,8 @@ def saturate_vector(v: Array, inner: float, outer: float, slope: Array) -> None:
     With n = v/|v|: ∂/∂v = (f/|v|) (1 − n nᵀ) + f' n nᵀ.
     """
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    value, rate = saturated(length, inner, outer)
+    # From twice the width on the length is the outer one.
+    value, rate = clamped(length, 0.0, inner, 2.0 * (outer - inner))
     share = value / length if length > inner else 1.0
     square = max(length * length, 1e-300)
     for i in range(3):

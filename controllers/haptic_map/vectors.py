@@ -1,0 +1,57 @@
+"""Vectors and unit quaternions (wxyz) as tuples, for kernels that would otherwise spell them out number by number."""
+
+from numba import njit
+
+from controllers.rotations import multiply, rotate
+from controllers.state import Array
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@njit
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit
+def minus(a: Vector, b: Vector) -> Vector:
+    """Difference a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit
+def turned(q: Quaternion, v: Vector) -> Vector:
+    """Vector v turned by q."""
+    return rotate(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
+
+
+@njit
+def turned_back(q: Quaternion, v: Vector) -> Vector:
+    """Vector v turned by the inverse of q."""
+    return rotate(q[0], -q[1], -q[2], -q[3], v[0], v[1], v[2])
+
+
+@njit
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Hamilton product a ⊗ b."""
+    return multiply(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+
+
+@njit
+def vector_at(array: Array, at: int) -> Vector:
+    """Three numbers of an array (n,)."""
+    return array[at], array[at + 1], array[at + 2]
