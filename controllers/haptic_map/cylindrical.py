@@ -21,7 +21,7 @@ from controllers.state import Array
 CYLINDRICAL = 1
 _CLIPS = 4
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
-_NODES = 9  # of the corrections' table, across the blend each way
+_NODES = 13  # of the corrections' table, across the blend each way
 _EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
 _ROWS = 512  # of it round the lap, at most
 

@@ -21,17 +21,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from controllers.haptic_map.inbetween import FOOT, ROOT
-from controllers.haptic_map.limb_ends import lowest_point
+from controllers.haptic_map.limb_ends import contact_moves, lowest_point
 from controllers.haptic_map.limbs import END, Limb
-from controllers.haptic_map.loops import plane_exponential, turned
+from controllers.haptic_map.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
-_FREE = 0.004  # h_0 [m], where the foot is lifted so high
-_SHARE_FREE = 0.2  # and as a share of the largest lift of the lap
+_FREE = 0.008  # h_0 [m], where the foot is lifted so high
+_STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] so high it does not move yet, and as a share
+_SHARE_FREE = 0.5  # and as a share of the largest lift of the lap
 _LIFTED = 0.002  # [m] a foot that is never lifted more is not held
 _RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap, at least
+_FADE = 4  # power of a clip's weight with which its own slides come back
 _LAPS = 4  # until the path repeats
 
 
@@ -109,7 +111,10 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     everything = np.concatenate([weights, np.eye(clips)])
     found = _found(channels, drifts, limbs, everything)
     own = found[:, len(weights) :]
-    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", weights, own)
+    # A clip that is given twice counts as one.
+    alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in range(clips)] for i in range(clips)])
+    shares = (weights @ alike) ** _FADE / alike.sum(axis=0)
+    return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
 
 
 def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
@@ -136,17 +141,17 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
         place = np.concatenate([mean[:, :, j, :2], mean[:1, :, j, :2]])
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
-        place = np.concatenate(
-            [turned(angle, place) + shift, (np.concatenate([heading, closing]) + angle)[..., None]], axis=-1
-        )
-        moves.append(np.diff(place, axis=0))
+        heading = np.concatenate([heading, closing]) + angle
+        over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
+        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, _SOFTNESS))
         angles.append(angle[:-1])
     height = np.stack(clearance, axis=2)
     lift = height - height.min(axis=2, keepdims=True)
     raised = np.maximum(0.0, _raise(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    free = _step(up / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest), 1e-6))
+    least = np.minimum(_STANDS, _SHARE_STANDS * highest)
+    free = _step((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
     # A foot that the clips do not lift is left to the mean.
     held = _step(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)

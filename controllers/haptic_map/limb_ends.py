@@ -47,6 +47,39 @@ def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
     return _lowest(turn, limb.points - limb.points.mean(axis=0), softness).reshape(quaternions.shape[:-1])
 
 
+def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
+    """How an end moves over the ground from each sample to the next: at the points that touch, so a foot may roll.
+
+    Parameters
+    ----------
+    places : Array, shape (n, k, 2)
+        Of the centre of the limb's points, over the ground [m].
+    quaternions : Array, shape (n, k, 4)
+        Orientations of the end over the ground.
+    headings : Array, shape (n, k)
+        Their turns about the vertical [rad], continuous along n.
+    limb : Limb
+    softness : float
+        Of the minimum that tells which points touch [m].
+
+    Returns
+    -------
+    Array, shape (n - 1, k, 3)
+        Movements (x, y) of the points, weighed by how low they are, but for what the turning does to them, and the
+        turning itself.
+    """
+    turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
+    offsets = limb.points - limb.points.mean(axis=0)
+    levers = np.stack([turn.apply(p).reshape(*headings.shape, 3) for p in offsets], axis=-2)
+    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / softness)
+    weights /= weights.sum(axis=-1, keepdims=True)
+    share, lever = 0.5 * (weights[1:] + weights[:-1])[..., None], 0.5 * (levers[1:] + levers[:-1])
+    turning = np.diff(headings, axis=0)
+    swept = turning[..., None, None] * np.stack([-lever[..., 1], lever[..., 0]], axis=-1)
+    rolled = (share * (np.diff(levers[..., :2], axis=0) - swept)).sum(axis=-2)
+    return np.concatenate([np.diff(places, axis=0) + rolled, turning[..., None]], axis=-1)
+
+
 def _rotations(channels: Array, joint: int) -> Rotation:
     return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
 

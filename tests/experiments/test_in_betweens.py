@@ -16,6 +16,8 @@ from sim.reference import poses_along
 
 TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
 CONFIG = RunConfig(seconds=1.0)
+STANDING = ("walk", "cheer", "angry", "squat_dance")
+STEPPING = (("walk", "run"), ("ginga", "cheer", "walk", "angry"), ("ginga", "walk"))
 ROWS = 160
 MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
 
@@ -24,7 +26,7 @@ MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.
 def maps():
     return {
         clips: wire(RunConfig(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
-        for clips in (FIGURE_CLIPS, ("walk", "cheer", "angry", "squat_dance"), ("walk", "run"))
+        for clips in (FIGURE_CLIPS, STANDING, *STEPPING)
     }
 
 
@@ -63,7 +65,7 @@ def slide(places):
     return worst
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, ("walk", "cheer", "angry", "squat_dance"), ("walk", "run")])
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, STANDING, *STEPPING])
 def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
     for r, z in MIXTURES:
         places = soles(laps(maps[clips], r, z, count=1.5))
@@ -71,7 +73,16 @@ def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
         assert places[..., 2].min() > -0.008, (r, z)
 
 
-@pytest.mark.parametrize(("clips", "most"), [(FIGURE_CLIPS, 0.04), (("walk", "cheer", "angry", "squat_dance"), 0.06)])
+@pytest.mark.parametrize("clips", [("walk", "angry", "cheer"), ("ginga", "angry", "walk"), ("run", "walk", "cheer")])
+def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
+    h_map = wire(RunConfig(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
+    places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
+    for feet in places:
+        assert slide(feet) < 0.01
+        np.testing.assert_allclose(feet, places[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("clips", "most"), [(FIGURE_CLIPS, 0.04), (STANDING, 0.06)])
 def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most):
     floor, step, shares = Floor(), CONFIG.lap / ROWS, []
     for r, z in MIXTURES:
