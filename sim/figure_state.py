@@ -29,6 +29,8 @@ class FigureGains(NamedTuple):
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
     stance_height : float
         Height from which the reference lifts a contact point that stood [m].
+    swing_speed : float
+        Speed over the floor from which a low contact point of the reference swings and does not stand [m/s].
     flight_height : float
         The reference flies, and no residual is applied, while all its contact points are higher than this [m].
     lift_time : float
@@ -47,6 +49,7 @@ class FigureGains(NamedTuple):
     reference_reach: float = 0.03
     contact_reach: float = 0.002
     stance_height: float = 0.008
+    swing_speed: float = 1.0
     flight_height: float = 0.02
     lift_time: float = 0.02
 

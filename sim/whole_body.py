@@ -63,24 +63,28 @@ def _nearness(height: float, reach: float) -> float:
 def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     """Share of each contact point: it touches, and the reference has it near the floor now and a moment ahead.
 
-    A point that the reference is about to lift is unloaded before, so that its leg need not catch up. Returns the
-    largest share by the narrower measure of what counts as flight.
+    A point that the reference is about to lift is unloaded before, so that its leg need not catch up; one that swings
+    low over the floor does not stand, and is not held to it. Returns the largest share by the narrower measure of what
+    counts as flight.
     """
     s.twin_qpos[:] = q_r
     mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.gains.lift_time)
     mj_kinematics(s.twin_model, s.twin_data)
     for c in range(s.share.shape[0]):
-        s.near[c] = s.twin_contact_pos[s.twin_contact[c], 2]
+        s.points[c] = s.twin_contact_pos[s.twin_contact[c]]
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
     support = 0.0
     for c in range(s.share.shape[0]):
+        now = s.twin_contact_pos[s.twin_contact[c]]
+        way = np.sqrt((s.points[c, 0] - now[0]) ** 2 + (s.points[c, 1] - now[1]) ** 2)
+        height = max(s.points[c, 2], now[2]) - s.radius
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
-        height = max(s.near[c], s.twin_contact_pos[s.twin_contact[c], 2]) - s.radius
         touch = _nearness(s.points[c, 2], s.gains.contact_reach)
-        s.near[c] = _nearness(height, s.gains.stance_height)
-        s.share[c] = touch * _nearness(height, s.gains.reference_reach)
+        rests = _nearness(way, s.gains.lift_time * s.gains.swing_speed)
+        s.near[c] = rests * _nearness(height, s.gains.stance_height)
+        s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)
         support = max(support, touch * _nearness(height, s.gains.flight_height))
     return support
 
