@@ -1,6 +1,6 @@
-"""STRETCHY TUBES, then FOLLOW: a hand on a mass bends the default curve and lets go; the path is a known one.
+"""STRETCHY TUBES, alone and then FOLLOW: a hand on a mass bends the default curve and lets go; the paths are known.
 
-Run this file to write the path anew, after a change that means to change it.
+Run this file to write the paths anew, after a change that means to change them.
 """
 
 import json
@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.program import evaluate
@@ -15,18 +16,22 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCI
 from experiments.stretch import law, stretch_grabs
 from sim.users.arm import Arm, hand_force
 
-GOLDEN = Path(__file__).with_name("stretch_then_follow.json")
+MODES = ("stretch", "stretch-then-follow")
 FLAGS = SimpleNamespace(
-    mode="stretch-then-follow", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5,
+    seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5,
     stiffness=300.0, damping=4.0, tube=0.25,
 )  # fmt: skip
 MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 17.0, 250
 
 
-def _run() -> dict[str, list]:
+def _golden(mode: str) -> Path:
+    return Path(__file__).with_name(mode.replace("-", "_") + ".json")
+
+
+def _run(mode: str) -> dict[str, list]:
     curve = Trajectory.circle(0.0477, 4.0)
     grabs = stretch_grabs(curve, FLAGS.rubber_tube)
-    field, arm = law(FLAGS, curve, grabs), Arm(grabs=grabs).compiled()
+    field, arm = law(SimpleNamespace(mode=mode, **vars(FLAGS)), curve, grabs), Arm(grabs=grabs).compiled()
     program = field.program()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
     p, v, path = curve.point(0.0), np.zeros(3), []
@@ -42,8 +47,9 @@ def _run() -> dict[str, list]:
     return {"path": path, "edits": field.edits(memory).tolist(), "held_off": field.held_off(memory)}
 
 
-def test_the_hand_goes_where_it_went_and_the_curve_is_bent_as_it_was() -> None:
-    golden, now = json.loads(GOLDEN.read_text(encoding="utf-8")), _run()
+@pytest.mark.parametrize("mode", MODES)
+def test_the_hand_goes_where_it_went_and_the_curve_is_bent_as_it_was(mode: str) -> None:
+    golden, now = json.loads(_golden(mode).read_text(encoding="utf-8")), _run(mode)
     np.testing.assert_allclose(now["path"], golden["path"], atol=1e-8)
     np.testing.assert_allclose(now["edits"], golden["edits"], atol=1e-8)
     assert len(now["edits"]) == 3
@@ -51,4 +57,5 @@ def test_the_hand_goes_where_it_went_and_the_curve_is_bent_as_it_was() -> None:
 
 
 if __name__ == "__main__":
-    GOLDEN.write_text(json.dumps(_run()) + "\n", encoding="utf-8")
+    for name in MODES:
+        _golden(name).write_text(json.dumps(_run(name)) + "\n", encoding="utf-8")

@@ -1,0 +1,64 @@
+"""The whole servo leads a figure along an S in five seconds and straight back: it retraces its path, feet stay put."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.config import RunConfig
+from experiments.lead_measures import _Soles
+from experiments.run import run
+from models.humanoid.skeleton import N_POSE
+from models.scene import SceneConfig
+from sim.recording import Recording
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("led") / "run"
+    run(RunConfig(mode="lead", seconds=19.0), folder, False, 0.0)
+    return folder
+
+
+def test_straight_back_it_retraces_its_path_within_a_centimetre_and_two_degrees(folder: Path) -> None:
+    summary = json.loads((folder / "summary.json").read_text())
+    lead, figure = summary["lead"], summary["figure"]
+    assert lead["length_m"] > 5.5
+    assert lead["retrace_cm"] < 0.1
+    assert lead["retrace_deg"] < 0.1
+    assert figure["fell_at"] is None
+    assert lead["physical_retrace_cm"] < 1.0
+    assert lead["physical_retrace_deg"] < 2.0
+    assert figure["joint_error_rms_deg"] < 2.0
+
+
+def test_it_goes_along_the_s_and_comes_back_to_where_it_began(folder: Path) -> None:
+    with Recording(folder / "run.h5") as recording:
+        s = recording.channel("ticks", "phase")[:]
+        poses = recording.channel("frames", "reference")[:]
+    farthest = int(np.argmax(s))
+    # The hand leads for five seconds after a pause of 0.8 s; the figure ends up behind it.
+    assert 5.8 < 1e-3 * farthest < 9.0
+    assert s[-1] < 0.05 * s[farthest]
+    w, x, y, z = poses[:, 3:7].T
+    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    forth = np.degrees(yaw[: farthest * len(poses) // len(s)])
+    # Left by about 80 degrees and right again.
+    assert 60.0 < forth.max() - forth[0] < 100.0
+    assert forth.max() - forth[-1] > 40.0
+
+
+def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> None:
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["lead"]["slide_cm"] < 3.0
+    none, one, two = summary["lead"]["turn_deg_per_s"]
+    assert none == 0.0
+    assert 20.0 < one < np.degrees(0.9) + 1e-6
+    assert one < two < np.degrees(1.2) + 1e-6
+    physical = _Soles(SceneConfig())
+    with Recording(folder / "run.h5") as recording:
+        physical.add(recording.channel("frames", "qpos")[:][:, -N_POSE:])
+    assert physical.slide < 0.03
