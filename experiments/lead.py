@@ -22,6 +22,8 @@ STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
+# Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
+_FLYING_LATERAL = 1.2
 
 
 def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
@@ -81,7 +83,10 @@ def law(config: RunConfig, gait: Gait) -> Leading:
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
     scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
-    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping)
+    lateral = Leading.lateral if gait.support.all() else _FLYING_LATERAL
+    return Leading(
+        gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, lateral=lateral
+    )  # fmt: skip
 
 
 def leading_hand(field: Leading, period: float = 0.01) -> Arm:

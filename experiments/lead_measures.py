@@ -34,8 +34,9 @@ class LeadSummary:
         Largest turn rates of the path while the figure went over it on no foot, on one and on two.
     force_max : float
         Largest force of the field in the plane [N].
-    slide_cm : float
-        Largest way over the floor of a point of the animation's soles while it touched.
+    slide_cm, physical_slide_cm : float
+        Largest way over the floor of a point of the animation's soles while it touched; and of the physical figure's
+        while it pressed on the floor, until it fell, if it did.
     retrace_cm, retrace_deg : float or None
         Backwards, how far the animation's root was from its way forwards at most; None if it never went back.
     physical_retrace_cm, physical_retrace_deg : float or None
@@ -46,6 +47,7 @@ class LeadSummary:
     turn_deg_per_s: tuple[float, float, float]
     force_max: float
     slide_cm: float
+    physical_slide_cm: float
     retrace_cm: float | None
     retrace_deg: float | None
     physical_retrace_cm: float | None
@@ -65,7 +67,8 @@ class LeadSummary:
             back += "."
         return [
             f"The figure was led {self.length_m:.1f} m, turning by up to {two:.0f}°/s on two feet, {one:.0f}°/s on one "
-            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm.",
+            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm, the physical figure's by up "
+            f"to {self.physical_slide_cm:.1f} cm.",
             f"{back} The hand felt up to {self.force_max:.1f} N.",
         ]
 
@@ -77,7 +80,7 @@ def lead_summary(
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
-    soles, shown, physical = _Soles(scene), _Retrace(), _Retrace()
+    soles, pressing, shown, physical = _Soles(scene), _Soles(scene, 0.0), _Retrace(), _Retrace()
     farthest, force, turns = -math.inf, 0.0, np.zeros(3)
     for first in range(0, len(frames["t"]), BLOCK_FRAMES):
         rows = slice(first, first + BLOCK_FRAMES)
@@ -89,11 +92,13 @@ def lead_summary(
         soles.add(reference)
         standing = t < (math.inf if fell_at is None else fell_at)
         shown.add(s, reference, farthest)
+        pressing.add(poses[standing])
         physical.add(s[standing], poses[standing], farthest)
         farthest = max(farthest, float(s.max()))
     none, one, two = (math.degrees(rate) for rate in turns)
     return LeadSummary(
-        farthest, (none, one, two), force, 100.0 * soles.slide, *shown.result(), *physical.result()
+        farthest, (none, one, two), force, 100.0 * soles.slide, 100.0 * pressing.slide, *shown.result(),
+        *physical.result(),
     )  # fmt: skip
 
 
@@ -117,9 +122,10 @@ def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
 
 
 class _Soles:
-    """How far points of the soles slide while they touch, of poses that come in blocks."""
+    """How far points of the soles slide while they are lower than `touch` [m], of poses that come in blocks."""
 
-    def __init__(self, scene: SceneConfig):
+    def __init__(self, scene: SceneConfig, touch: float = TOUCH):
+        self._touch = touch
         self._model = figure_model(scene.stature, scene.mass)
         self._data = mujoco.MjData(self._model)
         self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
@@ -131,7 +137,7 @@ class _Soles:
             self._data.qpos[:] = pose
             mujoco.mj_kinematics(self._model, self._data)
             places = self._data.geom_xpos[self._geoms]
-            touching = places[:, 2] - CONTACT_RADIUS < TOUCH
+            touching = places[:, 2] - CONTACT_RADIUS < self._touch
             begins = touching & np.isnan(self._since[:, 0])
             self._since[begins] = places[begins, :2]
             self._since[~touching] = np.nan

@@ -52,6 +52,14 @@ def test_how_far_soles_slide_while_they_touch() -> None:
     moved[3, 2] += 0.1
     measure.add(moved)
     assert measure.slide == pytest.approx(0.02, abs=1e-9)
+    pressing = _Soles(SceneConfig(), 0.0)
+    moved[:, 2] -= 1e-4
+    pressing.add(moved)
+    assert pressing.slide == pytest.approx(0.02, abs=1e-9)
+    hovering = _Soles(SceneConfig(), 0.0)
+    moved[:, 2] += 2e-4
+    hovering.add(moved)
+    assert hovering.slide == 0.0
 
 
 def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
@@ -76,14 +84,14 @@ def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int
 
 
 def test_the_lines_tell_it() -> None:
-    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 0.2, 0.1, 2.0, 1.0)
+    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, 0.2, 0.1, 2.0, 1.0)
     assert summary.lines() == [
         "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
-        "by up to 1.5 cm.",
+        "by up to 1.5 cm, the physical figure's by up to 2.5 cm.",
         "Back it retraced its way within 0.20 cm and 0.10°, the physical figure within 2.0 cm and 1.0°. The hand felt "
         "up to 1.1 N.",
     ]
-    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, None, None, None, None)
+    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, None, None, None, None)
     assert never.lines()[1].startswith("The figure was not led back.")
 
 
