@@ -5,6 +5,7 @@ Nothing here needs CasADi, so a stored certificate is checked without starting i
 
 import hashlib
 import json
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -16,10 +17,11 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config import RunConfig
+from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compiled import source_hash
 
-CERTIFIED_MODES = ("follow", "bunny", "rivers", "stretch", "stretch-then-follow")
+CERTIFIED_MODES = ("follow", "bunny", "rivers", "stretch", "stretch-then-follow", "lead")
 
 
 class CertifiedLaw(NamedTuple):
@@ -66,17 +68,38 @@ def certified_laws(config: RunConfig) -> dict[str, CertifiedLaw]:
         }
         return tubes | ({"_then": follow} if config.mode == "stretch-then-follow" else {})
     if config.mode == "rivers":
-        if config.governor or config.map.endswith(".npz"):
-            raise ParameterError("rivers are certified without --governor, and not those of a map's file")
+        if config.governor:
+            raise ParameterError("rivers are certified without --governor")
         return {"": follow._replace(width=config.river_tube)}
+    if config.mode == "lead":
+        return {"": CertifiedLaw("leading", config.leash, config.damping, float("inf"))}
     raise ParameterError(
         f"no certificate is known for mode {config.mode!r}; there are those of {', '.join(CERTIFIED_MODES)}"
     )
 
 
-def certified_curve(config: RunConfig) -> Trajectory:
-    """The curve of a run."""
-    return Trajectory.circle(config.radius, config.lap)
+def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
+    """The curve of a run by "", and the other ones of a lifted map's file by its clips' names.
+
+    Raises
+    ------
+    ParameterError, SimError, OSError
+        If the map has no such curve, the Phantom does not reach it, or there is no such map.
+    """
+    if config.mode == "lead":
+        from experiments.lead import s_curve
+
+        return {"": s_curve()}
+    if config.map.endswith(".npz"):
+        from experiments.lifted_runs import curve_number, lifted_curve
+        from experiments.map_files import Lifted, load_map
+
+        found = load_map(Path(config.map))
+        if isinstance(found, Lifted):
+            first = found.names[curve_number(found, config.curve)]
+            names = [first, *(name for name in found.names if name != first)]
+            return {"" if name == first else f"_{name}": lifted_curve(found, name) for name in names}
+    return {"": Trajectory.circle(config.radius, config.lap)}
 
 
 def certified_sampling(config: RunConfig, delay: float) -> Sampling:
@@ -84,7 +107,9 @@ def certified_sampling(config: RunConfig, delay: float) -> Sampling:
     return Sampling(config.scene.servo_period, delay, config.cutoff)
 
 
-def certificate_inputs(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
+def certificate_inputs(
+    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = ()
+) -> dict[str, object]:
     """All that the verdicts on a run's field depend on, by name, for `hash_of`.
 
     Parameters
@@ -97,13 +122,17 @@ def certificate_inputs(config: RunConfig, delay: float, hands: HandRange, push: 
         Intervals of the hand's impedance.
     push : float
         Largest force of the hand [N].
+    clips : sequence of Clip
+        Those that are judged besides, and that set the gait of a figure that is led.
     """
     sampling, folder = certified_sampling(config, delay), Path(__file__).parent
-    makers = [*sorted(folder.glob("certif*.py")), folder / "modes.py"]
+    makers = [*sorted(folder.glob("certif*.py")), *(folder / name for name in ("ballistics.py", "lead.py", "modes.py"))]
     return {
         "gains": certified_laws(config),
         "crossing": (config.crossing, config.reach) if config.mode == "rivers" else None,
-        "curve": certified_curve(config).packed(),
+        "curve": {name: curve.packed() for name, curve in certified_curves(config).items()},
+        "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
+        "figure": (config.scene.stature, config.scene.mass, config.floor_scale) if config.mode == "lead" else None,
         "period": sampling.period,
         "delay": sampling.delay,
         "filter": sampling.cutoff,
@@ -132,7 +161,9 @@ def read_certificate(file: Path) -> Certificate:
         raise CertificateError(f"{file}: {error}") from None
 
 
-def verify_certificate(file: Path, config: RunConfig, delay: float, hands: HandRange, push: float) -> Certificate:
+def verify_certificate(
+    file: Path, config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = ()
+) -> Certificate:
     """The certificate of a file, if it is of this run's field and of this code.
 
     Raises
@@ -144,7 +175,7 @@ def verify_certificate(file: Path, config: RunConfig, delay: float, hands: HandR
     """
     certificate = read_certificate(file)
     try:
-        certificate.check(certificate_inputs(config, delay, hands, push))
+        certificate.check(certificate_inputs(config, delay, hands, push, clips))
     except CertificateError as error:
         raise CertificateError(f"{file}: {error}") from None
     return certificate

@@ -1,6 +1,6 @@
 """Certificates of the rivers of a run: stability of each, and the switching where they meet."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from controllers.certificates.switching_search import counterexample
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.river import River as FieldRiver
 from controllers.safety import ForceLimiter
 from experiments.config import RunConfig
 from experiments.modes import default_rivers, law
@@ -81,26 +82,32 @@ def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, cross
 
 
 def certify_rivers(
-    config: RunConfig, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange, push: float
+    config: RunConfig, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
 ) -> dict[str, Verdict]:
-    """Stability of the rivers of a run besides the default curve, and the switching between all of them.
+    """Stability of the rivers of a run besides the first, and the switching between all of them.
 
     Parameters
     ----------
-    config, curve
+    config : RunConfig
         Of the run, in the mode of rivers.
-    device, sampling, hands
+    main : River
+        The one that the run begins on.
+    hands : HandRange
         As in `stability`.
     push : float
         Largest force of the hand [N].
+    curves : mapping of str to Trajectory
+        Of the rivers, the first one's first; one alone stands for the default rivers about it.
     """
-    bundle, ceiling = default_rivers(config, curve), ForceLimiter(sampling.period).peak
-    rivers = certified_bundle(bundle, device, sampling)
+    sampling, ceiling = main.sampling, ForceLimiter(main.sampling.period).peak
+    own = _lifted_bundle(config, curves) if len(curves) > 1 else None
+    bundle = own or default_rivers(config, main.curve)
+    rivers = certified_bundle(bundle, main.device, sampling)
     names = tuple(zip(bundle.names, rivers, strict=True))[1:]
     verdicts = {f"stability_{name}": stability(river, hands.hands()) for name, river in names}
     places = meetings(rivers)
     common = held_common(rivers, places[0], hands, config.crossing) if places else None
-    field = law(config, curve)
+    field = law(config, main.curve, rivers=own)
     if isinstance(field, HigherOrder):
         found = _search(field, rivers, places, push)
         sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
@@ -108,6 +115,13 @@ def certify_rivers(
         keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
         return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
     return verdicts | {"switching": _summed(common)}
+
+
+def _lifted_bundle(config: RunConfig, curves: Mapping[str, Trajectory]) -> RiverBundle:
+    """The rivers of a lifted map, as `lifted_runs.lifted_rivers` has them, the one that the run begins on first."""
+    tau = config.damping / config.stiffness
+    rivers = tuple(FieldRiver(curve, config.river_tube, tau, config.damping) for curve in curves.values())
+    return RiverBundle(rivers, tuple(name.removeprefix("_") or "first" for name in curves))
 
 
 def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float) -> dict[str, object]:

@@ -1,7 +1,7 @@
 """Certificates of a run's field: what is known of its stability, passivity and energy before it is felt."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,16 +18,20 @@ from controllers.certificates.passivity import passivity
 from controllers.certificates.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
 from controllers.certificates.stability import River, boundary, stability
+from controllers.errors import ParameterError
 from controllers.safety import ForceLimiter
+from experiments.certified_clips import certify_clips
 from experiments.certified_field import (
     certificate_inputs,
-    certified_curve,
+    certified_curves,
     certified_laws,
     certified_sampling,
     read_certificate,
 )
+from experiments.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certified_rivers import certify_rivers
 from experiments.config import RunConfig
+from models.mocap.clip import Clip
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
@@ -65,9 +69,9 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     ParameterError
         If there is no certificate for the run's mode, or a number is out of its interval.
     """
-    curve, device, sampling = certified_curve(config), phantom_device(), certified_sampling(config, delay)
+    curves, device, sampling = certified_curves(config), phantom_device(), certified_sampling(config, delay)
     return {
-        name: River(LAWS[law], stiffness, damping, width, curve, device, sampling)
+        name: River(LAWS[law], stiffness, damping, width, curves[""], device, sampling)
         for name, (law, stiffness, damping, width) in certified_laws(config).items()
     }
 
@@ -86,9 +90,14 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float) -> dict[
 
 
 def certify_into(
-    config: RunConfig, out: Path, delay: float = 0.0, hands: HandRange | None = None, push: float = 1.0
+    config: RunConfig,
+    out: Path,
+    delay: float = 0.0,
+    hands: HandRange | None = None,
+    push: float = 1.0,
+    clips: Sequence[Clip] = (),
 ) -> Certificate:
-    """Certify a run's field, or take the certificate that the folder holds if it is of the same inputs.
+    """Certify a run's field and clips, or take the certificate that the folder holds if it is of the same inputs.
 
     Parameters
     ----------
@@ -102,6 +111,8 @@ def certify_into(
         Intervals of the hand's impedance.
     push : float
         U_max of the bound on the distance [N].
+    clips : sequence of Clip
+        Whose flights are judged besides; in the mode "lead" the first of them is led.
 
     Raises
     ------
@@ -109,7 +120,7 @@ def certify_into(
         If a number is out of its interval, or the curve is out of the workspace.
     """
     hands = hands or HandRange()
-    inputs = certificate_inputs(config, delay, hands, push)
+    inputs = certificate_inputs(config, delay, hands, push, clips)
     file = out / CERTIFICATE
     if file.exists() and (out / PAGE).exists():
         try:
@@ -118,18 +129,38 @@ def certify_into(
             return held
         except CertificateError:
             pass  # of another river, or of none: certified anew
-    rivers = certified_rivers(config, delay)
-    verdicts, main = certify(rivers, hands, push), rivers[""]
-    if config.mode == "rivers":
-        verdicts |= certify_rivers(config, main.curve, main.device, main.sampling, hands, push)
+    main, verdicts = _field_verdicts(config, delay, hands, push, clips)
+    if clips:
+        verdicts |= certify_clips(clips)
     certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
     out.mkdir(parents=True, exist_ok=True)
-    stability_figure(rivers[""], certificate.verdicts["stability"]).savefig(out / PLOT, dpi=150)
-    if "ellipse" in certificate.verdicts["region"].figures:
-        region_figure(certificate.verdicts["region"]).savefig(out / REGION_PLOT, dpi=150)
+    stability_figure(main, verdicts["stability"]).savefig(out / PLOT, dpi=150)
+    if "region" in verdicts and "ellipse" in verdicts["region"].figures:
+        region_figure(verdicts["region"]).savefig(out / REGION_PLOT, dpi=150)
     (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
     file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return certificate
+
+
+def _field_verdicts(
+    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip]
+) -> tuple[River, dict[str, Verdict]]:
+    """The river that is drawn, and all verdicts on the field."""
+    if config.mode == "lead":
+        if not clips:
+            raise ParameterError("a certificate of leading is of a clip that is led; give one")
+        field, curve = leading_field(config, clips[0]), certified_curves(config)[""]
+        device, sampling = phantom_device(), certified_sampling(config, delay)
+        main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
+        return main, certify_leading(field, curve, device, sampling, hands)
+    rivers = certified_rivers(config, delay)
+    verdicts, main = certify(rivers, hands, push), rivers[""]
+    if config.mode == "rivers":
+        return main, verdicts | certify_rivers(config, main, hands, push, certified_curves(config))
+    for name, curve in certified_curves(config).items():
+        if name:
+            verdicts["stability" + name] = stability(main._replace(curve=curve), hands.hands())
+    return main, verdicts
 
 
 def stability_figure(river: River, verdict: Verdict) -> Figure:

@@ -21,6 +21,7 @@ from controllers.errors import ControllerError  # noqa: E402
 from controllers.haptic_map.lifting import Room  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
 from models.errors import ModelError  # noqa: E402
+from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
 
 Positional = tyro.conf.Positional
@@ -106,9 +107,11 @@ class Track:
 
 @dataclass(frozen=True)
 class Certify:
-    """Say what is certain of the field of a run, or of the flights of a clip: certified, refuted or unknown."""
+    """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
     config: tyro.conf.OmitArgPrefixes[RunConfig]
+    run: Annotated[Path | None, tyro.conf.Positional] = None
+    """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
     clip: Path | None = None
     """Judge the flights of this motion file instead of a field."""
     out: Path = Path("runs/certificate")
@@ -128,8 +131,9 @@ class Certify:
     def __call__(self) -> int:
         """Certify, or verify."""
         hands = NO_HANDS if self.no_hand else self.hand
+        config, clips = self._what()
         if self.verify is not None:
-            return self._verify(self.verify, hands)
+            return self._verify(self.verify, config, hands, clips)
         if self.clip is not None:
             from experiments.ballistics import certify_file
 
@@ -137,7 +141,7 @@ class Certify:
         else:
             from experiments.certify import certify_into
 
-            certificate = certify_into(self.config, self.out, self.delay, hands, self.hand_push)
+            certificate = certify_into(config, self.out, self.delay, hands, self.hand_push, clips)
         if self.json:
             print(json.dumps(certificate.to_json(), indent=2))
             return 0
@@ -145,12 +149,20 @@ class Certify:
             print(f"{name}: {verdict.verdict}; {verdict.reason}")
         return 0
 
-    def _verify(self, file: Path, hands: HandRange) -> int:
+    def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
+        """The field, and the clips that are certified with it; gains alone have none."""
+        if self.run is None and self.config.mode != "lead" and not self.config.map.endswith(".npz"):
+            return self.config, ()
+        from experiments.certified_clips import run_and_clips
+
+        return run_and_clips(self.run, self.config)
+
+    def _verify(self, file: Path, config: RunConfig, hands: HandRange, clips: tuple[Clip, ...]) -> int:
         from controllers.certificates.report import CertificateError
         from experiments.certified_field import verify_certificate
 
         try:
-            certificate = verify_certificate(file, self.config, self.delay, hands, self.hand_push)
+            certificate = verify_certificate(file, config, self.delay, hands, self.hand_push, clips)
         except CertificateError as error:
             print(f"hvf: {error}", file=sys.stderr)
             return 1

@@ -178,8 +178,8 @@ def draw(bench: Bench) -> Figure:
     slowest = np.interp(passage.phase, shares, bench.speeds[:, 0])
     slow_ax.plot(passage.t, 1e3 * slowest, color=CURVE, label="least speed [mm/s]")
     slow_ax.plot(passage.t, 100 * passage.along, color=FIELD, label="force [0.01 N]")
-    slow_ax.set(xlabel="time [s]", title="a hand that slows down in flight")
-    slow_ax.legend()
+    slow_ax.set(xlabel="time [s]", title="a hand that slows down in flight", ylim=(-10.0, 205.0))
+    slow_ax.legend(loc="upper right")
     return figure
 
 

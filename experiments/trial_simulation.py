@@ -20,6 +20,7 @@ from controllers.certificates.sampled_loop import SampledLoop
 from controllers.certificates.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
+from controllers.fields.instructions import Program
 from controllers.fields.program import evaluate
 from experiments.certify import phantom_device
 from models.phantom.spec import phantom_spec
@@ -131,6 +132,16 @@ class Trial:
         linear = linearise(phantom_device(), FOLLOW_LAW, self.curve, np.array([self.phase]), self.hand)
         return SampledLoop(linear, self.sampling)
 
+    def program(self, k_r: float) -> Program:
+        """The field that is simulated: FOLLOW with k_r [N/m]."""
+        return Follow(self.curve, k_r, self.b_d, np.inf).program()
+
+    def user(self, k_r: float) -> Arm:
+        """The hand that is simulated: it stays at the trial's place."""
+        held = self.hand.damping > 0.0 or self.hand.stiffness > 0.0
+        path = self.curve.point(self.phase)[None] if held else np.zeros((0, 3))
+        return Arm(self.hand.stiffness, self.hand.damping, path)
+
 
 def draw_trial(rng: np.random.Generator) -> Trial:
     """A random trial: curve, phase, clock, hand, and a damping between 5 and 70 % of what is stable by itself."""
@@ -241,7 +252,7 @@ def hand_path(
     state : Array, optional
         State ξ of the linear loop to begin in; by default at rest, `conditions.start` off in the trial's direction.
     user : Arm, optional
-        What pushes; by default the trial's hand, which stays where the trial is.
+        What pushes; by default the trial's own.
     """
     sampling, period = trial.sampling, trial.sampling.period
     model = trial_model(trial.hand, period / conditions.substeps, conditions.coulomb, conditions.integrator)
@@ -267,10 +278,7 @@ def hand_path(
         model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
         ground=np.zeros(3), arm_v=(a, b, c), substeps=conditions.substeps, period=period,
     )  # fmt: skip
-    held = trial.hand.damping > 0.0 or trial.hand.stiffness > 0.0
-    path = centre[None] if held else np.zeros((0, 3))
-    hand = make_hand(user or Arm(trial.hand.stiffness, trial.hand.damping, path))
-    program = Follow(trial.curve, k_r, trial.b_d, np.inf).program()
+    hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
     run_late(plant, port, hand, program.ops, program.params, program.fresh_memory(), late, conditions.rounded, path)
     return path[np.isfinite(path[:, 0])]

@@ -22,7 +22,7 @@ class Law(NamedTuple):
         ``force(p, v, piece, u, k_r, b_d, width)`` in H: the curve's piece as 28 coefficients, the phase u in it, and
         1/ε² or 1/δ². Linear in k_r and b_d.
     slides : bool
-        Whether the attracting point slides along the curve with the hand, so that a shift along it is neutral.
+        Whether there are shifts that the law does not answer: of a law that carries, the shift along the curve.
     carries : bool
         Whether the hand is driven along the curve, or comes to rest on it.
     """

@@ -17,6 +17,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.state import Array
 
+_NOTHING = 1e-6  # of the largest stiffness of a law, which is none
+
 
 @dataclass(frozen=True, eq=False)
 class LinearLoop:
@@ -40,10 +42,12 @@ class LinearLoop:
         Derivatives of the law's torques by θ and ω, for (k_r, b_d) = (1, 0) and (0, 1).
     velocity : Array, shape (n, 3)
         φ̇ in H.
-    shift : Array, shape (n, 12)
-        Derivative of the state on the curve, (θ, θ̇, θ_{k−1}, ω_{k−1}), by the phase, for T → 0.
-    neutral : bool
-        Whether a shift along the curve is neutral.
+    neutral : Array, shape (n, 3, m)
+        Displacements of the tip that the loop does not answer: along the curve, along a led figure's path, or none.
+    shift : Array, shape (n, 12, m)
+        Derivatives of the state, (θ, θ̇, θ_{k−1}, ω_{k−1}), by these, for T → 0.
+    held : bool
+        Whether the hand has a stiffness, so that no displacement is neutral.
     """
 
     phases: Array
@@ -57,8 +61,9 @@ class LinearLoop:
     unit_theta: Array
     unit_omega: Array
     velocity: Array
+    neutral: Array
     shift: Array
-    neutral: bool
+    held: bool
 
     def lap(self, curve: Trajectory, n: int) -> "LinearLoop":
         """The loop at n equal phases of a closed curve, by periodic splines through these: everything is smooth."""
@@ -73,8 +78,8 @@ class LinearLoop:
             phases=phases, theta=spread(self.theta), rate=spread(self.rate), jacobian=spread(self.jacobian),
             mass=spread(self.mass), inverse_theta=spread(self.inverse_theta), inverse_rate=spread(self.inverse_rate),
             weight_theta=spread(self.weight_theta), unit_theta=spread(self.unit_theta, 1),
-            unit_omega=spread(self.unit_omega, 1), velocity=spread(self.velocity), shift=spread(self.shift),
-            neutral=self.neutral,
+            unit_omega=spread(self.unit_omega, 1), velocity=spread(self.velocity), neutral=spread(self.neutral),
+            shift=spread(self.shift), held=self.held,
         )  # fmt: skip
 
 
@@ -122,12 +127,27 @@ def linearise(
         [_blocks(block) for block in torques(theta.T, rate.T, pieces.T, within[None], k_r, b_d, width**-2)[1:]]
         for k_r, b_d in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
+    unit_theta = np.array([unit[0] - none[0] for unit in units])
+    held = hand.stiffness > 0.0
+    neutral = np.zeros((len(phases), 3, 0))
+    if law.slides and not held:
+        neutral = velocity[:, :, None] if law.carries else _unanswered(jacobian, unit_theta[0])
+    turns = turn[:, :, None] if law.carries and neutral.shape[2] else 0.0 * neutral
+    joints = np.linalg.solve(jacobian, neutral)
+    shift = np.asarray(np.concatenate([joints, turns, joints, turns], axis=1), dtype=np.float64)
     return LinearLoop(
         phases=phases, theta=theta, rate=rate, jacobian=jacobian, mass=mass, inverse_theta=by_theta,
-        inverse_rate=by_rate, weight_theta=weight, unit_theta=np.array([unit[0] - none[0] for unit in units]),
-        unit_omega=np.array([unit[1] for unit in units]), velocity=velocity,
-        shift=np.hstack([rate, turn, rate, turn]), neutral=law.slides and hand.stiffness == 0.0,
+        inverse_rate=by_rate, weight_theta=weight, unit_theta=unit_theta,
+        unit_omega=np.array([unit[1] for unit in units]), velocity=velocity, neutral=neutral, shift=shift, held=held,
     )  # fmt: skip
+
+
+def _unanswered(jacobian: Array, by_theta: Array) -> Array:
+    """Orthonormal displacements of the tip that a law at rest does not answer, (n, 3, m); m is the same everywhere."""
+    stiffness = np.linalg.solve(jacobian.transpose(0, 2, 1), by_theta) @ np.linalg.inv(jacobian)
+    _, sizes, rows = np.linalg.svd(stiffness)
+    answered = int(np.sum(sizes[0] > _NOTHING * sizes[0, 0]))
+    return rows[:, answered:].transpose(0, 2, 1)
 
 
 def joint_motion(jacobian: Array, tip: Array) -> Array:

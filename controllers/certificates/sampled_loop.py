@@ -117,27 +117,35 @@ class SampledLoop:
         return matrices
 
     @cached_property
-    def across(self) -> tuple[Array, Array]:
-        """Directions across the curve, (n, size, r), and the projection onto them along it, (n, r, size).
+    def fresh(self) -> Array:
+        """Response of the state to the torques [N m] that a tick asks for, shape (n, size, 3)."""
+        unit = np.broadcast_to(np.eye(3), self.linear.weight_theta.shape)
+        return self._closed(unit, np.zeros(unit.shape), False)[:, :, :3]
 
-        Where a shift along the curve is neutral, r is ``size − 1``: with x̄' the derivative of the state on the curve
-        by the phase and c = ∂t*/∂ξ, the projection is I − x̄' cᵀ, in an orthonormal basis of the kernel of cᵀ. Else
-        both are the identity.
+    @cached_property
+    def shifts(self) -> Array:
+        """Derivatives of the whole state by the neutral displacements, shape (n, size, m)."""
+        linear = self.linear
+        # The delayed torques are the weight's there, but for the inertia of the lap.
+        weight = linear.weight_theta @ linear.shift[:, :3]
+        return np.concatenate([linear.shift, np.tile(weight, (1, (self.size - KEPT) // 3, 1))], axis=1)
+
+    @cached_property
+    def across(self) -> tuple[Array, Array]:
+        """Directions across what is neutral, (n, size, r), and the projection onto them along it, (n, r, size).
+
+        With X the `shifts` and C the gradients of the neutral coordinates by the state, CᵀX = 1, r is ``size − m`` and
+        the projection is I − X Cᵀ, in an orthonormal basis of the kernel of Cᵀ. Of a river C is ∂t*/∂ξ.
         """
         linear, size = self.linear, self.size
-        n = len(linear.phases)
-        if not linear.neutral:
+        n, m = len(linear.phases), linear.neutral.shape[2]
+        if m == 0:
             unit = np.broadcast_to(np.eye(size), (n, size, size))
             return unit, unit
-        gradient = np.zeros((n, size))
-        square = np.einsum("ni,ni->n", linear.velocity, linear.velocity)
-        gradient[:, :3] = np.einsum("ni,nij->nj", linear.velocity, linear.jacobian) / square[:, None]
-        shift = np.zeros((n, size))
-        # The delayed torques on the curve are the weight's, but for the inertia of the lap.
-        weight = np.einsum("nij,nj->ni", linear.weight_theta, linear.rate)
-        shift[:, :KEPT], shift[:, KEPT:] = linear.shift, np.tile(weight, (1, (size - KEPT) // 3))
-        basis = _kernels(gradient)
-        projection = basis.transpose(0, 2, 1) @ (np.eye(size) - shift[:, :, None] * gradient[:, None, :])
+        gradient = np.zeros((n, size, m))
+        gradient[:, :3] = (np.linalg.pinv(linear.neutral) @ linear.jacobian).transpose(0, 2, 1)
+        basis = np.linalg.qr(gradient, mode="complete")[0][:, :, m:]
+        projection = basis.transpose(0, 2, 1) @ (np.eye(size) - self.shifts @ gradient.transpose(0, 2, 1))
         return basis, projection
 
     def matrices(self, k_r: float, b_d: float) -> Array:
@@ -176,18 +184,3 @@ class SampledLoop:
             product, exponent = product / size, exponent + float(np.log(size))
         values = np.linalg.eigvals(product) * np.exp(min(exponent, 700.0))
         return values[np.argsort(-np.abs(values))]
-
-
-def _kernels(rows: Array) -> Array:
-    """Orthonormal basis of the kernel of each row, (n, size) → (n, size, size − 1), as smooth as the rows.
-
-    The other columns of the Householder reflection that turns e₁ to the row; its sign keeps it away from −e₁'s pole.
-    """
-    unit = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    pole = unit.copy()
-    pole[:, -1] += 1.0  # the rows have no part in the last coordinate, so this is never zero
-    reflection = (
-        np.eye(rows.shape[1])
-        - 2.0 * pole[:, :, None] * pole[:, None, :] / np.einsum("ni,ni->n", pole, pole)[:, None, None]
-    )
-    return reflection[:, :, :-1]

@@ -83,6 +83,12 @@ def leading_force(
 
 
 @njit
+def walker_acceleration(lag: float, speed: float, rate: float) -> float:
+    """s̈ = ω² (g − D − s) − 2 ω ṡ [m/s²], of a figure that lags by g − D − s [m] and follows with ω [1/s]."""
+    return rate * rate * lag - 2.0 * rate * speed
+
+
+@njit
 def _place(memory: Array, path: int, s: float) -> tuple[float, float, float, float]:
     """Place [m], heading [rad] and curvature [1/m] of the path at s, within what there is of it."""
     heading, curvature = path_value(memory, path, s, PATH_HEADING)
@@ -149,7 +155,7 @@ def _walk(params: Array, at: int, memory: Array, slot: int, dt: float) -> None:
     """The figure follows with inertia: s̈ = ω² (g − D − s) − 2 ω ṡ, bounded, and slower where the path bends."""
     rate, pull, path = params[at + _RATE], params[at + _PULL], slot + PATH
     s, speed = memory[slot + ARGUMENT], memory[slot + SPEED]
-    acceleration = rate * rate * (memory[slot + GOAL] - params[at + _AHEAD] - s) - 2.0 * rate * speed
+    acceleration = walker_acceleration(memory[slot + GOAL] - params[at + _AHEAD] - s, speed, rate)
     speed += dt * min(max(acceleration, -pull), pull)
     most = _bent_speed(params, at, memory, path, s, speed)
     speed = min(max(speed, -params[at + _BACKWARD], -most), most)
