@@ -16,6 +16,7 @@ from controllers.certificates.hand import HandImpedance, HandRange
 from controllers.certificates.laws import FOLLOW_LAW
 from controllers.certificates.stability import River, stability
 from controllers.curves.closest_point import closest_phases
+from controllers.curves.trajectory import Trajectory
 from experiments.certify import phantom_device
 from experiments.trial_onset import predicted
 from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
@@ -23,6 +24,7 @@ from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, han
 Array = npt.NDArray[np.float64]
 
 FORCE = 3.0  # [N] that the law asks for at most at the start: the motors give it anywhere, and the limiter too
+LAP_SECONDS = 4.0  # of the rivers; the hands are let go where the curve stands still
 LEFT = 0.2  # share of the slowest mode that is left at the end of a simulation, unless that takes too long
 LONGEST = 2000  # ticks
 ASSUMED = Conditions(16)
@@ -30,9 +32,10 @@ EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True
 
 
 class Certified(NamedTuple):
-    """A certified river, the intervals of its hands, and its largest spectral radius with any of them."""
+    """A certified river, its curve standing still, the intervals of its hands, and its largest spectral radius."""
 
     river: River
+    still: Trajectory
     hands: HandRange
     radius: float
 
@@ -59,10 +62,12 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         k_r = float(rng.uniform(0.05, 0.9)) * predicted(trial)
         hand = trial.hand
         hands = HandRange(*(_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
-        river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), trial.curve, phantom_device(), trial.sampling)
+        lap = LAP_SECONDS / LAP * np.asarray(trial.curve.times)
+        curve = Trajectory(lap, trial.curve.positions, periodic=True)
+        river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
         verdict = stability(river, hands.hands())
         if verdict.verdict == "certified":
-            return Certified(river, hands, float(str(verdict.figures["radius_bound"])))
+            return Certified(river, trial.curve, hands, float(str(verdict.figures["radius_bound"])))
 
 
 def _about(number: float, rng: np.random.Generator) -> tuple[float, float]:
@@ -75,13 +80,13 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
     river, device, clock = drawn.river, drawn.river.device, drawn.river.sampling
     hand = HandImpedance(*(float(rng.uniform(*getattr(drawn.hands, n))) for n in ("mass", "damping", "stiffness")))
     phase = float(rng.uniform(0.0, LAP))
-    trial = Trial(river.curve, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
+    trial = Trial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
     loop = trial.loop()
     offset, velocity = rng.normal(size=3), rng.normal(size=3)
     mix = rng.uniform(0.0, 0.5 * np.pi)
     offset *= min(2e-3, FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
     velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
-    theta = np.array(device.angles(river.curve.point(phase) + offset)) - loop.linear.theta[0]
+    theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
     rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
     torques = np.tile(loop.linear.weight_theta[0] @ theta, clock.whole_delay)
     state = np.concatenate([theta, rate, theta - clock.period * rate, rate, torques])
@@ -89,7 +94,7 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
     path = hand_path(trial, river.k_r, ticks, conditions, state)
     if len(path) < ticks:
         return Let(np.inf, np.inf)
-    distance = closest_phases(river.curve.packed(), path)[1]
+    distance = closest_phases(drawn.still.packed(), path)[1]
     return Let(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()))
 
 

@@ -31,7 +31,7 @@ from sim.users.arm import Arm
 
 Array = npt.NDArray[np.float64]
 
-SCALE, UPRIGHT = 1000.0, 1.5  # S and k_z/k_l of all trials: S so large that what the walker moves is nothing
+SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials: so that what the walker moves is nothing
 EXCESS = 1e-4  # [m] of the stylus on the side of an edge where the spring acts
 _SOFT = 1e-4  # [N/m] of an arm so soft, and so far away, that its force is constant
 _GAIT = Gait(1.4, 1.25, np.array([2, 2]), 0.45)
@@ -69,7 +69,7 @@ class LeadingTrial(Trial):
     def field(self, k_l: float) -> Leading:
         """The executed law, its figure so that the trial's place lies in the regime."""
         c, s = (float(x) for x in self.regime.tangent(self.curve.velocity(self.phase)))
-        plain = Leading(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)))
+        plain = Leading(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=RATE)
         lead = 2.0 * _GAIT.speed / plain.rate
         laid = (plain.path()[0] - 1.0) * STEP - plain.ahead
         edge = SCALE * EXCESS
@@ -84,8 +84,8 @@ class LeadingTrial(Trial):
             across = side * (0.5 * bend * beyond**2 + edge) if self.regime.aside else 0.0
         x, y = SCALE * self.curve.point(self.phase)[:2] - (along * c - across * s, along * s + across * c)
         return Leading(
-            _GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d, pull=1e-3,
-            curvature=bend,
+            _GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d, rate=RATE,
+            pull=1e-3, curvature=bend,
         )  # fmt: skip
 
 

@@ -1,0 +1,155 @@
+"""LEADING's certificate: its regimes are the executed law's, the walker moves as it does, and MuJoCo agrees."""
+
+import numpy as np
+import pytest
+
+from controllers.certificates.hand import NO_HAND, HandImpedance
+from controllers.certificates.leading_law import Regime, walking
+from controllers.certificates.linear_loop import linearise
+from controllers.certificates.sampled_loop import SampledLoop
+from controllers.certificates.sampling import Sampling
+from controllers.certificates.stability import River, stability
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
+from controllers.state import HandState
+from experiments.certified_leading import certify_leading, leading_field, leading_regimes
+from experiments.certify import phantom_device
+from experiments.config import RunConfig
+from experiments.lead import s_curve
+from experiments.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
+from experiments.trial_onset import growth, observed, predicted
+from experiments.trial_simulation import Conditions, simulate
+from models.mocap.library import embedded
+
+DEVICE, CURVE = phantom_device(), s_curve()
+FLUTTER = Regime(True, True, True, 3.0)
+
+
+def _river(regime, b=8.0):
+    return River(regime.law(SCALE, UPRIGHT), 120.0, b, np.inf, CURVE, DEVICE, Sampling(1e-3))
+
+
+@pytest.mark.parametrize("name", TRIALS)
+def test_each_regime_is_the_executed_law_differentiated(name):
+    trial = TRIALS[name]
+    field, place, step = trial.field(300.0), trial.curve.point(trial.phase), 1e-5
+
+    def slope(hand):
+        return np.stack([(hand(step * e).force - hand(-step * e).force) / (2.0 * step) for e in np.eye(3)], axis=1)
+
+    by_place = slope(lambda x: field.wrench(HandState.at(place + x)))
+    by_speed = slope(lambda v: field.wrench(HandState.at(place, v)))
+    linear = trial.loop().linear
+    inverse = np.linalg.inv(linear.jacobian[0])
+    found = inverse.T @ linear.unit_theta[0, 0] @ inverse
+    np.testing.assert_allclose(300.0 * found, by_place, atol=1e-4)
+    np.testing.assert_allclose(inverse.T @ linear.unit_omega[1, 0] @ inverse, by_speed / trial.b_d, atol=1e-8)
+    assert np.abs(linear.unit_theta[1]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("regime", "free"),
+    [
+        (Regime(False, True), 1),
+        (Regime(True, False, True), 1),
+        (Regime(False, True, True, 1.0), 1),
+        (Regime(True, True), 0),
+        (Regime(False, False, True), 2),
+    ],
+)
+def test_what_the_law_does_not_answer_is_neutral_and_taken_out(regime, free):
+    loop = SampledLoop(_river(regime).still(), Sampling(1e-3, 1.5e-3))
+    for whole, across in zip(loop.matrices(120.0, 8.0), loop.frozen(120.0, 8.0), strict=True):
+        values = np.linalg.eigvals(whole)
+        nearest = np.argsort(np.abs(values - 1.0))
+        assert np.abs(values[nearest[:free]] - 1.0).max(initial=0.0) < 1e-6
+        assert np.abs(values[nearest[free]] - 1.0) > 1e-3
+        left = np.sort(np.abs(values[nearest[free:]]))
+        np.testing.assert_allclose(left, np.sort(np.abs(np.linalg.eigvals(across))), atol=2e-6)
+    held = _river(regime).still(HandImpedance(0.1, 1.0, 100.0))
+    assert held.neutral.shape[2] == 0
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.5e-3])
+@pytest.mark.parametrize("regime", [Regime(True, True), Regime(True, False, True, heading=0.4)])
+def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
+    """Two hands that differ by little, in the executed law on the linear device: their difference obeys the maps."""
+    hand, b, scale = HandImpedance(0.05, 0.5, 20.0), 6.0, 40.0
+    sampling = Sampling(1e-3, delay)
+    trial = leading_trial(regime, 0.3, b, sampling)
+    linear = linearise(DEVICE, regime.law(scale, UPRIGHT), trial.curve, np.array([trial.phase]), hand)
+    loop = SampledLoop(linear, sampling)
+    c, s = regime.tangent(linear.velocity[0])
+    field = Leading(
+        Gait(1.4, 0.01, np.array([2, 2]), 0.45), (0.0, 0.0), float(np.arctan2(s, c)), scale, 120.0, 180.0, b,
+        forward=1e3, backward=1e3, pull=1e3,
+    )  # fmt: skip
+    program, free, jacobian = field.program(), loop.matrices(0.0, 0.0)[0], linear.jacobian[0]
+    # Backwards the edge is far behind, so a figure that stands is drawn there by a hand that is.
+    lag = 2.0 * 0.01 / field.rate * (1.0 if regime.beyond else -1e3)
+    start = (lag + (0.2 if regime.beyond else -0.2)) / scale
+    place = np.array([c * start, s * start, 0.0])
+    held = field.wrench(HandState.at(place)).force  # answered by a hand that holds on
+
+    def course(x, ticks):
+        memory, out = program.fresh_memory(), []
+        walker = memory[TRACE_SIZE:]
+        for k in range(ticks):
+            out.append(np.append(x, walker[[ARGUMENT, SPEED]]))
+            state = HandState.at(place + jacobian @ x[:3], loop.measured_velocity[0] @ x, k * sampling.period)
+            wrench = np.zeros(6)
+            leading_wrench(program.params, 0, 0, memory, TRACE_SIZE, state.vector(), wrench)
+            x = free @ x + loop.fresh[0] @ (jacobian.T @ (wrench[:3] - held))
+        return np.array(out)
+
+    kick = np.zeros(loop.size)
+    kick[:3] = np.linalg.solve(jacobian, [1e-7, 2e-7, -1e-7])
+    ticks = 60
+    still = course(np.zeros(loop.size), ticks)
+    difference = course(kick, ticks) - still
+    whole = walking(loop, regime, scale, field.rate, field.k_l, b)[0]
+    assert whole.shape == (loop.size + 2, loop.size + 2)
+    expected = difference[1].copy()
+    for k in range(1, ticks):
+        np.testing.assert_allclose(difference[k][:3], expected[:3], atol=1e-12 + 1e-4 * np.abs(expected[:3]).max())
+        np.testing.assert_allclose(difference[k][-2:], expected[-2:], atol=1e-11 + 1e-4 * np.abs(expected[-2:]).max())
+        expected = whole @ expected
+    assert np.abs(difference[-1][-2:]).max() > 1e-9
+
+
+@pytest.mark.slow
+def test_led_figures_are_certified_and_one_with_little_damping_is_refuted():
+    config = RunConfig(mode="lead")
+    field = leading_field(config, embedded("walk"))
+    assert leading_regimes(field)["_beyond"][0].turn > leading_regimes(field)["_aside"][0].turn > 0.5
+    hands = type("Few", (), {"hands": lambda self: [NO_HAND, HandImpedance(0.1, 2.0, 0.0)]})()
+    verdicts = certify_leading(field, CURVE, DEVICE, Sampling(1e-3), hands)  # pyright: ignore
+    assert {name: verdict.verdict for name, verdict in verdicts.items()} == {
+        "stability": "certified", "stability_back": "certified", "stability_aside": "certified",
+        "stability_beyond": "certified", "passivity": "refuted",
+    }  # fmt: skip
+    assert verdicts["stability"].figures["walker_radius"] < 1.0
+    # A force that is no potential's: little damping lets it shake a hand that pulls too far ahead and aside.
+    weak = stability(_river(FLUTTER, b=1.0), [NO_HAND])
+    assert weak.verdict == "refuted"
+    assert stability(_river(Regime(True, True), b=1.0), [NO_HAND]).verdict == "certified"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRIALS)
+def test_the_springs_make_mujoco_unstable_where_it_is_predicted(name):
+    trial = TRIALS[name]
+    expected = predicted(trial)
+    assert observed(trial, expected, Conditions()) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.slow
+def test_a_refuted_regime_does_what_its_counterexample_says():
+    sampling = Sampling(1e-3)
+    verdict = stability(_river(FLUTTER, b=1.5), [NO_HAND])
+    example = verdict.counterexample
+    share = float(example["phase"]) / CURVE.duration
+    trial = leading_trial(FLUTTER, share, 1.5, sampling)
+    path = simulate(trial, 120.0, 400, Conditions(), 1e-2 * example["state"])
+    assert np.log(growth(np.diff(path, axis=0))) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.1)
+    assert np.linalg.norm(np.diff(path, axis=0)[-50:], axis=1).max() > 2.0 * np.linalg.norm(path[1] - path[0])
