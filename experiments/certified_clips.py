@@ -6,10 +6,10 @@ from pathlib import Path
 
 from controllers.certificates.report import Verdict
 from experiments.ballistics import clip_ballistics
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.run import RECORDING, clips_of, config_of
-from experiments.wiring import load_clips
 from models.mocap.clip import Clip
 from sim.recording import Recording
 

@@ -17,8 +17,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.leading import Leading
 from controllers.safety import ForceLimiter
 from experiments.config import RunConfig
+from experiments.figure_maps import figure_legs
 from experiments.lead import law, led_map
-from experiments.wiring import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 

@@ -23,7 +23,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River as FieldRiver
 from controllers.safety import ForceLimiter
 from experiments.config import RunConfig
-from experiments.modes import default_rivers, law
+from experiments.modes import default_rivers, law, river_time
 
 Array = npt.NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def certify_rivers(
 
 def _lifted_bundle(config: RunConfig, curves: Mapping[str, Trajectory]) -> RiverBundle:
     """The rivers of a lifted map, as `lifted_runs.lifted_rivers` has them, the one that the run begins on first."""
-    tau = config.damping / config.stiffness
+    tau = river_time(config)
     rivers = tuple(FieldRiver(curve, config.river_tube, tau, config.damping) for curve in curves.values())
     return RiverBundle(rivers, tuple(name.removeprefix("_") or "first" for name in curves))
 

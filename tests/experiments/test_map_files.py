@@ -1,5 +1,7 @@
 """Maps in files: they come back to the last bit, a file that is none is refused, and a run takes its map from one."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.archives import read_archive, write_archive
+from experiments.cli import main
 from experiments.config import RunConfig
 from experiments.field_files import save_field
 from experiments.figure_maps import figure_legs
@@ -139,3 +142,20 @@ def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
     save_map(Cylindrical([*small, small[0]], R, Z), path)
     with pytest.raises(SimError, match="its poses have 19 numbers, the figure's have 75"):
         load_figure_map(path)
+
+
+@pytest.mark.slow
+def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_path, capsys):
+    path = tmp_path / "map.npz"
+    save_map(lifted(), path)
+    command = ["certify", "--map", str(path), "--no-hand", "--json", "--out", str(tmp_path)]
+    assert main(command) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {name for name in told if name.startswith("stability")} == {
+        "stability", "stability_a/b", "stability_../jump",
+    }  # fmt: skip
+    assert told["ballistic"]["figures"]["clips"] == {"walk": "certified", "a/b": "certified", "../jump": "certified"}
+    assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
+    assert main([*command, "--curve", "a/b", "--verify", str(tmp_path / "certificate.json")]) == 1
+    assert "changed: curve;" in capsys.readouterr().err
+    assert main([*command, "--curve", "hop"]) == 2

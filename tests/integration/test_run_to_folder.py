@@ -74,6 +74,18 @@ def test_memory_stays_below_a_gigabyte(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0
 
 
+def test_a_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["certify", str(folder), "--no-hand", "--out", str(tmp_path)]
+    assert main([*command, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["stability"]["verdict"] == "certified"
+    assert told["ballistic"]["verdict"] == "certified"
+    assert set(told["ballistic"]["figures"]["clips"]) == {"cheer", "angry"}
+    assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
+    assert main(["certify", "--no-hand", "--verify", str(tmp_path / "certificate.json")]) == 1
+    assert "changed: clips;" in capsys.readouterr().err
+
+
 def test_a_run_is_reproduced_bit_for_bit_from_its_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 9000 ticks" in capsys.readouterr().out

@@ -10,9 +10,8 @@ from controllers.certificates.hand import HandRange
 from controllers.certificates.sampling import Sampling
 from controllers.certificates.switching import Keeping, Sharing, hysteresis_dwell, switching
 from controllers.certificates.switching_search import SECONDS, Push, counterexample, failure
-from experiments.certified_field import certified_curve, certified_sampling
 from experiments.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
-from experiments.certify import phantom_device
+from experiments.certify import certified_rivers, phantom_device
 from experiments.config import RunConfig
 from experiments.modes import law
 from experiments.switching_trials import simulated_course, straight_pair, trials
@@ -157,8 +156,9 @@ def test_failures_are_told_apart():
 @pytest.mark.slow
 def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
     config = RunConfig(mode="rivers")
-    curve, clock = certified_curve(config), certified_sampling(config, 0.0)
-    verdict = certify_rivers(config, curve, phantom_device(), clock, HandRange(), 0.5)["switching"]
+    main = certified_rivers(config)[""]
+    curve, clock = main.curve, main.sampling
+    verdict = certify_rivers(config, main, HandRange(), 0.5, {"": curve})["switching"]
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
