@@ -114,7 +114,7 @@ def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
     """Field of the river along x and of a second one, or of the first alone."""
     rivers = (straight_river(0.0), second)
     bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
-    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED, form).program()
+    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form).program()
 
 
 def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:

@@ -75,8 +75,9 @@ def crossing(degrees: float) -> Crossing:
     """Forces at a crossing of two straight rivers, on a hand that follows the first."""
     pair = RiverBundle((straight_river(0.0), straight_river(degrees)), ("1", "2"))
     second = RiverBundle((straight_river(degrees),), ("2",))
-    scale = (ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED)
-    smooth, discrete = HigherOrder(pair, *scale), HigherOrder(pair, *scale, "discrete")
+    scale = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
+    smooth = HigherOrder(pair, ADMISSION * SPEED, SIGMA["smooth"] * SPEED)
+    discrete = HigherOrder(pair, *scale, "discrete")
     # River 1 gives no force to a hand on it at its own speed: all that is felt comes from river 2.
     way = np.linspace(-0.03, 0.03, 121)
     alone = _felt(HigherOrder(second, *scale, "discrete"), np.zeros(1))

@@ -27,7 +27,10 @@ IntArray = npt.NDArray[np.int64]
 
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
 # at a right angle is not: it is √2 from it.
-ADMISSION, SIGMA, HYSTERESIS = 1.2, 0.15, 0.15
+ADMISSION, HYSTERESIS = 1.2, 0.15
+# Smooth, σ says up to which angle rivers are blended, and a blend of tubes that part throws the hand out of both: with
+# 0.05 it ends at 20°, before the middle leaves the tubes.
+SIGMA = {"discrete": 0.15, "smooth": 0.05}
 GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
 WAVE = 0.6  # height of the wave, of the map's half width
 
@@ -114,7 +117,9 @@ def _rivers(
     if speeds_of is not None:
         gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))
         bundle, admission = replace(bundle, rivers=gated), GATE
-    return HigherOrder(bundle, admission * pace, SIGMA * pace, HYSTERESIS * pace, config.crossing)
+    return HigherOrder(
+        bundle, admission * pace, SIGMA[config.crossing] * pace, HYSTERESIS * pace, config.crossing
+    )  # fmt: skip
 
 
 def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:

@@ -100,7 +100,7 @@ class Bench:
         """The backflip's river, which takes a hand at the speeds that its flight admits."""
         pace = self.curve.length / self.curve.duration
         bundle = RiverBundle((River(self.curve, TUBE, speeds=self.speeds),), ("backflip",))
-        return HigherOrder(bundle, GATE * pace, SIGMA * pace, HYSTERESIS * pace, "discrete").program()
+        return HigherOrder(bundle, GATE * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace, "discrete").program()
 
     def past(self, speed: float) -> Array:
         """A straight way at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""

@@ -81,9 +81,9 @@ def simulated_course(
 def straight_pair(
     degrees: float, form: str, hysteresis: float, drag: float = 4.0, admission: float = ADMISSION
 ) -> HigherOrder:
-    """Two straight rivers that cross in the origin of H; hysteresis and admission as shares of their speed."""
+    """Two straight rivers that cross in the origin of H; h and r as shares of their speed, σ of the discrete mode."""
     rivers = tuple(replace(straight_river(angle), drag=drag) for angle in (0.0, degrees))
-    scale = (admission * SPEED, SIGMA * SPEED, hysteresis * SPEED)
+    scale = (admission * SPEED, SIGMA["discrete"] * SPEED, hysteresis * SPEED)
     return HigherOrder(RiverBundle(rivers, ("1", "2")), *scale, form)  # pyright: ignore[reportArgumentType]
 
 

@@ -18,7 +18,7 @@ from controllers.state import HandState
 from experiments.field_figures import SPEED, crossing, eight, straight_river
 from experiments.modes import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 
-SCALE = (ADMISSION * SPEED, SIGMA * SPEED, HYSTERESIS * SPEED)
+SCALE = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
 R, S, H = SCALE
 DRAG = 4.0
 
@@ -104,11 +104,14 @@ def test_at_crossings_a_hand_on_river_1_feels_the_documented_share_of_river_2():
     for degrees in range(0, 181, 5):
         row = crossing(float(degrees))
         gap = 2.0 * SPEED * np.sin(np.radians(degrees) / 2.0)
-        a, null = np.exp(-(gap**2) / (2 * S**2)), np.exp(-(R**2) / (2 * S**2))
+        sigma = SIGMA["smooth"] * SPEED
+        a, null = np.exp(-(gap**2) / (2 * sigma**2)), np.exp(-(R**2) / (2 * sigma**2))
         assert row.both == pytest.approx(DRAG * gap, abs=1e-9)
         assert row.smooth == pytest.approx(DRAG * gap * a / (1.0 + a + null), rel=1e-6, abs=1e-12)
         assert row.discrete_passing < 1e-12
         assert row.alone == pytest.approx(DRAG * gap if gap < R else 0.0, abs=1e-9)
+        if degrees >= 30:
+            assert row.smooth_passing < 5e-3
         if degrees >= 90:
             assert row.smooth_passing < 1e-9
             assert row.both_passing > 0.5
@@ -241,6 +244,27 @@ def test_the_smooth_field_blends_rivers_that_touch_and_does_not_throw_the_hand_o
     memory, _ = _carried_along_the_wave("smooth", lift)
     assert memory[TRACE_RIVER] >= 0.0
     assert memory[TRACE_DISTANCE] < 0.005
+
+
+def _through_a_crossing(degrees, sigma):
+    """Memory and last point of a mass that nobody pushes, 0.1 mm beside river 1, through a crossing."""
+    program = HigherOrder(_pair(degrees), R, sigma).program()
+    start, push = np.array([-0.045, 1e-4, 0.0]), np.zeros((1200, 3))
+    path, memory = mass_in(program, start, np.array([SPEED, 0.0, 0.0]), push)
+    return memory, path[-1]
+
+
+def test_the_smooth_mode_throws_no_hand_out_and_leaves_it_on_its_river_from_30_degrees_on():
+    for degrees in (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 45.0, 60.0, 90.0, 135.0, 180.0):
+        memory, end = _through_a_crossing(degrees, SIGMA["smooth"] * SPEED)
+        assert memory[TRACE_RIVER] >= 0.0
+        # Up to 20° a mass without friction may be taken along, or still be between the rivers, 45 mm on.
+        if degrees >= 30.0:
+            assert memory[TRACE_RIVER] == 0.0
+            assert abs(end[1]) < 2e-3
+    # A wider blend takes hands along between the rivers.
+    memory, end = _through_a_crossing(30.0, 0.15 * SPEED)
+    assert abs(end[1]) > 3e-3
 
 
 @pytest.mark.parametrize("form", ["smooth", "discrete"])
