@@ -10,6 +10,8 @@ the cart-table model (Kajita et al. 2003), which for a lap is solved harmonic by
 What the clips themselves are out of balance is left to their blends: a clip alone does not sway.
 """
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -17,8 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.haptic_map.cylindrical import Cylindrical
+from experiments.kept import kept_array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.balance import GRAVITY
+from sim.compiled import CACHE_FOLDER
 from sim.reference import poses_along
 
 Array = npt.NDArray[np.float64]
@@ -41,8 +45,10 @@ class _Laps(NamedTuple):
     height: float
 
 
-def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
-    """The same map with a root that sways between the clips.
+def balanced(
+    haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float, ready: Callable[[], None] = lambda: None
+) -> Cylindrical:
+    """The same map with a root that sways between the clips; what was found once is kept beside the compiled code.
 
     Parameters
     ----------
@@ -52,15 +58,31 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
         Whose poses they are, alone.
     lap : float
         Time of a lap [s].
+    ready : callable
+        Called before compiled code is needed.
     """
+
+    def find() -> Array:
+        ready()
+        return _sway(haptic_map, figure, lap)
+
+    shape = (_ROWS, len(haptic_map.mixtures), 2)
+    model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
+    mujoco.mj_saveModel(figure, None, model)
+    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
+    made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]), code)
+    return haptic_map.with_sway(kept_array(CACHE_FOLDER, "sway", made_of, shape, find))
+
+
+def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
     weights = haptic_map.mixtures
     frequency = np.arange(_ROWS // 2 + 1) / lap
     corners = weights.argmax(axis=0)
     # The laps begin a row before the seam, so they are measured in the second one.
     turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_ROWS) / _ROWS)
     sway = np.zeros((_ROWS, len(weights), 2))
-    for _ in range(_ROUNDS):
-        laps = _laps(haptic_map, figure, lap)
+    for k in range(_ROUNDS):
+        laps = _laps(haptic_map.with_sway(sway) if k > 0 else haptic_map, figure, lap)
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
         own = outside[corners]
         outside -= np.einsum("km,mnx->knx", weights, own)
@@ -72,8 +94,7 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
         sway += np.fft.irfft(error, _ROWS, axis=0)
         size = np.linalg.norm(sway, axis=-1, keepdims=True)
         sway *= np.minimum(1.0, _FARTHEST / np.maximum(size, 1e-12))
-        haptic_map = haptic_map.with_sway(sway)
-    return haptic_map
+    return sway
 
 
 def nearest_supported(point: Array, contacts: Array, share: float) -> Array:

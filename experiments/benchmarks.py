@@ -33,6 +33,7 @@ from experiments.wiring import wire
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from sim.compiled import entry_point
+from sim.kernel_units import map_units
 from sim.loop import make_logs
 from sim.servo import FrameLog, TickLog, run_block
 
@@ -149,9 +150,11 @@ def closest_point_microseconds(pieces: int) -> float:
 
 
 @entry_point
-def _map_many(kind: int, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+def _map_many(
+    units: IntArray, kind: int, params: Array, points: Array, memory: Array, pose: Array, jacobian: Array
+) -> None:
     for i in range(points.shape[0]):
-        evaluate_map_jacobian(kind, params, points[i], memory, pose, jacobian)
+        evaluate_map_jacobian(units, kind, params, points[i], memory, pose, jacobian)
 
 
 def map_microseconds(session: Session) -> float:
@@ -159,8 +162,9 @@ def map_microseconds(session: Session) -> float:
     kind, params, memory = session.haptic_map.compiled()
     pose, jacobian = np.empty(session.haptic_map.nq), np.empty((session.haptic_map.nv, 6))
     points = stylus_path(session.curve.point(np.linspace(0.0, session.config.lap, 2000)))
-    _map_many(kind, params, points[:2], memory, pose, jacobian)
-    return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
+    units = map_units([(kind, params)])
+    _map_many(units, kind, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))
 
 
 def lifted_microseconds(m: int) -> float:
@@ -176,14 +180,15 @@ def lifted_microseconds(m: int) -> float:
     pose, jacobian = np.empty(lifted.nq), np.empty((lifted.nv, 6))
     theta, radius, height = np.random.default_rng(0).uniform([0.0, 0.03, -0.02], [6.28, 0.07, 0.02], (2000, 3)).T
     points = stylus_path(np.column_stack([radius * np.cos(theta), radius * np.sin(theta), height]))
-    _map_many(kind, params, points[:2], memory, pose, jacobian)
-    return _microseconds(lambda: _map_many(kind, params, points, memory, pose, jacobian), len(points))
+    units = map_units([(kind, params)])
+    _map_many(units, kind, params, points[:2], memory, pose, jacobian)
+    return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))
 
 
 @njit
-def _wall_many(ops: IntArray, params: Array, memory: Array, hands: Array, wrench: Array) -> None:
+def _wall_many(units: IntArray, ops: IntArray, params: Array, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
-        raise_walls(ops, params, memory, hands[i])
+        raise_walls(units, ops, params, memory, hands[i])
         evaluate(ops, params, memory, hands[i], wrench)
 
 
@@ -194,9 +199,9 @@ def walls_microseconds(session: Session) -> float:
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
     walls = figure_walls(session.haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
     program, wrench = walls.program(), np.empty(6)
-    memory = program.fresh_memory()
-    _wall_many(program.ops, program.params, memory, hands[:2], wrench)
-    return _microseconds(lambda: _wall_many(program.ops, program.params, memory, hands, wrench), len(hands))
+    memory, units = program.fresh_memory(), session.servo.reference.units
+    _wall_many(units, program.ops, program.params, memory, hands[:2], wrench)
+    return _microseconds(lambda: _wall_many(units, program.ops, program.params, memory, hands, wrench), len(hands))
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:

@@ -1,47 +1,74 @@
-"""The servo loop compiled in a process of its own, which gives back the memory that a compiler takes."""
+"""What a run needs compiled, made in a process of its own, which gives back the memory that a compiler takes."""
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 
 from rich.console import Console
 
+from controllers.fields.program import LAW_KERNELS
+from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.evaluate import kinds_of
+from controllers.state import IntArray
 from experiments.config import ArmConfig, RunConfig
 from sim.compiled import CACHE_FOLDER
 
+Config = RunConfig | ArmConfig
 
-def compile_once(console: Console, body: str = "figure") -> None:
-    """Compile the servo loop for a body, ``figure`` or ``arm``, if this version of the code has not been compiled yet.
+
+def compiled_parts(body: str, haptic_map: CompiledMap, ops: IntArray | None = None) -> tuple[str, ...]:
+    """Names of what is compiled by itself for a run: the loop for a body, kernels of the map and of the field's laws.
+
+    Parameters
+    ----------
+    body : str
+        ``figure`` or ``arm``.
+    haptic_map : CompiledMap
+        Whose poses the body follows, and whose walls the field may have.
+    ops : IntArray, optional
+        Instructions (n, 4) of the field, if it is known.
+    """
+    kinds = kinds_of(haptic_map.kind, haptic_map.params)
+    laws = set() if ops is None else {int(opcode) for opcode in ops[:, 0]} & LAW_KERNELS.keys()
+    return (body, *(f"map-{kind}" for kind in kinds), *(f"law-{opcode}" for opcode in sorted(laws)))
+
+
+def compile_once(console: Console, config: Config, parts: tuple[str, ...]) -> None:
+    """Compile all that a run needs, if any of these parts has not been compiled by this version of the code.
 
     It says so first. A compilation that fails leaves it to the run itself, which then says what is wrong.
     """
-    if _mark(body).exists():
+    if all(_mark(part).exists() for part in parts):
         return
-    console.print("Compiling the servo loop; this happens once for each version of the code.")
-    subprocess.run([sys.executable, "-m", "experiments.compiling", body], check=False, capture_output=True)
+    console.print("Compiling what this run needs; this happens once for each version of the code.")
+    subprocess.run(
+        [sys.executable, "-m", "experiments.compiling"], input=pickle.dumps(config), check=False, capture_output=True
+    )
 
 
-def _mark(body: str) -> Path:
-    return CACHE_FOLDER / f"{body}.compiled"
+def _mark(part: str) -> Path:
+    return CACHE_FOLDER / f"{part}.compiled"
 
 
-def _compile(body: str) -> None:
+def _compile(config: Config) -> None:
     from sim.loop import Loop
 
-    if body == "arm":
+    parts: set[str] = set()
+    if isinstance(config, ArmConfig):
         from experiments.robot_arm import wire_arm
 
-        servo, world, _ = wire_arm(ArmConfig())
-        Loop(servo, world).run(servo.plant.period * servo.figure_ticks)
+        servo, world, _ = wire_arm(config, parts.update)
     else:
         from experiments.clips import load_clips
         from experiments.wiring import wire
 
-        config = RunConfig()
-        session = wire(config, load_clips(config.clips)[0])
-        Loop(session.servo, session.world).run(session.servo.plant.period * config.figure_ticks)
-    _mark(body).touch()
+        session = wire(config, load_clips(config.clips)[0], ready=parts.update)
+        servo, world = session.servo, session.world
+    Loop(servo, world).run(servo.plant.period * servo.figure_ticks)
+    for part in parts:
+        _mark(part).touch()
 
 
 if __name__ == "__main__":
-    _compile(sys.argv[1])
+    _compile(pickle.load(sys.stdin.buffer))

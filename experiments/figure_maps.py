@@ -1,5 +1,7 @@
 """Haptic maps of the figure that a run makes from its clips, by name."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +14,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.balance import balanced
+from experiments.compiling import compiled_parts
 from experiments.config import RunConfig
 from experiments.modes import default_rivers
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
@@ -22,8 +25,14 @@ Array = npt.NDArray[np.float64]
 _MOST_CLIPS = {"cylindrical": 4, "composite": 3, "rivers": 3}
 
 
-def clip_map(config: RunConfig, clips: tuple[Clip, ...], curve: Trajectory, figure: mujoco.MjModel) -> ClipMap:
-    """Haptic map that a configuration names, of these clips about a curve.
+def clip_map(
+    config: RunConfig,
+    clips: tuple[Clip, ...],
+    curve: Trajectory,
+    figure: mujoco.MjModel,
+    ready: Callable[[tuple[str, ...]], None] = lambda parts: None,
+) -> ClipMap:
+    """Haptic map that a configuration names, of these clips about a curve; `ready` as in `experiments.wiring.wire`.
 
     Raises
     ------
@@ -40,7 +49,8 @@ def clip_map(config: RunConfig, clips: tuple[Clip, ...], curve: Trajectory, figu
     legs = figure_legs(figure)
     if config.map == "cylindrical":
         corners = [motions[i % len(motions)] for i in range(4)]
-        return balanced(Cylindrical(corners, radii, (-config.reach, config.reach), legs), figure, config.lap)
+        blended = Cylindrical(corners, radii, (-config.reach, config.reach), legs)
+        return balanced(blended, figure, config.lap, lambda: ready(compiled_parts("figure", blended.compiled())))
     if config.map == "rivers":
         if config.mode != "rivers" or config.crossing == "sum":
             raise ParameterError(

@@ -19,7 +19,7 @@ from controllers.fields.follow import Follow
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.safety import ForceLimiter
 from experiments.budget import fastest, tank_for
-from experiments.compiling import compile_once
+from experiments.compiling import compile_once, compiled_parts
 from experiments.config import ArmConfig
 from experiments.figures import STYLE
 from experiments.hands import lap_pushes
@@ -29,6 +29,7 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm_model
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT
 from sim.devices.phantom_port import phantom_port
+from sim.kernel_units import law_units
 from sim.loop import Loop, groups, tick_channels
 from sim.plant import make_hand, make_plant
 from sim.recorder import Group, Recorder
@@ -111,8 +112,10 @@ def tilted_circle(radius: float, lap: float) -> Trajectory:
     return Trajectory(times, turned, periodic=True)
 
 
-def wire_arm(config: ArmConfig) -> tuple[Servo, RobotWorld, Trajectory]:
-    """Put a run together: servo, world and curve.
+def wire_arm(
+    config: ArmConfig, ready: Callable[[tuple[str, ...]], None] = lambda parts: None
+) -> tuple[Servo, RobotWorld, Trajectory]:
+    """Put a run together: servo, world and curve; `ready` as in `experiments.wiring.wire`.
 
     Raises
     ------
@@ -140,16 +143,18 @@ def wire_arm(config: ArmConfig) -> tuple[Servo, RobotWorld, Trajectory]:
     mujoco.mju_mat2Quat(stylus, world.data.site(PHANTOM + "tip").xmat)
     world.put_arm(haptic_map.pose(np.concatenate([start, stylus])))
     port = phantom_port(world.model, world.data, period, config.cutoff)
+    compiled = haptic_map.compiled()
+    ready(compiled_parts("arm", compiled, program.ops))
     servo = Servo(
         plant=make_plant(world),
         port=port,
         field=Field(
-            ops=program.ops, params=program.params, memory=program.fresh_memory(), limits=limiter.limits(),
-            limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
+            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory(),
+            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
         hand=make_hand(Arm(pushes=pushes)),
-        reference=make_reference(world.arm, haptic_map.compiled(), period * config.arm_ticks, config.smoothing),
+        reference=make_reference(world.arm, compiled, period * config.arm_ticks, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
         argument=port.hand[1:8],
@@ -210,8 +215,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     """
     console = Console(stderr=True)
     check_folder(out, overwrite)
-    servo, world, curve = wire_arm(config)
-    compile_once(console, "arm")
+    servo, world, curve = wire_arm(config, lambda parts: compile_once(console, config, parts))
     out.mkdir(parents=True, exist_ok=True)
     for name in (RECORDING, SUMMARY, REPORT, FIGURE):
         (out / name).unlink(missing_ok=True)

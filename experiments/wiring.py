@@ -15,6 +15,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.safety import ForceLimiter
 from experiments.budget import energy_tank
 from experiments.clips import only
+from experiments.compiling import compiled_parts
 from experiments.config import STRETCHING, RunConfig
 from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
@@ -32,6 +33,7 @@ from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.devices.phantom_port import phantom_port
 from sim.figure import Figure
+from sim.kernel_units import law_units
 from sim.plant import make_hand, make_plant
 from sim.reference import make_reference, poses_along
 from sim.servo import Field as CompiledField
@@ -44,7 +46,10 @@ MOST_PACE = 1.4  # times the clips' own that passes without a word
 
 
 def wire(
-    config: RunConfig, clips: tuple[Clip, ...], remarks: tuple[str, ...] = (), ready: Callable[[], None] = lambda: None
+    config: RunConfig,
+    clips: tuple[Clip, ...],
+    remarks: tuple[str, ...] = (),
+    ready: Callable[[tuple[str, ...]], None] = lambda parts: None,
 ) -> Session:
     """Put a run together.
 
@@ -55,7 +60,7 @@ def wire(
     clips, remarks
         Of `load_clips`.
     ready : callable
-        Called when everything has been checked and before compiled code is needed.
+        Called before compiled code is needed, with the names of its parts (see `experiments.compiling`).
 
     Raises
     ------
@@ -93,7 +98,7 @@ def wire(
             curve = lifted_curve(blended, config.curve)
             rivers = lifted_rivers(blended, config) if config.mode == "rivers" else None
     else:
-        blended = clip_map(config, clips, curve, world.figure)
+        blended = clip_map(config, clips, curve, world.figure, ready)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
     haptic_map = expressive_figure(blended) if config.expressive and not isinstance(blended, Led) else blended
@@ -115,6 +120,7 @@ def wire(
     if leading:
         # The path that the figure is on is the one that the field lays.
         compiled = compiled._replace(memory=memory)
+    ready(compiled_parts("figure", compiled, program.ops))
     reference = make_reference(
         world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend, packed_legs(world.figure)
     )
@@ -125,7 +131,6 @@ def wire(
     limiter = ForceLimiter(period)
     tank = energy_tank(config, curve, limiter, grabs, urged)
     port = phantom_port(world.model, world.data, period, config.cutoff)
-    ready()
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
@@ -134,8 +139,8 @@ def wire(
         plant=make_plant(world),
         port=port,
         field=CompiledField(
-            ops=program.ops, params=program.params, memory=memory, limits=limiter.limits(),
-            limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
+            units=law_units(program.ops), ops=program.ops, params=program.params, memory=memory,
+            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
         hand=make_hand(user),

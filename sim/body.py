@@ -19,12 +19,10 @@ def drive(body: BodyState, pose: Array, velocity: Array, acceleration: Array) ->
         robot_torque(body, pose, velocity, acceleration)
 
 
+# A function around them would take all the arrays of a state once more, number by number.
+_DRIVES: dict[type, Any] = {FigureState: figure_torque, RobotState: robot_torque}
+
+
 @overload(drive, strict=False)
 def _drive(body: Any, pose: Any, velocity: Any, acceleration: Any) -> Any:
-    def drive_figure(body: FigureState, pose: Array, velocity: Array, acceleration: Array) -> None:
-        figure_torque(body, pose, velocity, acceleration)
-
-    def drive_robot(body: RobotState, pose: Array, velocity: Array, acceleration: Array) -> None:
-        robot_torque(body, pose, velocity, acceleration)
-
-    return {FigureState: drive_figure, RobotState: drive_robot}[body.instance_class]
+    return _DRIVES[body.instance_class].py_func

@@ -3,7 +3,7 @@
 numba notices a change only in the file of the function it cached, not in the files of the functions that one calls.
 So the kernels of ``models`` and ``controllers`` are not cached by themselves; the entry points of ``sim`` are, with
 everything they call linked in, in a folder named by a hash of every source file that can hold a kernel. Any change
-there is another folder.
+there is another folder. What else takes long and depends on nothing but these sources and its input may be kept there.
 """
 
 import hashlib

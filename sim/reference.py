@@ -20,11 +20,13 @@ from controllers.haptic_map.river_clips import RIVER_CLIPS, change_clip, heading
 from controllers.rotations import rotate
 from sim.compiled import entry_point
 from sim.errors import SimError
+from sim.kernel_units import map_units
 from sim.native import mj_differentiate_pos
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
 from sim.transition import Transition, carry_on, make_transition, note_change
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 class CompiledReference(NamedTuple):
@@ -38,6 +40,8 @@ class CompiledReference(NamedTuple):
         θ = exp(−ω T) of the tracking filter, for the period T at which it runs.
     period : float
         T [s].
+    units : IntArray
+        Addresses of the map's kernels (see `sim.kernel_units`).
     kind, params, memory
         The haptic map and its state (the lap).
     hand : Array
@@ -55,6 +59,7 @@ class CompiledReference(NamedTuple):
     figure_model: int
     smoothing: float
     period: float
+    units: IntArray
     kind: int
     params: Array
     memory: Array
@@ -79,13 +84,13 @@ def _look_around(reference: CompiledReference) -> None:
     """Poses of the map along the stylus's motion: now, a period before and a period after; the memory is now's."""
     hand, period, x = reference.hand, reference.period, reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
-    evaluate_map(reference.kind, reference.params, x, reference.memory, reference.pose)
+    evaluate_map(reference.units, reference.kind, reference.params, x, reference.memory, reference.pose)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
         for i in range(3):
             x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
         x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
         reference.scratch_memory[:] = reference.memory
-        evaluate_map(reference.kind, reference.params, x, reference.scratch_memory, pose)
+        evaluate_map(reference.units, reference.kind, reference.params, x, reference.scratch_memory, pose)
 
 
 @njit
@@ -165,6 +170,11 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
 
 
 @entry_point
+def _poses_along(units: IntArray, kind: int, params: Array, memory: Array, points: Array, poses: Array) -> None:
+    for i in range(points.shape[0]):
+        evaluate_map(units, kind, params, points[i], memory, poses[i])
+
+
 def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: Array) -> None:
     """Evaluate a map along a path of the stylus.
 
@@ -177,8 +187,7 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
     poses : Array
         Set, shape (n, 75).
     """
-    for i in range(points.shape[0]):
-        evaluate_map(kind, params, points[i], memory, poses[i])
+    _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
 
 
 @entry_point
@@ -238,8 +247,9 @@ def make_reference(
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
-        kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)), orientation=np.array([1.0, 0.0, 0.0, 0.0]),
-        turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq), velocity=np.zeros(nv),
-        acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs), scratch_memory=memory.copy(),
-        scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+        units=map_units([(kind, params)]), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
+        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
+        velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs),
+        scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq),
+        to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

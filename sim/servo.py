@@ -22,7 +22,7 @@ from numba import njit
 
 from controllers.energy_tank import TANK_ENERGY, guard_energy
 from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.program import evaluate
+from controllers.fields.program import evaluate_units
 from controllers.fields.soft_wall import raise_walls
 from controllers.safety import limit_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
@@ -37,8 +37,12 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Field(NamedTuple):
-    """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench."""
+    """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench.
 
+    `units` are the addresses of its laws' kernels (see `sim.kernel_units`).
+    """
+
+    units: IntArray
     ops: IntArray
     params: Array
     memory: Array
@@ -126,19 +130,19 @@ class FrameLog(NamedTuple):
     ground: Array
 
 
-@njit
+@njit(inline="always")  # a call would hand over all of the servo's arrays, number by number
 def field_force(servo: Servo) -> None:
     """Evaluate and limit the field at the measured hand, within the tank's budget, and command the motors."""
     field, hand = servo.field, servo.port.hand
-    raise_walls(field.ops, field.params, field.memory, hand)
-    evaluate(field.ops, field.params, field.memory, hand, field.wrench)
+    raise_walls(servo.reference.units, field.ops, field.params, field.memory, hand)
+    evaluate_units(field.units, field.ops, field.params, field.memory, hand, field.wrench)
     limit_force(field.limits, field.limiter, field.wrench, field.force)
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     guard_energy(field.budget, field.tank, p, v, field.force)
     actuate(servo.port, field.force)
 
 
-@njit
+@njit(inline="always")
 def move_figure(servo: Servo) -> None:
     """Update the animation at the map's argument, and the torques that follow it."""
     reference = servo.reference

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.fields.instructions import SOFT_WALL, Program, checked, wrench_of
+from controllers.fields.instructions import SOFT_WALL, Program, checked
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.rotations import logarithm, rotation_vector_rate
@@ -64,18 +64,11 @@ def _torque(params: Array, joint: int, pose: Array, rates: Array, torque: Array)
 
 
 @njit
-def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Wrench of a wall: parameters see `SoftWall`, memory [wrench (6), memory of the map]; `curve` is not used."""
-    wall = params[at:]
-    nv, joints = int(wall[_NV]), int(wall[_JOINTS])
-    first = _HEADER + joints * _JOINT
-    haptic_map = wall[first : first + int(wall[_SIZE])]
-    pose, jacobian = np.empty(int(wall[_NQ])), np.empty((nv, STYLUS_TANGENT))
-    stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
-    evaluate_map_jacobian(int(wall[_KIND]), haptic_map, stylus, memory[slot + WRENCH :], pose, jacobian)
+def soft_wall_wrench(wall: Array, pose: Array, jacobian: Array, hand: Array, wrench: Array) -> None:
+    """Wrench of a wall whose parameters (see `SoftWall`) begin an array, at h (nq,) and h_* (nv, 6)."""
     rates, torque = np.zeros(3), np.empty(3)
     wrench[:] = 0.0
-    for n in range(joints):
+    for n in range(int(wall[_JOINTS])):
         joint = _HEADER + n * _JOINT
         row, size = int(wall[joint + _ROW]), 1 if wall[joint + _BALL] == 0.0 else 3
         for i in range(3):
@@ -91,12 +84,25 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
 
 
 @njit
-def raise_walls(ops: IntArray, params: Array, memory: Array, hand: Array) -> None:
-    """Write the wrench of every wall of a field into its memory, where `evaluate` finds it."""
+def raise_walls(units: IntArray, ops: IntArray, params: Array, memory: Array, hand: Array) -> None:
+    """Write the wrench of every wall of a field into its memory, where `evaluate` finds it.
+
+    Parameters
+    ----------
+    units : IntArray
+        Of the walls' maps (see `controllers.haptic_map.evaluate`).
+    ops, params, memory, hand
+        As `controllers.fields.program.evaluate` takes them; a wall's memory is its wrench (6), then that of its map.
+    """
+    stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
     for row in range(ops.shape[0]):
         if ops[row, 0] == SOFT_WALL:
-            slot = ops[row, 2]
-            soft_wall_wrench(params, ops[row, 1], ops[row, 3], memory, slot, hand, memory[slot : slot + WRENCH])
+            wall, kept = params[ops[row, 1] :], memory[ops[row, 2] :]
+            first = _HEADER + int(wall[_JOINTS]) * _JOINT
+            haptic_map = wall[first : first + int(wall[_SIZE])]
+            pose, jacobian = np.empty(int(wall[_NQ])), np.empty((int(wall[_NV]), STYLUS_TANGENT))
+            evaluate_map_jacobian(units, int(wall[_KIND]), haptic_map, stylus, kept[WRENCH:], pose, jacobian)
+            soft_wall_wrench(wall, pose, jacobian, hand, kept[:WRENCH])
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,4 +187,8 @@ class SoftWall:
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force and moment at one hand state, by the compiled law; the map's lap has just begun."""
-        return wrench_of(soft_wall_wrench, self._program, hand)
+        state, wrench = hand.vector(), np.empty(WRENCH)
+        stylus = state[HAND_POSITION : HAND_POSITION + STYLUS]
+        pose, jacobian = self.haptic_map.pose(stylus), self.haptic_map.jacobian(stylus)
+        soft_wall_wrench(self._program.params, pose, jacobian, state, wrench)
+        return Wrench(wrench[:3], wrench[3:])

@@ -105,7 +105,7 @@ def _push(params: Array, at: int, memory: Array, slot: int, p: Array) -> float:
 
 
 @njit
-def stretchy_wrench(params: Array, at: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
     """Instruction STRETCHY: parameters [k_f, k_s, b, ε, until]; the memory holds the curve, see the module."""
     p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
     wrench[:] = 0.0
@@ -242,7 +242,7 @@ class StretchyTubes:
     def wrench(self, hand: HandState) -> Wrench:
         """F at one hand state, by the compiled law, on the curve before all edits."""
         wrench = np.zeros(6)
-        stretchy_wrench(self._program.params, 0, self._program.fresh_memory(), TRACE_SIZE, hand.vector(), wrench)
+        stretchy_wrench(self._program.params, 0, 0, self._program.fresh_memory(), TRACE_SIZE, hand.vector(), wrench)
         return Wrench(wrench[:3], wrench[3:])
 
     def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:

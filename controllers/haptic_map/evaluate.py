@@ -1,8 +1,14 @@
-"""The evaluation of a haptic map, of whatever kind, in the compiled tick."""
+"""The evaluation of a haptic map, of whatever kind, in the compiled tick.
+
+Every kind has a kernel with the same arguments, which is called by its address: so nothing is compiled that is not
+used. Where the addresses come from is not this package's affair (see `sim.kernel_units`).
+"""
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
+from controllers.errors import ControllerError
+from controllers.haptic_map.animation import Kernel
 from controllers.haptic_map.composite import COMPOSITE, composite_map
 from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express
@@ -10,46 +16,64 @@ from controllers.haptic_map.led import LED, led_map
 from controllers.haptic_map.lifted import LIFTED, lifted_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
-from controllers.state import Array
+from controllers.kernel_call import kernel_call
+from controllers.state import Array, IntArray
+
+MAP_KERNELS: dict[int, Kernel] = {
+    CYLINDRICAL: cylindrical_map,
+    COMPOSITE: composite_map,
+    LIFTED: lifted_map,
+    ROBOT_ARM: robot_arm_map,
+    RIVER_CLIPS: river_clips_map,
+    EXPRESSIVE: express,
+    LED: led_map,
+}
+"""Kernels by kind; that of a map that wraps another one changes what the other one wrote."""
+
+_VECTOR = types.Array(types.float64, 1, "C")
+MAP_ARGUMENTS = (_VECTOR, _VECTOR, _VECTOR, _VECTOR, types.Array(types.float64, 2, "C"))
+"""Types of a kernel's arguments: params, x, memory, pose, jacobian."""
+
+_call = kernel_call(MAP_ARGUMENTS)
+
+
+def kinds_of(kind: int, params: Array) -> tuple[int, ...]:
+    """Kinds of kernels that a map needs: its own, and that of the map that it wraps."""
+    base, _ = base_of.py_func(kind, params)
+    return (kind,) if base == kind else (kind, base)
 
 
 @njit
-def _evaluate_one(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """A map that wraps no other."""
-    if kind == CYLINDRICAL:
-        cylindrical_map(params, x, memory, pose, jacobian)
-    elif kind == COMPOSITE:
-        composite_map(params, x, memory, pose, jacobian)
-    elif kind == LIFTED:
-        lifted_map(params, x, memory, pose, jacobian)
-    elif kind == ROBOT_ARM:
-        robot_arm_map(params, x, memory, pose, jacobian)
-    elif kind == RIVER_CLIPS:
-        river_clips_map(params, x, memory, pose, jacobian)
-    elif kind == LED:
-        led_map(params, x, memory, pose, jacobian)
-
-
-@njit
-def evaluate_map_jacobian(kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+def evaluate_map_jacobian(
+    units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
+) -> None:
     """Pose h(x) and derivative h_*(x); arguments as in `evaluate_map`, and `jacobian`, shape (nv, 6), written."""
     base, numbers = base_of(kind, params)
-    _evaluate_one(base, numbers, x, memory, pose, jacobian)
+    if units[base] == 0 or units[kind] == 0:
+        raise ControllerError("the kernel of this haptic map is not compiled; its kind is missing in the units")
+    _call(units[base], (numbers, x, memory, pose, jacobian))
     if kind == EXPRESSIVE:
-        express(params, x, pose, jacobian)
+        _call(units[kind], (params, x, memory, pose, jacobian))
 
 
 @njit
-def evaluate_map(kind: int, params: Array, x: Array, memory: Array, pose: Array) -> None:
+def evaluate_map(units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array) -> None:
     """Pose h(x).
 
     Parameters
     ----------
+    units : IntArray
+        Addresses of compiled kernels by kind, 0 for those that are not compiled.
     kind, params, memory
         Of a `CompiledMap`; the memory is updated.
     x : Array, shape (7,)
         Stylus pose: p_H [m], R_H (quaternion wxyz).
     pose : Array, shape (nq,)
         Written.
+
+    Raises
+    ------
+    ControllerError
+        If the address of a kernel that the map needs is 0.
     """
-    evaluate_map_jacobian(kind, params, x, memory, pose, np.empty((0, 6)))
+    evaluate_map_jacobian(units, kind, params, x, memory, pose, np.empty((0, 6)))

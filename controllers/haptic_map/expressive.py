@@ -16,6 +16,7 @@ EXPRESSIVE = 6
 FADE_FROM = 2.0 * np.pi / 3.0  # angle of the stylus from which its turn fades, to nothing at half a turn [rad]
 _KIND, _JOINTS, _ROWS = range(3)
 _JOINT, _GAIN, _LOW, _HIGH, _ROW = 0, 1, 4, 7, 10
+_NO_MEMORY = np.zeros(0)
 _ROUNDING = 0.02  # of a room: with less than this left it shrinks to nothing without a corner [rad]
 
 
@@ -95,7 +96,7 @@ def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array
 
 
 @njit
-def express(params: Array, x: Array, pose: Array, jacobian: Array) -> None:
+def express(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Turn the joints of a base map's pose, and of its derivative unless that has no rows, as the stylus is turned.
 
     Parameters
@@ -104,6 +105,8 @@ def express(params: Array, x: Array, pose: Array, jacobian: Array) -> None:
         Of an `Expressive`.
     x : Array, shape (7,)
         Stylus pose.
+    memory : Array
+        The base map's; neither read nor written.
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         The base map's; updated.
     """
@@ -197,13 +200,13 @@ class Expressive(HapticMap):
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the base map."""
         pose = self.base.pose(x, memory)
-        express(self._params, np.asarray(x, dtype=np.float64), pose, np.empty((0, STYLUS_TANGENT)))
+        express(self._params, np.asarray(x, dtype=np.float64), _NO_MEMORY, pose, np.empty((0, STYLUS_TANGENT)))
         return pose
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in the base map."""
         pose, jacobian = self.base.pose(x, None if memory is None else memory.copy()), self.base.jacobian(x, memory)
-        express(self._params, np.asarray(x, dtype=np.float64), pose, jacobian)
+        express(self._params, np.asarray(x, dtype=np.float64), _NO_MEMORY, pose, jacobian)
         return jacobian
 
 

@@ -9,6 +9,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.limbs import Limb
+from sim.kernel_units import map_units
 
 R = (0.03, 0.07)
 LOWER, RED, BLUE = (
@@ -59,8 +60,9 @@ def test_the_derivative_agrees_with_differences_on_the_manifold():
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     compiled, x = MAP.compiled(), stylus(0.05, 2.0, 0.01)
     pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-    evaluate_map(compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
+    units = map_units([(compiled.kind, compiled.params)])
+    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
+    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
     np.testing.assert_array_equal(pose, MAP.pose(x))
     np.testing.assert_array_equal(other, pose)
     np.testing.assert_array_equal(jacobian, MAP.jacobian(x))

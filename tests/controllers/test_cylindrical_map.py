@@ -14,6 +14,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAPS
 from controllers.haptic_map.mean import mean_rotation
+from sim.kernel_units import map_units
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]
@@ -163,8 +164,9 @@ def test_it_is_finite_and_of_unit_quaternions_everywhere(p):
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     compiled, x = MOVING.compiled(), stylus(0.05, 2.0, 0.01)
     pose, other, jacobian = np.empty(MOVING.nq), np.empty(MOVING.nq), np.empty((MOVING.nv, 6))
-    evaluate_map(compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
+    units = map_units([(compiled.kind, compiled.params)])
+    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
+    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
     np.testing.assert_array_equal(pose, MOVING.pose(x))
     np.testing.assert_array_equal(other, pose)
     np.testing.assert_array_equal(jacobian, MOVING.jacobian(x))

@@ -12,6 +12,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
+from sim.kernel_units import map_units
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
 BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))
@@ -138,8 +139,9 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     for _ in range(20):
         compiled, x = MAP.compiled(), anywhere(rng)
         pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-        evaluate_map(compiled.kind, compiled.params, x, compiled.memory, pose)
-        evaluate_map_jacobian(compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
+        units = map_units([(compiled.kind, compiled.params)])
+        evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
+        evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
         np.testing.assert_array_equal(pose, MAP.pose(x))
         np.testing.assert_array_equal(other, pose)
         np.testing.assert_array_equal(jacobian, MAP.jacobian(x))

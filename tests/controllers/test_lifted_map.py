@@ -8,6 +8,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.frames import closing_gap
 from controllers.haptic_map.lifted import Lifted
+from sim.kernel_units import map_units
 
 ROWS = 48
 TURN = 2.0 * np.pi
@@ -57,8 +58,9 @@ def test_every_frame_of_every_clip_is_exact_on_its_curve():
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():
     compiled, x = MAP.compiled(), stylus(0.05, 2.0, 0.004)
     pose, other, jacobian = np.empty(MAP.nq), np.empty(MAP.nq), np.empty((MAP.nv, 6))
-    evaluate_map(compiled.kind, compiled.params, x, compiled.memory, pose)
-    evaluate_map_jacobian(compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
+    units = map_units([(compiled.kind, compiled.params)])
+    evaluate_map(units, compiled.kind, compiled.params, x, compiled.memory, pose)
+    evaluate_map_jacobian(units, compiled.kind, compiled.params, x, compiled.memory, other, jacobian)
     np.testing.assert_array_equal(pose, MAP.pose(x))
     np.testing.assert_array_equal(other, pose)
     np.testing.assert_array_equal(jacobian, MAP.jacobian(x))

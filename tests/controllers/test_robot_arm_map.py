@@ -10,6 +10,7 @@ from controllers.haptic_map.robot_arm import RobotArm
 from controllers.rotations import exponential, multiply
 from experiments.robot_arm import HOME, ORIENTATION, SCALE, robot_arm_map
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
+from sim.kernel_units import map_units
 
 MODEL = arm_model()
 MAP = robot_arm_map()
@@ -92,9 +93,10 @@ def test_the_servo_s_dispatch_is_the_same_map():
     x = random_stylus(rng, 0.2, 1.0)
     pose, jacobian = np.empty(7), np.empty((7, 6))
     kind, params, memory = MAP.compiled()
-    evaluate_map(kind, params, x, memory, pose)
+    units = map_units([(kind, params)])
+    evaluate_map(units, kind, params, x, memory, pose)
     np.testing.assert_array_equal(pose, MAP.pose(x))
-    evaluate_map_jacobian(kind, params, x, memory, pose, jacobian)
+    evaluate_map_jacobian(units, kind, params, x, memory, pose, jacobian)
     np.testing.assert_array_equal(jacobian, MAP.jacobian(x))
 
 

@@ -73,7 +73,7 @@ def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name
     poses = clip[rng.integers(len(clip), size=1500)].copy()
     params = figure_map.compiled().params
     for pose, turn in zip(poses, Rotation.random(len(poses), random_state=rng), strict=True):
-        express(params, np.concatenate([np.zeros(3), wxyz(turn)]), pose, np.empty((0, 6)))
+        express(params, np.concatenate([np.zeros(3), wxyz(turn)]), np.zeros(0), pose, np.empty((0, 6)))
     for joint in ("abdomen", "chest", "head"):
         low, high = joint_range()[JOINTS.index(joint)].T
         vectors = rotations(poses, BODIES.index(joint)).as_rotvec()

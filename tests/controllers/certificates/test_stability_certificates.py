@@ -92,7 +92,7 @@ def test_tubes_are_differentiated_as_the_kernels_run_them(kind):
         def feel(p, v, memory, wrench=wrench):
             hand = HandState.at(p, v, 0.0).vector()
             hand[HAND_SWITCH] = float(kind == "hold")
-            stretchy_wrench(program.params, 0, memory, TRACE_SIZE, hand, wrench)
+            stretchy_wrench(program.params, 0, 0, memory, TRACE_SIZE, hand, wrench)
             return wrench[:3].copy()
 
         feel(CIRCLE.point(t), np.zeros(3), memory)

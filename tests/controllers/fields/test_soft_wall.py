@@ -11,6 +11,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
 from experiments.robot_arm import robot_arm_map
 from models.robot_arm.spec import arm_limits, arm_model
+from sim.kernel_units import map_units
 
 FPS, K, MARGIN, DAMPING, SPEED = 30.0, 2.0, 0.1, 0.02, 6.0
 
@@ -164,9 +165,10 @@ def test_far_away_and_on_the_axis_the_force_is_finite():
 def test_the_compiled_sum_with_another_field_is_the_same_to_the_last_bit():
     program = WALL.program() + BRAKE.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
+    units = map_units([MAP.compiled()[:2]])
     for angle in np.linspace(0.0, 6.0, 30):
         hand = HandState.at(place(0.065, angle, 0.02), (0.2, -0.1, 0.05))
-        raise_walls(program.ops, program.params, memory, hand.vector())
+        raise_walls(units, program.ops, program.params, memory, hand.vector())
         evaluate(program.ops, program.params, memory, hand.vector(), wrench)
         np.testing.assert_array_equal(wrench[:3], WALL.wrench(hand).force + BRAKE.wrench(hand).force)
 

@@ -1,0 +1,46 @@
+"""Calls of compiled kernels by their address: what calls one is compiled without it, and whatever it will be.
+
+A kernel is one of several with the same arguments. A call by name would link all of them into the caller; by address
+each is compiled, and kept, by itself. Calling convention and errors are those of any other compiled call.
+"""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+
+def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, ...]], None]:
+    """Call of kernels with given types of arguments, for compiled code: ``call(address, (argument, ...))``.
+
+    Parameters
+    ----------
+    arguments : tuple of numba types
+        Of the kernels, which return nothing.
+
+    Returns
+    -------
+    callable
+        Its address must be that of a kernel compiled for these types and alive; nothing checks it.
+    """
+
+    @intrinsic
+    def call(typingctx: Any, address: Any, given: Any) -> Any:
+        signature = types.void(types.int64, types.Tuple(arguments))
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            convention = context.call_conv
+            kernel = convention.get_function_type(types.void, arguments).as_pointer()
+            status, _ = convention.call_function(
+                builder, builder.inttoptr(values[0], kernel), types.void, arguments,
+                cgutils.unpack_tuple(builder, values[1], len(arguments)),
+            )  # fmt: skip
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return signature, generate
+
+    return cast(Callable[[int, tuple[Any, ...]], None], call)

@@ -1,0 +1,76 @@
+"""Arrays that take long to find, kept in a file under a hash of all that they were found from."""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def kept_array(
+    folder: Path,
+    name: str,
+    made_of: Iterable[npt.NDArray[np.generic]],
+    shape: tuple[int, ...],
+    find: Callable[[], Array],
+) -> Array:
+    """The array in the file of these ingredients, or found now and written there.
+
+    A file that is cut short, changed or not such an array is not believed: it carries a hash of its own contents. One
+    that cannot be written is done without.
+
+    Parameters
+    ----------
+    folder : Path
+        Where files are kept; made when it is missing.
+    name : str
+        Of the kind of array, the first part of the file's name.
+    made_of : iterable of arrays
+        Everything that the result depends on.
+    shape : tuple of int
+        Of the result.
+    find : callable
+        What makes it.
+    """
+    path = folder / f"{name}-{_digest(made_of).hex()}.kept"
+    try:
+        content = path.read_bytes()
+    except OSError:
+        content = b""
+    kept = np.frombuffer(content[_SIZE:]) if len(content) == _SIZE + 8 * int(np.prod(shape)) else None
+    if kept is not None and _digest([kept]) == content[:_SIZE]:
+        return kept.reshape(shape).copy()
+    found = np.ascontiguousarray(find(), dtype=np.float64)
+    with suppress(OSError):
+        _write(path, _digest([found.ravel()]) + found.tobytes())
+    return found
+
+
+_SIZE = hashlib.sha256().digest_size
+
+
+def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(f"{array.dtype} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.digest()
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Whole or not at all, also when two processes write it at once."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(name, path)
+    except OSError:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,89 @@
+"""Units of compiled code: a run compiles what it uses, the next process finds it, and every path gives the same."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ControllerError
+from controllers.fields.follow import Follow
+from controllers.fields.instructions import BUNNY, FOLLOW
+from controllers.fields.program import LAW_KERNELS, evaluate, evaluate_units
+from controllers.haptic_map.evaluate import MAP_KERNELS, evaluate_map, kinds_of
+from controllers.haptic_map.expressive import EXPRESSIVE
+from controllers.haptic_map.robot_arm import ROBOT_ARM
+from controllers.state import HandState
+from experiments.robot_arm import robot_arm_map
+from sim.kernel_units import law_units, map_units
+from sim.reference import poses_along
+
+ARM = robot_arm_map()
+FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
+
+
+def test_only_what_is_used_has_an_address():
+    maps, laws = map_units([ARM.compiled()[:2]]), law_units((FIELD + FIELD).limited(2.0).ops)
+    assert np.flatnonzero(maps).tolist() == [ROBOT_ARM]
+    assert np.flatnonzero(laws).tolist() == [FOLLOW]
+    np.testing.assert_array_equal(map_units([ARM.compiled()[:2]]), maps)
+    assert max(MAP_KERNELS) < len(maps)
+    assert max(LAW_KERNELS) < len(laws)
+
+
+def test_a_map_about_another_one_needs_both():
+    assert kinds_of(ROBOT_ARM, np.zeros(0)) == (ROBOT_ARM,)
+    assert kinds_of(EXPRESSIVE, np.array([ROBOT_ARM, 0.0])) == (EXPRESSIVE, ROBOT_ARM)
+
+
+def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
+    compiled, rng = ARM.compiled(), np.random.default_rng(1)
+    points = np.hstack((rng.uniform(-0.05, 0.05, (20, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))))
+    poses = np.empty((20, ARM.nq))
+    poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
+    np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
+
+
+def test_a_field_by_addresses_is_the_field_by_names_to_the_last_bit():
+    program, units = (FIELD + FIELD).limited(2.0), law_units(FIELD.ops)
+    named, other, wrench, same = program.fresh_memory(), program.fresh_memory(), np.empty(6), np.empty(6)
+    for t in np.linspace(0.0, 4.0, 50):
+        hand = HandState.at((0.05 * np.cos(t), 0.04 * np.sin(t), 0.01), (0.1, 0.0, 0.0), t).vector()
+        evaluate(program.ops, program.params, named, hand, wrench)
+        evaluate_units(units, program.ops, program.params, other, hand, same)
+        np.testing.assert_array_equal(same, wrench)
+        np.testing.assert_array_equal(other, named)
+
+
+def test_what_is_not_compiled_is_an_error_and_no_crash():
+    kind, params, memory = ARM.compiled()
+    with pytest.raises(ControllerError, match="map is not compiled"):
+        evaluate_map(np.zeros(8, dtype=np.int64), kind, params, np.zeros(7), memory, np.empty(ARM.nq))
+    units, hand = law_units(FIELD.ops), HandState.at((0.0, 0.0, 0.0)).vector()
+    ops = FIELD.ops.copy()
+    ops[0, 0] = BUNNY
+    with pytest.raises(ControllerError, match="law is not compiled"):
+        evaluate_units(units, ops, FIELD.params, FIELD.fresh_memory(), hand, np.empty(6))
+
+
+_PROCESS = """
+import numpy as np
+from controllers.haptic_map.robot_arm import ROBOT_ARM
+from sim import kernel_units
+kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
+(unit,) = kernel_units._alive
+print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()))
+"""
+
+
+def test_the_next_process_finds_a_unit_compiled(tmp_path):
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", _PROCESS], env=os.environ | {"HVF_CACHE_DIR": str(tmp_path)}, check=True,
+            capture_output=True, text=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]  # fmt: skip
+    assert told == [["0", "1"], ["1", "0"]]
