@@ -35,7 +35,7 @@ from sim.devices.phantom_port import phantom_port
 from sim.figure import Figure
 from sim.kernel_units import law_units
 from sim.plant import make_hand, make_plant
-from sim.reference import make_reference, poses_along
+from sim.reference import begin_in_motion, make_reference, poses_along
 from sim.servo import Field as CompiledField
 from sim.servo import Servo
 from sim.world import World, phantom_angles
@@ -132,8 +132,14 @@ def wire(
     tank = energy_tank(config, curve, limiter, grabs, urged)
     port = phantom_port(world.model, world.data, period, config.cutoff)
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
+    orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
+    # A walk at full speed cannot begin from rest.
+    if isinstance(blended, Lifted) and config.mode not in STRETCHING:
+        v_H = curve.velocity(curve.start)
+        velocity = haptic_map.jacobian(argument[0])[:, :3] @ v_H
+        begin_in_motion(reference, np.array([start, v_H, curve.acceleration(curve.start)]))
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
-    world.reset(start, poses[0], UPRIGHT if config.expressive or user.turns else None)
+    world.reset(start, poses[0], orientation, v_H, velocity)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
     servo = Servo(
         plant=make_plant(world),

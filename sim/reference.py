@@ -208,6 +208,11 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
         poses[i] = reference.pose
 
 
+def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
+    """Let a reference begin with the stylus in motion: position, velocity and acceleration in H, shape (3, 3)."""
+    reference.started[0], reference.hand[:] = 1.0, motion
+
+
 def make_reference(
     figure_model: mujoco.MjModel,
     compiled: CompiledMap,

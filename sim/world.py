@@ -6,8 +6,15 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from models.humanoid.skeleton import N_POSE, figure_model
-from models.phantom.kinematics import Quat, gimbal_angles, inverse_kinematics, vector_to_device_frame, within_limits
+from models.humanoid.skeleton import N_POSE, N_TANGENT, figure_model
+from models.phantom.kinematics import (
+    Quat,
+    gimbal_angles,
+    inverse_kinematics,
+    jacobian,
+    vector_to_device_frame,
+    within_limits,
+)
 from models.scene import FIGURE, PHANTOM, SceneConfig, world_model
 from sim.errors import SimError
 
@@ -40,8 +47,15 @@ class World:
         object.__setattr__(self, "data", mujoco.MjData(model))
         object.__setattr__(self, "figure", figure_model(self.config.stature, self.config.mass))
 
-    def reset(self, p_H: Array, pose: Array, q_HS: Quat | None = None) -> None:
-        """Put the stylus at a point and the figure in a pose, both at rest.
+    def reset(
+        self,
+        p_H: Array,
+        pose: Array,
+        q_HS: Quat | None = None,
+        v_H: Array | None = None,
+        velocity: Array | None = None,
+    ) -> None:
+        """Put the stylus at a point and the figure in a pose, at rest or in motion.
 
         Parameters
         ----------
@@ -51,15 +65,22 @@ class World:
             The figure's pose, shape (75,).
         q_HS : Quat, optional
             Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
+        v_H : Array, optional
+            Velocity of the stylus tip [m/s], shape (3,); by default it rests.
+        velocity : Array, optional
+            The figure's velocity, shape (57,); by default it rests.
 
         Raises
         ------
         SimError
             If the Phantom cannot reach the point.
         """
-        place_stylus(self.model, self.data, p_H, q_HS)
-        root = int(self.model.joint(FIGURE + "root").qposadr[0])
-        self.data.qpos[root : root + N_POSE] = pose
+        place_stylus(self.model, self.data, p_H, q_HS, v_H)
+        root = self.model.joint(FIGURE + "root")
+        pose_at, velocity_at = int(root.qposadr[0]), int(root.dofadr[0])
+        self.data.qpos[pose_at : pose_at + N_POSE] = pose
+        if velocity is not None:
+            self.data.qvel[velocity_at : velocity_at + N_TANGENT] = velocity
         mujoco.mj_forward(self.model, self.data)
 
     @property
@@ -75,10 +96,13 @@ class World:
         return {name: count for name, count in zip(names, counts, strict=False) if count}
 
 
-def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Quat | None = None) -> None:
+def place_stylus(
+    model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Quat | None = None, v_H: Array | None = None
+) -> None:
     """Reset a world that holds the Phantom, with the stylus tip at a point of the hand frame [m], shape (3,).
 
-    The stylus is turned to an orientation (wxyz); by default its gimbal joints are at zero.
+    The stylus is turned to an orientation (wxyz); by default its gimbal joints are at zero. It rests, or moves with a
+    velocity in the hand frame [m/s], shape (3,).
 
     Raises
     ------
@@ -88,17 +112,21 @@ def place_stylus(model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Q
     mujoco.mj_resetData(model, data)
     theta = phantom_angles(p_H)
     gimbal = (0.0, 0.0, 0.0) if q_HS is None else gimbal_angles.py_func(theta, q_HS)
-    for name, angle in (
-        ("theta1", theta[0]),
-        ("theta2", theta[1]),
-        ("theta3", theta[2]),
-        ("elbow", theta[2] - theta[1]),
-        ("twin", theta[1] - theta[2]),
-        ("gimbal1", gimbal[0]),
-        ("gimbal2", gimbal[1]),
-        ("gimbal3", gimbal[2]),
+    rates = (0.0, 0.0, 0.0)
+    if v_H is not None:
+        rates = np.linalg.solve(jacobian.py_func(theta), vector_to_device_frame.py_func(tuple(v_H)))
+    for name, angle, rate in (
+        ("theta1", theta[0], rates[0]),
+        ("theta2", theta[1], rates[1]),
+        ("theta3", theta[2], rates[2]),
+        ("elbow", theta[2] - theta[1], rates[2] - rates[1]),
+        ("twin", theta[1] - theta[2], rates[1] - rates[2]),
+        ("gimbal1", gimbal[0], 0.0),
+        ("gimbal2", gimbal[1], 0.0),
+        ("gimbal3", gimbal[2], 0.0),
     ):
-        data.qpos[model.joint(PHANTOM + name).qposadr[0]] = angle
+        joint = model.joint(PHANTOM + name)
+        data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = angle, rate
 
 
 def phantom_angles(p_H: Array) -> tuple[float, float, float]:

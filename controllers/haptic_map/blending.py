@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.haptic_map.alignment import aligned_channels
-from controllers.haptic_map.combination import combine_corrected, figure_channels, figure_size, packed_figure
+from controllers.haptic_map.combination import combine, figure_channels, figure_size, packed_figure
 from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import Loop
@@ -58,14 +58,14 @@ def blend_corrected(
     params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
     pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
-    """`blend`, with a correction as `combine_corrected` takes it."""
+    """`blend`, with a correction as `combine` takes it."""
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
     figure = params[_DRIFTS + 3 * clips :]
     channels = figure_channels(figure)
     value, slope = np.empty((clips, channels)), np.empty((clips, channels))
     _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
-    combine_corrected(figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, pose, jacobian)
+    combine(figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, pose, jacobian)
 
 
 def _closing_signs(channels: Array, rotations: int) -> Array:

@@ -88,7 +88,7 @@ def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
 @njit
 def combine(
     figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
-    chain: Array, memory: Array, pose: Array, jacobian: Array,
+    correction: Array, chain: Array, memory: Array, pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
     """Mean of poses, and its derivative unless `jacobian` has no rows.
 
@@ -106,6 +106,8 @@ def combine(
         Of sum 1; group 0 is the root's. Slightly negative ones are taken (see `mean`).
     changes : Array, shape (groups, 3, clips)
         Their derivatives by θ and two other parameters.
+    correction : Array, shape (4, 2 + 4 limbs)
+        By which root and ends are moved (see `inbetween`), and its derivatives by the three; (4, 0) for none.
     chain : Array, shape (3, 6)
         Derivatives of the three by the stylus.
     memory : Array
@@ -113,17 +115,6 @@ def combine(
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
-    combine_corrected(
-        figure, value, slope, drifts, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian
-    )
-
-
-@njit
-def combine_corrected(
-    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
-    correction: Array, chain: Array, memory: Array, pose: Array, jacobian: Array,
-) -> None:  # fmt: skip
-    """`combine`, with root and ends moved by a correction (see `inbetween`), shape (4, 2 + 4 limbs), or (4, 0)."""
     clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]

@@ -24,6 +24,7 @@ from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
+from controllers.haptic_map.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.haptic_map.saturation import clamped
 from controllers.haptic_map.sites import box, checked_sites
 from controllers.haptic_map.splines import basis, basis_slope, control_points, round_lap
@@ -32,7 +33,11 @@ from controllers.state import Array, IntArray
 LIFTED = 3
 
 _LAGS = 128  # samples of λ round the lap
-_R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _FIGURE = range(11)
+_ROWS = 256  # of the corrections' table round the lap, at most
+_PAIR_STEPS = 24  # of the lap, at which clips are looked for that are neighbours
+_R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT, _FIGURE = (
+    range(12)
+)
 
 
 @njit
@@ -82,7 +87,11 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
         for k in range(3):
             drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
     _lags(params[int(params[_LAG_AT]) :], int(figure[1]), angle, channels, value, slope)
-    combine(figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], chain, memory, pose, jacobian)
+    pairs = params[int(params[_PAIRS_AT]) :]
+    d = np.empty((4, pair_channels(pairs)))
+    if d.shape[1] > 0:
+        pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
+    combine(figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory, pose, jacobian)
 
 
 class Lifted(ClipMap):
@@ -97,6 +106,9 @@ class Lifted(ClipMap):
     up to the displacement over the ground by which it was moved to the origin (`placed`). What is blended, how, and
     the lap's frame A are told in `combination`; a closed clip whose angles begin at θ₀ > 0 has its frames beyond 2π
     in the next lap.
+
+    With limbs, in-betweens of neighbours are corrected (`pair_corrections`): feet move one at a time, while they are
+    lifted.
 
     h is C² but on the axis r = 0, where the phase is not defined. Beyond the box round all sites r and z are clamped
     to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
@@ -256,9 +268,25 @@ class Lifted(ClipMap):
             drifts.ravel(),
             packed_frames(splines),
             packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
+            self._packed_pairs(packed_frames(splines), channels[0].shape[1], lags, limbs),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
         return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self._placed), *at], *blocks])
+
+    def _packed_pairs(self, frames: Array, size: int, lags: Array, limbs: Sequence[Limb]) -> Array:
+        rows = int(np.clip(max(len(clip.poses) for clip in self._placed), 64, _ROWS)) if limbs else 1
+        phases = np.arange(rows) * 2.0 * np.pi / rows
+        channels, last = np.empty((rows, len(self._placed), size)), size - END * len(limbs)
+        for i in range(len(self._placed)):
+            for phase, value in zip(phases, channels[:, i], strict=True):
+                interpolate_frames(frames, i, phase, value, np.empty_like(value))
+        rotations = channels[..., 3:last].reshape(rows, len(self._placed), -1, 4)
+        rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+        channels[..., 3:last] = rotations.reshape(rows, len(self._placed), -1)
+        for n in range(len(limbs)):
+            channels[..., last + END * n + 3] = round_lap(lags[:, n], phases)[:, None]
+        steps = round_lap(self.sites, np.arange(_PAIR_STEPS) * 2.0 * np.pi / _PAIR_STEPS)
+        return packed_pairs(channels, self._drifts, limbs, neighbouring_pairs(steps))
 
     def _common_lags(self, rotations: int, limbs: Sequence[Limb]) -> Array:
         """λ of each limb at equal steps of the lap, shape (_LAGS, limbs), from all clips."""

@@ -16,11 +16,13 @@ from experiments.cli import main
 from experiments.config import RunConfig
 from experiments.field_files import save_field
 from experiments.figure_maps import figure_legs
-from experiments.map_files import load_figure_map, load_map, save_map
+from experiments.map_files import load_figure_map, load_map, map_digest, save_map
+from experiments.run import RECORDING, config_dict
 from experiments.wiring import wire
 from models.mocap.library import embedded
 from models.scene import SceneConfig
 from sim.errors import SimError
+from sim.recorder import Group, Recorder
 from sim.world import World
 
 NAMES = ("walk", "angry", "jump")
@@ -159,3 +161,23 @@ def test_a_maps_file_is_certified_along_all_its_curves_and_with_its_clips(tmp_pa
     assert main([*command, "--curve", "a/b", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: curve;" in capsys.readouterr().err
     assert main([*command, "--curve", "hop"]) == 2
+
+
+def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_path, capsys):
+    path, folder = tmp_path / "map.npz", tmp_path / "run"
+    folder.mkdir()
+    save_map(lifted(), path)
+    config = RunConfig(map=str(path), seconds=1.0)
+    static = wire(config, ()).static()
+    groups = {"ticks": Group(1000.0, {"t": ()}), "frames": Group(100.0, {"t": ()})}
+    with Recorder(folder / RECORDING, config_dict(config), 1, groups, static) as recorder:
+        recorder.append("ticks", {"t": np.zeros(1)})
+    save_map(swaying(), path)
+    assert main(["reproduce", str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert f"{path}: the map has changed since the run was recorded" in told
+    assert map_digest(path)[:12] in told
+    assert str(static["map_sha256"])[:12] in told
+    path.unlink()
+    assert main(["reproduce", str(folder)]) == 2
+    assert "No such file" in capsys.readouterr().err
