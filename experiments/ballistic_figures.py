@@ -1,6 +1,13 @@
-"""Drawings of flights: a clip against free fall, and what the physical figure makes of it at many rates."""
+"""Drawings of flights: a clip against free fall, and what the physical figure makes of it at many rates.
 
+``python -m experiments.ballistic_figures docs ../shared/mocap`` flies the embedded jump and backflip and two captured
+jumps, draws the picture of the docs and prints its table.
+"""
+
+import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +15,8 @@ from matplotlib.figure import Figure
 
 from controllers.certificates.ballistic import FlightJudgement
 from controllers.certificates.flight_fit import GRAVITY, best_fall
-from experiments.ballistics import ClipBallistics, fly
+from experiments.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
+from models.mocap.library import embedded, load_clip
 
 _COLORS = {"certified": "#2a7f4f", "refuted": "#c2473b", "unknown": "#b98a1d"}
 _RATES = 13  # flown by the physical figure
@@ -38,19 +46,60 @@ def flights_figure(ballistics: ClipBallistics) -> Figure:
     return drawing
 
 
-def rates_figure(cases: Sequence[tuple[str, ClipBallistics]]) -> Figure:
+class FlownClip(NamedTuple):
+    """The longest flight of a clip, flown by the physical figure at many rates.
+
+    Attributes
+    ----------
+    name : str
+        Of the clip.
+    ballistics : ClipBallistics
+        What is certified.
+    flight : FlightJudgement
+        The flight.
+    trials : list of FlightTrial
+        One for every rate.
+    """
+
+    name: str
+    ballistics: ClipBallistics
+    flight: FlightJudgement
+    trials: list[FlightTrial]
+
+
+def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
+    """Fly the longest flight of a clip at rates inside and outside of those at which it can be done."""
+    flight = max(ballistics.flights, key=lambda flight: flight.fit.duration)
+    low, high = flight.done or flight.seen
+    rates = np.geomspace(0.8 * low, 1.25 * min(high, 2.0), _RATES)
+    return FlownClip(name, ballistics, flight, [fly(ballistics.clip, flight.fit, float(rate)) for rate in rates])
+
+
+def rates_table(cases: Sequence[FlownClip]) -> str:
+    """Distance of the centres of mass over σ as Markdown: a row a clip and rate, found and predicted."""
+    lines = ["| clip | σ | can be done | strays [cm] | predicted [cm] |", "|---|---|---|---|---|"]
+    for case in cases:
+        low, high = case.flight.done or (np.inf, 0.0)
+        for trial in case.trials:
+            said = "yes" if low <= trial.rate <= high else "no"
+            row = f"{trial.rate:.2f} | {said} | {100 * trial.distance:.1f} | {100 * trial.predicted:.1f}"
+            lines.append(f"| {case.name} | {row} |")
+    return "\n".join(lines)
+
+
+def rates_figure(cases: Sequence[FlownClip]) -> Figure:
     """How far the physical figure strays from the longest flight of each clip, over the rate at which it is played."""
     drawing = Figure(figsize=(3.6 * len(cases), 3.2), layout="constrained")
-    for ax, (name, ballistics) in zip(drawing.subplots(1, len(cases), squeeze=False)[0], cases, strict=True):
-        _draw_rates(ax, name, ballistics, max(ballistics.flights, key=lambda flight: flight.fit.duration))
+    for ax, case in zip(drawing.subplots(1, len(cases), squeeze=False)[0], cases, strict=True):
+        _draw_rates(ax, *case)
     return drawing
 
 
-def _draw_rates(ax: Axes, name: str, ballistics: ClipBallistics, flight: FlightJudgement) -> None:
+def _draw_rates(
+    ax: Axes, name: str, ballistics: ClipBallistics, flight: FlightJudgement, trials: list[FlightTrial]
+) -> None:
     low, high = flight.done or flight.seen
-    high = min(high, 2.0)
-    rates = np.geomspace(0.8 * low, 1.25 * high, _RATES)
-    trials = [fly(ballistics.clip, flight.fit, float(rate)) for rate in rates]
+    rates = [trial.rate for trial in trials]
     com = ballistics.motion.com[flight.fit.start : flight.fit.end + 1]
     many = np.geomspace(rates[0], rates[-1], 100)
     predicted = [100 * best_fall(com, ballistics.motion.fps, float(rate))[0] for rate in many]
@@ -58,7 +107,7 @@ def _draw_rates(ax: Axes, name: str, ballistics: ClipBallistics, flight: FlightJ
     ax.plot(rates, [100 * trial.distance for trial in trials], "o", ms=4, color="#c2473b", label="physical figure")
     ax.axhline(5.0, color="#566072", lw=0.8, ls="--")
     if flight.done is not None:
-        ax.axvspan(low, high, color="#dbe7f4", lw=0, label="can be done")
+        ax.axvspan(low, min(high, 2.0), color="#dbe7f4", lw=0, label="can be done")
     ax.axvspan(*flight.seen, color="#e4f1e6", lw=0, label="seen as natural")
     ax.set(title=name, xlabel="rate σ", xlim=(rates[0], rates[-1]))
     ax.set_ylabel("distance of centres of mass [cm]")
@@ -70,3 +119,19 @@ def _once(ax: Axes) -> tuple[list[object], list[str]]:
     handles, labels = ax.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))
     return list(named.values()), list(named)
+
+
+def main(folder: Path, mocap: Path) -> None:
+    """Draw the picture of the docs into a folder, and print its table; `mocap` holds the captured jumps."""
+    clips = {
+        "jump (embedded)": embedded("jump"),
+        "backflip (embedded)": embedded("backflip"),
+        **{f"CMU {name}": load_clip(mocap / "cmu_amc" / f"{name}.amc") for name in ("02_04", "16_09")},
+    }
+    cases = [flown(name, clip_ballistics(clip)) for name, clip in clips.items()]
+    rates_figure(cases).savefig(folder / "ballistics.png", dpi=110)
+    print(rates_table(cases))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

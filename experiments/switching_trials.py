@@ -38,7 +38,7 @@ Array = npt.NDArray[np.float64]
 
 SUBSTEPS = 8
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] that are tried on every crossing, to 4 N
-NONE, NEVER = 0.05, 5.7  # [N] where the picture has what is not certified, and who is never lost
+NONE, NEVER = 0.025, 5.7  # [N] where the picture has what is not certified, and who is never lost
 
 
 def simulated_course(
