@@ -44,6 +44,15 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     return led, Gait(led.stride, led.stride / led.duration, np.roll(support, -first), led.reach)
 
 
+def gait_remark(name: str, gait: Gait) -> tuple[str, ...]:
+    """What is said of a clip that flies: a body in the air falls with g, at whatever pace it is led."""
+    if gait.support.all():
+        return ()
+    return (
+        f"the clip {name!r} flies: the animation can be led at any pace, the physical figure may fall where it is slow",
+    )
+
+
 def _middle_of_longest(mask: npt.NDArray[np.bool_]) -> int:
     """Middle of the longest run of a mask that goes round."""
     n = len(mask)

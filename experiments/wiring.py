@@ -21,8 +21,8 @@ from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
 from experiments.hands import UPRIGHT, stylus_path, user_arm
+from experiments.lead import gait_remark, leading_hand, led_map, s_curve, walker_argument
 from experiments.lead import law as lead_law
-from experiments.lead import leading_hand, led_map, s_curve, walker_argument
 from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.session import Session
@@ -91,6 +91,7 @@ def wire(
     if leading:
         blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
         led = lead_law(config, gait)
+        remarks += gait_remark(only(clips).name, gait)
     elif config.map.endswith(MAP_SUFFIX):
         blended, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)

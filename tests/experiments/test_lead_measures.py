@@ -9,7 +9,7 @@ from experiments.cli import main
 from experiments.clips import load_clips
 from experiments.config import RunConfig
 from experiments.figure_maps import figure_legs
-from experiments.lead import law, leading_hand, led_map, s_curve, walker_argument
+from experiments.lead import gait_remark, law, leading_hand, led_map, s_curve, walker_argument
 from experiments.lead_measures import LeadSummary, _Retrace, _Soles, support_at
 from experiments.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
@@ -81,6 +81,12 @@ def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int
     field = law(RunConfig(mode="lead"), gait)
     assert support_at(field, np.array([0.0]))[0] == most
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
+
+
+def test_who_leads_a_clip_that_flies_is_told_so() -> None:
+    legs = figure_legs(figure_model())
+    assert gait_remark("walk", led_map(embedded("walk"), legs, 0)[1]) == ()
+    assert "flies" in gait_remark("run", led_map(embedded("run"), legs, 0)[1])[0]
 
 
 def test_the_lines_tell_it() -> None:
