@@ -10,7 +10,6 @@ the cart-table model (Kajita et al. 2003), which for a lap is solved harmonic by
 What the clips themselves are out of balance is left to their blends: a clip alone does not sway.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,9 +44,7 @@ class _Laps(NamedTuple):
     height: float
 
 
-def balanced(
-    haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float, ready: Callable[[], None] = lambda: None
-) -> Cylindrical:
+def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
     """The same map with a root that sways between the clips; what was found once is kept beside the compiled code.
 
     Parameters
@@ -58,20 +55,15 @@ def balanced(
         Whose poses they are, alone.
     lap : float
         Time of a lap [s].
-    ready : callable
-        Called before compiled code is needed.
     """
-
-    def find() -> Array:
-        ready()
-        return _sway(haptic_map, figure, lap)
-
     shape = (_ROWS, len(haptic_map.mixtures), 2)
     model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
     mujoco.mj_saveModel(figure, None, model)
     code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
     made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]), code)
-    return haptic_map.with_sway(kept_array(CACHE_FOLDER, "sway", made_of, shape, find))
+    return haptic_map.with_sway(
+        kept_array(CACHE_FOLDER, "sway", made_of, shape, lambda: _sway(haptic_map, figure, lap))
+    )
 
 
 def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:

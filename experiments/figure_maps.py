@@ -1,7 +1,5 @@
 """Haptic maps of the figure that a run makes from its clips, by name."""
 
-from collections.abc import Callable
-
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +11,6 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
-from experiments.balance import balanced
-from experiments.compiling import compiled_parts
 from experiments.config import RunConfig
 from experiments.modes import default_rivers
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
@@ -30,9 +26,8 @@ def clip_map(
     clips: tuple[Clip, ...],
     curve: Trajectory,
     figure: mujoco.MjModel,
-    ready: Callable[[tuple[str, ...]], None] = lambda parts: None,
 ) -> ClipMap:
-    """Haptic map that a configuration names, of these clips about a curve; `ready` as in `experiments.wiring.wire`.
+    """Haptic map that a configuration names, of these clips about a curve.
 
     Raises
     ------
@@ -49,8 +44,7 @@ def clip_map(
     legs = figure_legs(figure)
     if config.map == "cylindrical":
         corners = [motions[i % len(motions)] for i in range(4)]
-        blended = Cylindrical(corners, radii, (-config.reach, config.reach), legs)
-        return balanced(blended, figure, config.lap, lambda: ready(compiled_parts("figure", blended.compiled())))
+        return Cylindrical(corners, radii, (-config.reach, config.reach), legs)
     if config.map == "rivers":
         if config.mode != "rivers" or config.crossing == "sum":
             raise ParameterError(

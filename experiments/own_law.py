@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from controllers.energy_tank import EnergyTank
 from controllers.fields.instructions import Program
 from experiments.clips import load_clips
@@ -39,9 +37,7 @@ def loop_with(
     """
     clips, remarks = load_clips(config.clips)
     session = wire(config, clips, remarks)
-    field = session.servo.field._replace(
-        ops=program.ops, params=program.params, memory=program.fresh_memory(), wrench=np.zeros(6)
-    )
+    field = session.servo.field.of(program)
     if tank is not None:
         field = field._replace(budget=tank.params(), tank=tank.fresh_memory())
     session = replace(session, servo=session.servo._replace(field=field))

@@ -126,7 +126,7 @@ class Bench:
         plant = session.servo.plant
         root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
         session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
-        field = session.servo.field._replace(ops=program.ops, params=program.params, memory=program.fresh_memory())
+        field = session.servo.field.of(program)
         servo = session.servo._replace(field=field, hand=make_hand(Arm(400.0, 10.0, way, STEP)))
         blocks: list[tuple[Array, ...]] = []
 

@@ -2,17 +2,24 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.energy_tank import EnergyTank
 from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, PATH
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.instructions import TRACE_SIZE, Program
+from controllers.fields.leading import ARGUMENT, PATH, Leading
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import CompiledMap, HapticMap
+from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.led import Led
 from controllers.haptic_map.lifted import Lifted
 from controllers.safety import ForceLimiter
+from experiments.balance import balanced
 from experiments.budget import energy_tank
 from experiments.clips import only
 from experiments.compiling import compiled_parts
@@ -25,19 +32,21 @@ from experiments.lead import gait_remark, leading_hand, led_map, s_curve, walker
 from experiments.lead import law as lead_law
 from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
+from experiments.modes import Field
 from experiments.session import Session
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
 from experiments.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
-from sim.devices.phantom_port import phantom_port
+from sim.devices.phantom_port import PhantomPort, phantom_port
 from sim.figure import Figure
 from sim.kernel_units import law_units
 from sim.plant import make_hand, make_plant
-from sim.reference import begin_in_motion, make_reference, poses_along
+from sim.reference import begin_in_motion, check_reference, make_reference, poses_along
 from sim.servo import Field as CompiledField
 from sim.servo import Servo
+from sim.users.arm import Arm
 from sim.world import World, phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -99,39 +108,26 @@ def wire(
             curve = lifted_curve(blended, config.curve)
             rivers = lifted_rivers(blended, config) if config.mode == "rivers" else None
     else:
-        blended = clip_map(config, clips, curve, world.figure, ready)
+        blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
-    haptic_map = expressive_figure(blended) if config.expressive and not isinstance(blended, Led) else blended
-    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
-    urged = 0.0
-    if led is not None:
-        field = led
-    elif config.mode in STRETCHING:
-        field = stretch_law(config, curve, grabs)
-    else:
-        assert not isinstance(blended, Led)
-        field, urged = governed_law(config, curve, blended, rivers)
-    program = field.program() if leading else oriented(field.program(), config, curve)
-    if config.walls:
-        walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
-        program = program + walls.program()
-    memory, period = program.fresh_memory(), config.scene.servo_period
-    compiled = haptic_map.compiled()
+    parts = _assemble(config, curve, blended, rivers, led, world)
+    ready(compiled_parts("figure", parts.compiled, parts.program.ops))
+    if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
+        # Its sway is found with compiled code, when everything has been checked.
+        blended = balanced(blended, world.figure, config.lap)
+        parts = _assemble(config, curve, blended, rivers, led, world)
+    haptic_map, field, program, compiled, user, limiter, tank, port = parts
+    memory = program.fresh_memory()
     if leading:
         # The path that the figure is on is the one that the field lays.
         compiled = compiled._replace(memory=memory)
-    ready(compiled_parts("figure", compiled, program.ops))
-    reference = make_reference(
-        world.figure, compiled, period * config.figure_ticks, config.smoothing, config.blend, packed_legs(world.figure)
-    )
+    period = config.scene.servo_period * config.figure_ticks
+    legs = packed_legs(world.figure)
+    reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs)
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     poses = np.empty((1, haptic_map.nq))
     argument = walker_argument(np.zeros(1)) if leading else stylus_path(start[None])
-    user = user_arm(config, curve, grabs) if led is None else leading_hand(led)
-    limiter = ForceLimiter(period)
-    tank = energy_tank(config, curve, limiter, grabs, urged)
-    port = phantom_port(world.model, world.data, period, config.cutoff)
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
     # A walk at full speed cannot begin from rest.
@@ -159,6 +155,51 @@ def wire(
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)
     return Session(config, clips, remarks, curve, field, blended, haptic_map, world, figure, servo)
+
+
+class _Parts(NamedTuple):
+    """What a run is made of, apart from its world."""
+
+    haptic_map: HapticMap
+    field: Field
+    program: Program
+    compiled: CompiledMap
+    user: Arm
+    limiter: ForceLimiter
+    tank: EnergyTank
+    port: PhantomPort
+
+
+def _assemble(
+    config: RunConfig,
+    curve: Trajectory,
+    blended: ClipMap | Led,
+    rivers: RiverBundle | None,
+    led: Leading | None,
+    world: World,
+) -> _Parts:
+    """Make the parts of a run and check all its numbers, without a call of what would have to be compiled."""
+    haptic_map = blended if isinstance(blended, Led) or not config.expressive else expressive_figure(blended)
+    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
+    urged = 0.0
+    if led is not None:
+        field = led
+    elif config.mode in STRETCHING:
+        field = stretch_law(config, curve, grabs)
+    else:
+        assert not isinstance(blended, Led)
+        field, urged = governed_law(config, curve, blended, rivers)
+    program = field.program() if led is not None else oriented(field.program(), config, curve)
+    if config.walls:
+        walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
+        program = program + walls.program()
+    compiled, period = haptic_map.compiled(), config.scene.servo_period
+    check_reference(period * config.figure_ticks, config.smoothing, config.blend)
+    user = user_arm(config, curve, grabs) if led is None else leading_hand(led)
+    limiter = ForceLimiter(period)
+    tank = energy_tank(config, curve, limiter, grabs, urged)
+    port = phantom_port(world.model, world.data, period, config.cutoff)
+    return _Parts(haptic_map, field, program, compiled, user, limiter, tank, port)
 
 
 def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:

@@ -213,6 +213,20 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
     reference.started[0], reference.hand[:] = 1.0, motion
 
 
+def check_reference(period: float, bandwidth: float, blend: float) -> None:
+    """Refuse numbers that `make_reference` could not take.
+
+    Raises
+    ------
+    SimError
+        If the bandwidth is not positive, or too high for the period; or the blend time negative or not finite.
+    """
+    if not 0.0 < bandwidth < 0.5 / period:
+        raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
+    if not 0.0 <= blend < math.inf:
+        raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
+
+
 def make_reference(
     figure_model: mujoco.MjModel,
     compiled: CompiledMap,
@@ -241,12 +255,9 @@ def make_reference(
     Raises
     ------
     SimError
-        If the bandwidth is not positive, or too high for the period; or the blend time negative or not finite.
+        As `check_reference`.
     """
-    if not 0.0 < bandwidth < 0.5 / period:
-        raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
-    if not 0.0 <= blend < math.inf:
-        raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
+    check_reference(period, bandwidth, blend)
     kind, params, memory = compiled
     legs = np.zeros((0, 18)) if limbs is None else limbs
     nq, nv = figure_model.nq, figure_model.nv

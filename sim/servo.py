@@ -21,7 +21,7 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.energy_tank import TANK_ENERGY, guard_energy
-from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.instructions import TRACE_SIZE, Program
 from controllers.fields.program import evaluate_units
 from controllers.fields.soft_wall import raise_walls
 from controllers.safety import limit_force
@@ -29,6 +29,7 @@ from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from sim.body import BodyState, drive
 from sim.compiled import entry_point
 from sim.devices.phantom_port import PhantomPort, actuate, has_sensed, sense
+from sim.kernel_units import law_units
 from sim.plant import Hand, Plant, advance
 from sim.reference import CompiledReference, update_reference
 
@@ -52,6 +53,12 @@ class Field(NamedTuple):
     tank: Array
     wrench: Array
     force: Array
+
+    def of(self, program: Program) -> "Field":
+        """The same limits and budget about another program, with a fresh memory."""
+        return self._replace(
+            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory()
+        )
 
 
 class Servo(NamedTuple):

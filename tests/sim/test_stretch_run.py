@@ -40,7 +40,7 @@ def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
     field = law(FLAGS, session.curve, grabs)
     program, channels = field.program(), {"p": [], "switch": [], "distance": [], "force": []}
     shown: list[np.ndarray] = []
-    compiled = session.servo.field._replace(ops=program.ops, params=program.params, memory=program.fresh_memory())
+    compiled = session.servo.field.of(program)
     servo = session.servo._replace(field=compiled, hand=make_hand(Arm(grabs=grabs)))
 
     def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
