@@ -27,6 +27,7 @@ FORCE = 3.0  # [N] that the law asks for at most at the start: the motors give i
 LAP_SECONDS = 4.0  # of the rivers; the hands are let go where the curve stands still
 LEFT = 0.2  # share of the slowest mode that is left at the end of a simulation, unless that takes too long
 LONGEST = 2000  # ticks
+COUNTS = 5e-5  # [m] by which readings of a hand at rest change: a count or two
 ASSUMED = Conditions(16)
 EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 
@@ -43,16 +44,17 @@ class Certified(NamedTuple):
 class Let(NamedTuple):
     """A hand that was let go: its largest distance from the curve in the first nine tenths of the time, and after [m].
 
-    Both are infinite if it went 5 cm away.
+    Both are infinite if it went 5 cm away. Where encoders round, a hand that friction holds moves by `slack` [m].
     """
 
     before: float
     after: float
+    slack: float
 
     @property
     def diverges(self) -> bool:
         """Whether it ends farther from the curve than it ever was."""
-        return not self.after < self.before
+        return not self.after < self.before + self.slack
 
 
 def draw_certified(rng: np.random.Generator) -> Certified:
@@ -93,9 +95,10 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
     ticks = int(np.clip(np.log(LEFT) / np.log(drawn.radius), 200, LONGEST)) if drawn.radius < 1.0 else LONGEST
     path = hand_path(trial, river.k_r, ticks, conditions, state)
     if len(path) < ticks:
-        return Let(np.inf, np.inf)
+        return Let(np.inf, np.inf, 0.0)
     distance = closest_phases(drawn.still.packed(), path)[1]
-    return Let(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()))
+    slack = COUNTS if conditions.rounded else 0.0
+    return Let(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
 
 
 def certified_trials(
