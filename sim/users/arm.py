@@ -151,12 +151,15 @@ class CompiledArm(NamedTuple):
     turns: Array
 
 
-@njit
+@njit(inline="always")  # at each physics step a call would count references to every array
 def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> None:
     """Set the force of the hand on the stylus, in H: arm impedance plus pushes and grabs; and the switch."""
-    arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
-    push_force(arm.pushes, arm.begun, t, p, force)
-    arm.switch[0] = grab_force(arm.stiffness, arm.damping, arm.grabs, arm.held, t, p, v, force)
+    if arm.path.shape[0] + arm.pushes.shape[0] + arm.grabs.shape[0] == 0:
+        force[0], force[1], force[2] = 0.0, 0.0, 0.0
+    else:
+        arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
+        push_force(arm.pushes, arm.begun, t, p, force)
+        arm.switch[0] = grab_force(arm.stiffness, arm.damping, arm.grabs, arm.held, t, p, v, force)
 
 
 @dataclass(frozen=True)
