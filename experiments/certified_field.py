@@ -130,7 +130,7 @@ def certificate_inputs(
     return {
         "gains": certified_laws(config),
         "crossing": (config.crossing, config.reach) if config.mode == "rivers" else None,
-        "curve": {name: curve.packed() for name, curve in certified_curves(config).items()},
+        "curve": certified_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
         "figure": (config.scene.stature, config.scene.mass, config.floor_scale) if config.mode == "lead" else None,
         "period": sampling.period,

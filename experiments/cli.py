@@ -18,7 +18,7 @@ import tyro  # noqa: E402
 
 from controllers.certificates.hand import NO_HANDS, HandRange  # noqa: E402
 from controllers.errors import ControllerError  # noqa: E402
-from controllers.haptic_map.lifting import Room  # noqa: E402
+from controllers.haptic_map.room import Room  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
@@ -312,10 +312,24 @@ Command = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; bad input is one line on stderr and exit code 2."""
+    """Run the command; bad input is one line on stderr and exit code 2, a reader that has gone is 141."""
+    try:
+        try:
+            return _run(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # As `head` leaves it: what is still to be written goes nowhere, also when the interpreter ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     command: Command = tyro.cli(Command, prog="hvf", args=arguments, description=__doc__)  # pyright: ignore[reportArgumentType, reportUnknownVariableType, reportCallIssue]
     try:
         return command()
+    except BrokenPipeError:
+        raise
     except (ModelError, ControllerError, SimError, OSError) as error:
         print(f"hvf: {error}", file=sys.stderr)
         return 2

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from controllers.haptic_map.curve_measures import ArrangementMeasure
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting import Lifting, Room, closes, lift
+from controllers.haptic_map.lifting import Lifting, closes, lift
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.motion_features import Motion
+from controllers.haptic_map.room import Room
 from experiments.clips import load_clips
 from experiments.figure_maps import figure_legs
 from experiments.in_betweens import MotionMeasure

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.lifting import Room
+from controllers.haptic_map.room import Room
 from experiments.figure_maps import figure_legs
 from experiments.in_betweens import MotionMeasure
 from experiments.lift import LiftedClips, lift_clips

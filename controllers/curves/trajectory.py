@@ -7,7 +7,6 @@ from typing import Literal, cast
 import numpy as np
 import numpy.typing as npt
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from controllers.curves.bounds import capsule_tree
 from controllers.errors import CurveError
@@ -219,6 +218,9 @@ class Trajectory:
     @cached_property
     def coefficients(self) -> Array:
         """Powers of u = t − break, shape (pieces, 4, 7): rows 1, u, u², u³; columns position and quaternion."""
+        # SciPy's splines take a quarter of a second to import: not for a curve that is only compared.
+        from scipy.interpolate import CubicSpline
+
         times, positions, quaternions = (cast("Array", a) for a in (self.times, self.positions, self.quaternions))
         if self.periodic:
             position = CubicSpline(times, np.vstack([positions[:-1], positions[:1]]), bc_type="periodic").c

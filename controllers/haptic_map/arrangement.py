@@ -19,7 +19,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.sparse import csr_array
 
-from controllers.haptic_map.layouts import Rectangle, on_lattice, scaled
+from controllers.haptic_map.layouts import on_lattice, scaled
+from controllers.haptic_map.room import Rectangle
 from controllers.haptic_map.transitions import Transition
 from controllers.state import Array
 

@@ -1,30 +1,10 @@
-"""Places for curves in the half plane (r, z): a rectangle, how many fit into it, and where motions belong in it."""
-
-from typing import NamedTuple
+"""Places for curves in the half plane (r, z): how many fit into a rectangle, and where motions belong in it."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from controllers.haptic_map.room import Rectangle
 from controllers.state import Array
-
-
-class Rectangle(NamedTuple):
-    """Where sites may be [m]: r from r_min to r_max, z from z_min to z_max."""
-
-    r_min: float
-    r_max: float
-    z_min: float
-    z_max: float
-
-    @property
-    def low(self) -> Array:
-        """(r_min, z_min)."""
-        return np.array([self.r_min, self.z_min])
-
-    @property
-    def high(self) -> Array:
-        """(r_max, z_max)."""
-        return np.array([self.r_max, self.z_max])
 
 
 def lattice(rectangle: Rectangle, separation: float) -> Array:

@@ -9,10 +9,11 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.arrangement import ROWS, SAMPLES, Energy, Task, is_apart, on_lap
 from controllers.haptic_map.common_lap import SAMPLES as STEPS
 from controllers.haptic_map.common_lap import common_lap
-from controllers.haptic_map.layouts import Rectangle, lattice, scaled
+from controllers.haptic_map.layouts import lattice, scaled
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting import Room, lift
+from controllers.haptic_map.lifting import lift
 from controllers.haptic_map.motion_features import Motion, features
+from controllers.haptic_map.room import Rectangle, Room
 from controllers.haptic_map.transitions import Transition
 
 WEIGHTS = np.array([0.4, 0.2, 0.15, 0.1])

@@ -1,5 +1,8 @@
 """What the ``hvf`` command says to bad input: one line, exit code 2, nothing lost."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -89,3 +92,20 @@ def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pyt
     before = target.read_bytes()
     assert "--overwrite" in refused(["convert", str(source), str(target)], capsys)
     assert target.read_bytes() == before
+
+
+def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None:
+    from models.mocap.library import embedded
+    from models.mocap.own_bvh import write_bvh
+
+    write_bvh(embedded("cheer"), tmp_path / "in.bvh")
+    for arguments in (["--help"], ["convert", str(tmp_path / "in.bvh"), str(tmp_path / "out.bvh")]):
+        reading, writing = os.pipe()
+        os.close(reading)
+        try:
+            command = [sys.executable, "-m", "experiments.cli", *arguments]
+            ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=60)
+        finally:
+            os.close(writing)
+        assert ended.returncode == 141
+        assert ended.stderr == b""
