@@ -10,10 +10,11 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.blending import blend_corrected
+from controllers.haptic_map.clearance import cleared
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.inbetween import ROOT, correction, packed_table, table_channels
+from controllers.haptic_map.inbetween import ROOT, correction, interpolation, packed_table, table_channels
 from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.state import Array
@@ -22,6 +23,7 @@ CYLINDRICAL = 1
 _CLIPS = 4
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
 _NODES = 13  # of the corrections' table, across the blend each way
+_BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
 _EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
 _ROWS = 512  # of it round the lap, at most
 
@@ -49,6 +51,16 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         d[2] *= i_slope
         d[3] *= j_slope
     blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
+
+
+def _mixtures(steps: int) -> tuple[Array, Array]:
+    """Places (steps², 2) at equal steps of the corrections' table, as shares of r and z, and weights (steps², 4)."""
+    share = np.linspace(0.0, 1.0, 4001)
+    nodes = np.interp(np.linspace(0.0, 1.0, steps), [eased(at, _EDGE)[0] for at in share], share)
+    z, r = np.meshgrid(nodes, nodes)
+    places = np.stack([r.ravel(), z.ravel()], axis=-1)
+    a, b = (np.array([eased(at)[0] for at in way]) for way in places.T)
+    return places, np.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], axis=-1)
 
 
 class Cylindrical(AnimationMap):
@@ -103,18 +115,16 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
         super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
         self._numbers = numbers
-        share = np.linspace(0.0, 1.0, 4001)
-        nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [eased(at, _EDGE)[0] for at in share], share)
-        z, r = np.meshgrid(nodes, nodes)
-        self._nodes = np.stack([r.ravel(), z.ravel()], axis=-1)
-        a, b = (np.array([eased(at)[0] for at in way]) for way in self._nodes.T)
-        shares = [(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b]
-        self.mixtures: Array = np.stack(shares, axis=-1).reshape(-1, _CLIPS)
+        self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
         if limbs:
             rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
             channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
-            self._correct(foot_corrections(channels, self.drifts, limbs, self.mixtures))
+            found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
+            share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
+            shares = np.einsum("ai,bj->abij", share, share).reshape(_BETWEEN**2, _NODES**2)
+            between = _mixtures(_BETWEEN)[1]
+            self._correct(cleared(found, channels, self.drifts, limbs, self.mixtures, between, shares))
 
     def _correct(self, values: Array) -> None:
         table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))

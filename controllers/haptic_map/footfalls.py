@@ -17,6 +17,7 @@ What is found at a mixture is lessened by the average of what is found for its c
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +29,37 @@ from controllers.state import Array
 
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 _FREE = 0.008  # h_0 [m], where the foot is lifted so high
-_STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] so high it does not move yet, and as a share
+STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] so high it does not move yet, and as a share
 _SHARE_FREE = 0.5  # and as a share of the largest lift of the lap
 _LIFTED = 0.002  # [m] a foot that is never lifted more is not held
 _RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap, at least
-_FADE = 4  # power of a clip's weight with which its own slides come back
+FADE = 4  # power of a clip's weight with which its own slides come back
 _LAPS = 4  # until the path repeats
 
 
-def _step(x: Array) -> Array:
+class BlendedFeet(NamedTuple):
+    """What the mean asks of J feet at k mixtures of m clips, at n samples of the lap.
+
+    Attributes
+    ----------
+    height : Array, shape (n, k, J)
+        Of the lowest point of each sole over the lowest of all clips [m].
+    moves : Array, shape (n, k, J, 3)
+        Over the ground (x, y [m], heading [rad]) at the points that touch, from each sample to the next.
+    angles : Array, shape (n + 1, k, J)
+        By which a foot's frame is turned [rad].
+    own : Array, shape (n, m, J)
+        Heights in the clips themselves [m].
+    """
+
+    height: Array
+    moves: Array
+    angles: Array
+    own: Array
+
+
+def smooth_step(x: Array) -> Array:
     """C² step from 0 to 1 on [0, 1]."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
@@ -113,29 +135,27 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     own = found[:, len(weights) :]
     # A clip that is given twice counts as one.
     alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in range(clips)] for i in range(clips)])
-    shares = (weights @ alike) ** _FADE / alike.sum(axis=0)
+    shares = (weights @ alike) ** FADE / alike.sum(axis=0)
     return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
 
 
-def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
+def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:
+    """What the mean asks of the feet; arguments as in `foot_corrections`."""
     n, first = len(channels), channels.shape[2] - END * len(limbs)
     ends = channels[..., first:].reshape(n, channels.shape[1], len(limbs), END)
-    s = np.arange(n + 1) / n
-    drift = weights @ drifts
+    s, drift = np.arange(n + 1) / n, weights @ drifts
     columns = [3 + 4 * limb.joints[2] for limb in limbs]
     soles = np.stack(
         [lowest_point(channels[..., at : at + 4], limb, _SOFTNESS) for limb, at in zip(limbs, columns, strict=True)],
         axis=2,
     )
     own = ends[..., 2] + soles
-    ground, least = own.min(), own.min(axis=2, keepdims=True)
-    flight = np.einsum("km,nmj->nkj", weights, least - ground)
-    own_raise = np.einsum("km,nmj->nkj", weights, _raise(own - least))
+    ground = own.min()
     mean = np.einsum("km,nmjc->nkjc", weights, ends)
-    clearance, moves, angles = [], [], []
+    height, moves, angles = [], [], []
     for j, limb in enumerate(limbs):
         turn = _mean_rotations(channels[:, :, columns[j] : columns[j] + 4], weights)
-        clearance.append(mean[:, :, j, 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
+        height.append(mean[:, :, j, 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
         lag = np.append(ends[:, 0, j, 3], ends[0, 0, j, 3])
         shift, angle = plane_exponential((s + lag)[:, None, None] * drift)
         place = np.concatenate([mean[:, :, j, :2], mean[:1, :, j, :2]])
@@ -144,23 +164,30 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
         heading = np.concatenate([heading, closing]) + angle
         over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
         moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, _SOFTNESS))
-        angles.append(angle[:-1])
-    height = np.stack(clearance, axis=2)
-    lift = height - height.min(axis=2, keepdims=True)
+        angles.append(angle)
+    return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
+
+
+def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
+    n = len(channels)
+    feet = blended_feet(channels, drifts, limbs, weights)
+    flight = np.einsum("km,nmj->nkj", weights, feet.own.min(axis=2, keepdims=True))
+    own_raise = np.einsum("km,nmj->nkj", weights, _raise(feet.own - feet.own.min(axis=2, keepdims=True)))
+    lift = feet.height - feet.height.min(axis=2, keepdims=True)
     raised = np.maximum(0.0, _raise(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    least = np.minimum(_STANDS, _SHARE_STANDS * highest)
-    free = _step((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
+    least = np.minimum(STANDS, _SHARE_STANDS * highest)
+    free = smooth_step((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
     # A foot that the clips do not lift is left to the mean.
-    held = _step(highest / _LIFTED)
+    held = smooth_step(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)
     rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
-    gap = _gap(np.stack(moves, axis=2), free, np.exp(-rate * free / n), drift[:, 2])
+    gap = _gap(feet.moves, free, np.exp(-rate * free / n), (weights @ drifts)[:, 2])
     result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))
     for j in range(len(limbs)):
         at = ROOT + FOOT * j
-        result[..., at : at + 2] = turned(-angles[j], -gap[:, :, j, :2])
-        result[..., at + 2] = (up - height)[..., j]
+        result[..., at : at + 2] = turned(-feet.angles[:-1, :, j], -gap[:, :, j, :2])
+        result[..., at + 2] = (up - feet.height)[..., j]
         result[..., at + 3] = -gap[:, :, j, 2]
     return result

@@ -9,6 +9,7 @@ is turned about the vertical. It is zero at the corners, where a clip is alone.
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicSpline
 
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.state import Array
@@ -28,6 +29,11 @@ def packed_table(values: Array) -> Array:
     inverse = np.linalg.inv(system)[:, :nodes]
     control = np.einsum("ai,bj,nijc->nabc", inverse, inverse, values)
     return np.concatenate([[rows, nodes, channels], control_points(control, np.ones(1)).ravel()])
+
+
+def interpolation(nodes: int, places: Array) -> Array:
+    """Shares (k, nodes) that values at equal steps of [0, 1] have in the table at places (k,) along one way."""
+    return CubicSpline(np.linspace(0.0, 1.0, nodes), np.eye(nodes), bc_type="natural")(places)
 
 
 @njit

@@ -1,0 +1,67 @@
+"""Feet between the mixtures at which footfalls were found: raised where they would be dragged, else left alone."""
+
+import numpy as np
+import pytest
+from test_footfalls import LEGS, REST, STILL, N, kicking
+
+from controllers.haptic_map.clearance import cleared
+from controllers.haptic_map.footfalls import foot_corrections
+from controllers.haptic_map.inbetween import FOOT, ROOT, interpolation
+
+TOUCH = 0.003
+# Which of the feet is the lower one when both kick changes soon with the mixture.
+CLIPS = np.stack([kicking(0, 0.1, 0.4, ahead=0.6), kicking(1, 0.15, 0.5, ahead=0.6)], axis=1)
+
+
+def mixtures(count):
+    share = np.linspace(0.0, 1.0, count)
+    return np.stack([1.0 - share, share], axis=1)
+
+
+def dragged(clips, values, fine):
+    """Way of each foot while it touches, at mixtures between the nodes of values, shape (fine, 2)."""
+    weights = mixtures(fine)
+    d = np.einsum("ck,nkx->ncx", interpolation(values.shape[1], weights[:, 1]), values)
+    d = d[..., ROOT:].reshape(N, fine, 2, FOOT)
+    ends = np.einsum("cm,nmk->nck", weights, clips)[..., REST:].reshape(N, fine, 2, 5)
+    places, heights = ends[..., :2] + d[..., :2], ends[..., 2] + d[..., 2]
+    moved, low = np.linalg.norm(np.diff(places, axis=0), axis=-1), heights < TOUCH
+    return (moved * (low[1:] & low[:-1])).sum(axis=0)
+
+
+def corrected(clips, count):
+    nodes = mixtures(count)
+    found = foot_corrections(clips, STILL, LEGS, nodes)
+    between = mixtures(2 * count - 1)
+    return found, cleared(found, clips, STILL, LEGS, nodes, between, interpolation(count, between[:, 1]))
+
+
+@pytest.mark.parametrize("count", [4, 5, 7])
+def test_feet_that_a_coarse_table_drags_are_lifted(count):
+    found, raised = corrected(CLIPS, count)
+    before, after = (dragged(CLIPS, values, 61) for values in (found, raised))
+    own = before[[0, -1]].max()
+    assert before.max() > own + 0.02
+    assert after.max() < own + 0.4 * (before.max() - own)
+    change = raised - found
+    upwards = np.zeros(change.shape[2], dtype=bool)
+    upwards[ROOT + 2 :: FOOT] = True
+    np.testing.assert_array_equal(change[..., ~upwards], 0.0)
+    assert change.min() >= 0.0
+    assert 0.002 < change.max() < 0.01
+
+
+def test_a_clip_alone_and_feet_that_are_not_dragged_are_left_as_they_are():
+    found, raised = corrected(CLIPS, 5)
+    np.testing.assert_array_equal(raised[:, [0, -1]], found[:, [0, -1]])
+    small = np.stack([kicking(0, 0.1, 0.4, ahead=0.01), kicking(1, 0.15, 0.5, ahead=0.01)], axis=1)
+    found, raised = corrected(small, 5)
+    np.testing.assert_array_equal(raised, found)
+
+
+def test_a_lift_has_no_jump():
+    found, raised = corrected(CLIPS, 5)
+    change = (raised - found)[..., ROOT + 2 :: FOOT]
+    steps = np.abs(np.diff(np.concatenate([change, change[:1]]), axis=0))
+    # It takes two hundredths of the lap to come.
+    assert steps.max() < 0.5 * change.max()
