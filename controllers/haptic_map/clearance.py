@@ -22,7 +22,7 @@ from controllers.haptic_map.loops import turned
 from controllers.state import Array
 
 _CLEAR = 0.0065  # h_c [m]
-_LEAST, _MOST = 0.015, 0.03  # D_0, D_1 [m]
+_LEAST, _MOST = 0.03, 0.045  # D_0, D_1 [m]
 _MOMENT = 0.1  # share of the lap over which D is taken
 _LEVER = 0.1  # [m] by which a foot that turns sweeps over the ground
 _SPREAD = 0.012  # share of the lap by which a lift begins early and ends late
