@@ -20,6 +20,7 @@ from controllers.curves.trajectory import Trajectory
 from experiments.certify import phantom_device
 from experiments.trial_onset import predicted
 from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
+from sim.errors import SimError
 
 Array = npt.NDArray[np.float64]
 
@@ -67,7 +68,10 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         lap = LAP_SECONDS / LAP * np.asarray(trial.curve.times)
         curve = Trajectory(lap, trial.curve.positions, periodic=True)
         river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
-        verdict = stability(river, hands.hands())
+        try:
+            verdict = stability(river, hands.hands())
+        except SimError:  # somewhere between the points that were looked at it is out of the workspace: another one
+            continue
         if verdict.verdict == "certified":
             return Certified(river, trial.curve, hands, float(str(verdict.figures["radius_bound"])))
 
@@ -84,11 +88,16 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
     phase = float(rng.uniform(0.0, LAP))
     trial = Trial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
     loop = trial.loop()
-    offset, velocity = rng.normal(size=3), rng.normal(size=3)
-    mix = rng.uniform(0.0, 0.5 * np.pi)
-    offset *= min(2e-3, FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
-    velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
-    theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
+    while True:
+        offset, velocity = rng.normal(size=3), rng.normal(size=3)
+        mix = rng.uniform(0.0, 0.5 * np.pi)
+        offset *= min(2e-3, FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
+        velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
+        try:
+            theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
+        except SimError:  # beyond a stop of the Phantom: another one
+            continue
+        break
     rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
     torques = np.tile(loop.linear.weight_theta[0] @ theta, clock.whole_delay)
     state = np.concatenate([theta, rate, theta - clock.period * rate, rate, torques])

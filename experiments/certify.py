@@ -189,13 +189,11 @@ def region_figure(verdict: Verdict) -> Figure:
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
     masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
-    certain = verdict.verdict == "certified"
     for axes, (outer, inner), mass in zip(figure.subplots(1, 2), edges, masses, strict=True):
-        label = "region" if certain else "V decreases, the inertia frozen"
-        axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4" if certain else "#eeeeee", label=label)
-        axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3" if certain else "#9aa0aa")
-        if certain:
-            axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
+        label = "region, firm hands" if "firm_hands" in verdict.figures else "region"
+        axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4", label=label)
+        axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3")
+        axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
         axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
         axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
         axes.legend(frameon=False, fontsize=8, loc="upper right")

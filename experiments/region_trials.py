@@ -26,7 +26,7 @@ from experiments.trial_simulation import Conditions, Trial, hand_path
 
 Array = npt.NDArray[np.float64]
 
-CONFIG, HANDS = RunConfig(lap=12.0), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
+CONFIG, HANDS = RunConfig(), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400
 EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 

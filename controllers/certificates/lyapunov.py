@@ -1,4 +1,4 @@
-r"""A Lyapunov function of the sampled loop about its curve, found by IPOPT and checked on cells by interval bounds.
+r"""A Lyapunov function of the sampled loop about its curve, found by IPOPT; `decrease_check` checks it on cells.
 
 State at a tick: x = (e, ν, y, f_1 … f_m). e = p − φ(t*); ν and y are the velocity and the filtered velocity less
 λφ̇, the pace that the hand comes to; f are the forces of the last m ticks that are still on their way. With Λ(θ) the
@@ -19,24 +19,30 @@ p_e(μ) = P(μ)ε_e, a_e the row of A that gives e⁺ less ε_e, q ≥ p_ee, and
           \quad\text{for every } \mu,\ \text{and } (b_h, k_h, w)
 
 of damping and stiffness of the hand and the window's share: a matrix of four numbers' cells, whatever the curve.
+
+Forces w that the axes leave out, in newtons and in the metric of the device's own mass Λ, are more columns of A: of B,
+what a force of 1 N does in a period. With T s_c in their part of the matrix V falls to ρ²V + T Σ s_c |w_c|². A force
+that changes in a period does what the mean of kicks at all its moments would, and V is convex: so kicks at its
+beginning and at its end stand for all.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.intervals import bounds
 from controllers.state import Array
 
 SERIES = 12  # terms of the exponential of a period: what is left out is below 1e-9 while b_h T/μ < 1
 LENGTH = 0.01  # [m] that forms are scaled by, to be well conditioned
-MASSES = 5  # at which the program asks for decrease; the cells ask for it everywhere
+MASSES = 3  # at which the program asks for decrease; the cells ask for it everywhere
 _HEAVY, _VISCOUS, _STIFF = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] that the unknowns are scaled by
-KICK = 8.0  # [√kg/s] what a push of 1 N adds to √V counts against size by 1/√μ of this
 FILTER_WEIGHT = 10.0  # how much what the filter holds counts: it passes in a period or two
 SPEED_WEIGHT = 0.25  # how much size in velocity counts against size in place
+PUSH_WEIGHT = 10.0  # how much the level that the forces left out hold up counts against size
 PARAMETERS = 4  # of an axis: μ, b_h, k_h, w
+CHANNELS = 2  # of forces that are left out: in newtons, and in the metric
 
 
 class Axis(NamedTuple):
@@ -88,12 +94,27 @@ class Axis(NamedTuple):
         """`matrix` as an array."""
         return np.array(self.matrix(z), dtype=np.float64)
 
+    def pushes(self, a: Any, mass: Any, lever: Any, units: Sequence[float], early: bool) -> list[list[Any]]:
+        """B as rows, for A(μ), in units of `scale` and of the forces' `units`: kicks at a period's beginning or end.
+
+        A kick at the beginning is a change of ν. `lever` is √(the device's own share of μ) [√kg].
+        """
+        kick = [a[i][1] if early else float(i == 1) for i in range(self.size)]
+        size = [self.period * unit / (mass * self.scale[1]) for unit in units]
+        return [[kick[i] * size[0], kick[i] * size[1] * lever] for i in range(self.size)]
+
 
 class Cell(NamedTuple):
-    """Intervals of μ [kg], b_h [N s/m], k_h [N/m] and w in which one form has to do."""
+    """Intervals of μ [kg], b_h [N s/m], k_h [N/m] and w in which one form has to do, and the device's largest mass."""
 
     low: Array
     high: Array
+    own: float
+    lightest: float
+
+    def lever(self, mass: Any) -> Any:
+        """Bound of √(the device's own share of μ) [√kg], shape as `mass`."""
+        return np.sqrt(np.minimum(self.own, mass - (self.low[0] - self.lightest)))
 
     def corners(self, masses: int = MASSES) -> Array:
         """Some masses, with every corner of the rest, shape (n, 4)."""
@@ -103,7 +124,10 @@ class Cell(NamedTuple):
 
 
 class Form(NamedTuple):
-    """V: α, β, what the hand adds to e's part, in units of `Axis.scale`; ρ = e^{−rate T}, σ, q, γ of its decrease."""
+    """V: α, β, what the hand adds to e's part, in units of `Axis.scale`; ρ = e^{−rate T}, σ, q, γ, s of its decrease.
+
+    `units` are those of the forces that s belongs to, in newtons and in the metric [N/√kg].
+    """
 
     alpha: Array
     beta: Array
@@ -112,6 +136,8 @@ class Form(NamedTuple):
     sigma: float
     bound: float
     gauge: float
+    gains: Sequence[float]
+    units: Sequence[float]
 
     def matrix(self, z: Any) -> list[list[Any]]:
         """P(μ, b_h, k_h), symbols or numbers: α + βμ, and e's part of the hand's damping and stiffness."""
@@ -128,11 +154,15 @@ class Form(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What {V ≤ 1} has to stay within: the law's force [N], the distance from the curve [m] and the speed [m/s]."""
+    """What {V ≤ 1} has to stay within: the law's force [N], the distance from the curve [m] and the speed [m/s].
+
+    `pushes` are forces that the axes leave out, about as large as they will be [N], [N/√kg]: V is chosen for them.
+    """
 
     force: float
     distance: float
     speed: float
+    pushes: tuple[float, float]
 
 
 def _symmetric(numbers: Any, size: int) -> list[list[Any]]:
@@ -141,33 +171,39 @@ def _symmetric(numbers: Any, size: int) -> list[list[Any]]:
 
 def _congruent(a: Any, p: Any) -> list[list[Any]]:
     """AᵀPA of lists of lists."""
-    n = len(p)
-    pa = [[sum(p[i][k] * a[k][j] for k in range(n)) for j in range(n)] for i in range(n)]
-    return [[sum(a[k][i] * pa[k][j] for k in range(n)) for j in range(n)] for i in range(n)]
+    n, m = len(p), len(a[0])
+    pa = [[sum(p[i][k] * a[k][j] for k in range(n)) for j in range(m)] for i in range(n)]
+    return [[sum(a[k][i] * pa[k][j] for k in range(n)) for j in range(m)] for i in range(m)]
 
 
-def decrease(axis: Axis, a: Any, p: Any, form: Form) -> list[list[Any]]:
-    """The matrix of the module over T, of A and P as lists of lists; the last row is scaled to be of its size.
+def decrease(axis: Axis, a: Any, pushes: Any, p: Any, form: Form) -> list[list[Any]]:
+    """The matrix of the module over T, of A, B and P as lists of lists; the last row is scaled to be of its size.
 
     An axis that does not slide has no h.
     """
     n, t = axis.size, axis.period
-    after, keep = _congruent(a, p), np.exp(-2.0 * form.rate * t)
-    matrix = [[(keep * p[i][j] - after[i][j]) / t for j in range(n)] for i in range(n)]
+    whole = [[*a[i], *pushes[i]] for i in range(n)]
+    size, keep = n + CHANNELS, np.exp(-2.0 * form.rate * t)
+    after = _congruent(whole, p)
+    matrix = [
+        [((keep * p[i][j] if i < n and j < n else 0.0) - after[i][j]) / t for j in range(size)] for i in range(size)
+    ]
+    for i, gain in enumerate(form.gains):
+        matrix[n + i][n + i] += gain
     if not axis.slides:
         return matrix
     speed = axis.stiffness / axis.damping
-    along = [(a[0][j] - (j == 0)) / (t * speed) for j in range(n)]
+    along = [(whole[0][j] - (j == 0)) / (t * speed) for j in range(size)]
     h = [
         np.sqrt(speed)
         * (
             (form.sigma + form.bound * t * speed) * along[j]
-            - 2.0 * sum(a[i][j] * p[i][0] for i in range(n))
+            - 2.0 * sum(whole[i][j] * p[i][0] for i in range(n))
             + form.gauge * (j == 0)
         )
-        for j in range(n)
+        for j in range(size)
     ]
-    return [[*matrix[i], h[i]] for i in range(n)] + [[*h, 4.0 * form.sigma]]
+    return [[*matrix[i], h[i]] for i in range(size)] + [[*h, 4.0 * form.sigma]]
 
 
 def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | None:
@@ -177,13 +213,15 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     barrier −Σ log det(M + s I); it begins inside, with s large.
     """
     n, scale, entries = axis.size, axis.scale, axis.size * (axis.size + 1) // 2
-    x, s = ca.SX.sym("x", 2 * entries + 6), ca.SX.sym("s")
+    x, s = ca.SX.sym("x", 2 * entries + 6 + CHANNELS), ca.SX.sym("s")
 
     def form_of(values: Any) -> Form:
         low, slope = (_symmetric([values[k * entries + i] for i in range(entries)], n) for k in range(2))
         rest = [values[2 * entries + i] for i in range(5)]
+        gains = [values[2 * entries + 6 + i] for i in range(CHANNELS)]
         slope = [[value / _HEAVY for value in row] for row in slope]
-        return Form(low, slope, [rest[0] / _VISCOUS, rest[1] / _STIFF], rate, *rest[2:])  # pyright: ignore[reportArgumentType]
+        hand, (sigma, bound, gauge) = [rest[0] / _VISCOUS, rest[1] / _STIFF], rest[2:]
+        return Form(low, slope, hand, rate, sigma, bound, gauge, gains, limits.pushes)  # pyright: ignore[reportArgumentType]
 
     form, size = form_of(x), x[2 * entries + 5]
     sigma, bound = form.sigma, form.bound
@@ -192,13 +230,13 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     reach += [row * scale / limits.force for row in np.eye(n)[3:]]
     logs: list[Any] = [ca.log(value + s) for value in (sigma, bound, 100.0 - size, 100.0 - bound, 100.0 - sigma)]
     for z in cell.corners():
-        logs += _pivots(decrease(axis, axis.numbers(z).tolist(), form.matrix(z), form), s)
+        a, p = axis.numbers(z).tolist(), form.matrix(z)
+        for early in (True, False):
+            pushes = axis.pushes(a, z[0], cell.lever(z[0]), limits.pushes, early)
+            logs += _pivots(decrease(axis, a, pushes, p, form), s)
     for z in cell.corners(2):
         p = form.matrix(z)
         logs.append(ca.log(size - FILTER_WEIGHT * p[2][2] + s))
-        for jolt in (np.array([0.0, 1.0, 0.0]), np.array([axis.period, 1.0, 1.0 - axis.keep])):
-            kick = np.append(jolt, np.zeros(axis.delay)) / (scale * np.sqrt(z[0]) * KICK)
-            logs.append(ca.log(size - sum(kick[i] * kick[j] * p[i][j] for i in range(n) for j in range(n)) + s))
         logs += [ca.log(value + s) for value in (bound - p[0][0], size - p[0][0], size - SPEED_WEIGHT * p[1][1])]
         for row in reach:
             logs += _pivots([[p[i][j] - row[i] * row[j] for j in range(n)] for i in range(n)], s)
@@ -211,15 +249,20 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
         "show_eval_warnings": False,
     }
     first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
-    start = np.concatenate([_first_guess(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1e5]])
+    start = np.concatenate(
+        [_first_guess(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
+    )
     found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
     if found[-1] > -1e-3:
         return None
-    goal = ca.substitute(size + 0.3 * barrier, s, ca.SX(0.0))
+    held_up = sum(form.gains) / (2.0 * rate)
+    goal = ca.substitute(size + PUSH_WEIGHT * held_up + 0.3 * barrier, s, ca.SX(0.0))
     second = ca.nlpsol("second", "ipopt", {"x": x, "f": goal}, options)
     values = np.array(second(x0=found[:-1])["x"]).ravel()
     found = form_of(values.tolist())
-    return found._replace(alpha=np.array(found.alpha), beta=np.array(found.beta), hand=np.array(found.hand))
+    return found._replace(
+        alpha=np.array(found.alpha), beta=np.array(found.beta), hand=np.array(found.hand), gains=tuple(found.gains)
+    )
 
 
 def _pivots(matrix: Any, shift: Any) -> list[Any]:
@@ -238,46 +281,3 @@ def _pivots(matrix: Any, shift: Any) -> list[Any]:
 def _first_guess(n: int) -> Array:
     rows, columns = np.tril_indices(n)
     return np.where(rows == columns, 1.0, 0.0)
-
-
-class Checked(NamedTuple):
-    """Cells on which the decrease was checked, and by how much a corner's matrix may differ from one inside [1/s]."""
-
-    cells: int
-    slack: float
-    least: float
-
-
-def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, int]) -> Checked:
-    """Whether a form decreases everywhere in a cell: `least` is positive, the least eigenvalue on corners less `slack`.
-
-    On each of the cells' parts a matrix differs from what is interpolated between its corners, entry by entry, by at
-    most Σ h_i²/8 sup|∂²/∂z_i²|; the suprema are interval bounds of CasADi's second derivatives over the whole part.
-    What is interpolated between positive definite matrices is positive definite.
-    """
-    z = ca.SX.sym("z", PARAMETERS)
-    rows = decrease(axis, axis.matrix(z), form.matrix(z), form)
-    matrix = ca.vertcat(*(ca.horzcat(*row) for row in rows))
-    edges = [
-        (np.geomspace if i == 0 else np.linspace)(cell.low[i], cell.high[i], counts[i] + 1)
-        if cell.high[i] > cell.low[i] else np.array([cell.low[i]] * 2)
-        for i in range(PARAMETERS)
-    ]  # fmt: skip
-    parts = np.stack(np.meshgrid(*(np.arange(len(edge) - 1) for edge in edges), indexing="ij"), axis=-1)
-    parts = parts.reshape(-1, PARAMETERS)
-    low, high = (np.stack([edges[i][parts[:, i] + k] for i in range(PARAMETERS)], axis=1) for k in (0, 1))
-    curvature = np.zeros((len(low), len(rows), len(rows)))
-    for i in range(PARAMETERS):
-        if cell.high[i] > cell.low[i]:
-            second = ca.jacobian(ca.jacobian(ca.vec(matrix), z[i]), z[i])
-            ends = bounds(ca.Function("second", [z], [ca.reshape(second, *matrix.shape)]), low, high)
-            curvature += np.maximum(np.abs(ends[0]), np.abs(ends[1])) * (high - low)[:, i, None, None] ** 2 / 8.0
-    slack = np.linalg.norm(curvature, axis=(1, 2))
-    evaluate = ca.Function("matrix", [z], [matrix])
-    least = np.full(len(low), np.inf)
-    for choice in np.ndindex(*(2,) * PARAMETERS):
-        corner = np.where(np.array(choice), high, low)
-        blocks = np.array(evaluate.map(len(corner))(corner.T)).reshape(len(rows), len(corner), len(rows))
-        blocks = blocks.transpose(1, 0, 2)
-        least = np.minimum(least, np.linalg.eigvalsh(0.5 * (blocks + blocks.transpose(0, 2, 1)))[:, 0])
-    return Checked(len(low), float(slack.max()), float((least - slack).min()))

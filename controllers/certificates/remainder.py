@@ -2,9 +2,10 @@ r"""What the frozen axes of `lyapunov` leave out, as rates and forces: an input-
 
 With ‖x‖ = √V ≤ ℓ, the loop that runs obeys
 
-.. math:: \|x^+\| \le \bigl(1 - T\,(r - r_0 - r_1 \ell)\bigr)\,\|x\| + T\,\delta
+.. math:: \|x^+\| \le \sqrt{e^{-2rT} \|x\|^2 + T \textstyle\sum_c s_c w_c^2} + T\,(r_0 \|x\| + \delta)
 
-r is the form's rate; r_0 and r_1 ℓ are what the nonlinearity takes of it, δ what does not vanish on the curve.
+r is the form's rate and s_c what it allows for forces w_c; r_0 is what the nonlinearity takes of the rate, δ what does
+not vanish on the curve and is no force. All of them grow with ℓ.
 Every term is the largest it can be in the tube, with the form's worst mass and hand. Terms of second order in T are
 made good by `SAFE`.
 """
@@ -54,10 +55,10 @@ class Remainder(NamedTuple):
 
     Attributes
     ----------
-    rate, rate_by_level, drift : float
-        r_0, r_1 and δ [1/s].
-    push : float
-        What a push of 1 N adds to δ [1/s].
+    rate, drift : float
+        r_0 and δ [1/s].
+    newtons, metric : float
+        Forces w: [N], and [N/√kg] in the metric of the device's own mass.
     shift : float
         How far the encoders' rounding shifts a state, in √V.
     distance, speed, force : float
@@ -65,9 +66,9 @@ class Remainder(NamedTuple):
     """
 
     rate: float
-    rate_by_level: float
     drift: float
-    push: float
+    newtons: float
+    metric: float
     shift: float
     distance: float
     speed: float
@@ -93,9 +94,7 @@ def remainder(
         ℓ, at most 1.
     """
     t, n, k, b, scale = axis.period, axis.size, axis.stiffness, axis.damping, axis.scale
-    unit = np.eye(n) / scale
-    corners = cell.corners(2)
-    forms = np.array([form.numbers(z) for z in corners])
+    forms = np.array([form.numbers(z) for z in cell.corners(2)])
     inverses: Array = np.asarray(np.linalg.inv(forms), dtype=np.float64)
 
     def reach(row: Array) -> float:
@@ -109,8 +108,7 @@ def remainder(
     force = max(reach(rows(k, 0.0, b)), reach(np.eye(n)[-1] * scale) if axis.delay else 0.0)
     spring, viscous = cell.high[2], cell.high[1]
     total = reach(rows(k + spring, viscous, b))
-    pace_share = b / (b + cell.low[1])
-    slow_share = b / (b + viscous)
+    pace_share, slow_share = b / (b + cell.low[1]), b / (b + viscous)
     pace = pace_share * course.pace
     swing = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
     speed = pace + swing * v * level
@@ -123,35 +121,33 @@ def remainder(
     z = cell.corners(DENSE)
     dense = np.array([form.numbers(row) for row in z])
     back = np.linalg.inv(dense)
-    own = np.minimum(tube.mass_high, z[:, 0] - max(0.0, cell.low[0] - tube.mass_low))
-    jolts = np.array([[0.0, 1.0, 0.0], [t, 1.0, 1.0 - axis.keep]]) @ unit[:3]
-    kicks = np.sqrt(np.einsum("ki,nij,kj->nk", jolts, dense, jolts).max(axis=1)) / z[:, 0]
-    push = SAFE * float(kicks.max())
-    metric = SAFE * float((kicks * np.sqrt(own)).max())
-    motion = float(np.sqrt(own * back[:, 1, 1]).max()) * scale[1]
-    swap = np.abs(np.linalg.eigvalsh(form.beta)), np.linalg.eigh(form.beta)[1]
-    size = (swap[1] * swap[0]) @ swap[1].T
+    lever = cell.lever(z[:, 0])
+    motion = float((lever * np.sqrt(back[:, 1, 1])).max()) * scale[1] * swing * level
+    swap = np.linalg.eigh(form.beta)
+    size = (swap[1] * np.abs(swap[0])) @ swap[1].T
     roots = np.linalg.cholesky(back)
-    drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * own
-    tangent = 0.5 * t * z[:, 2] * kicks * np.sqrt(back[:, 1, 1]) * scale[1] * axis.slides
+    drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * lever**2
+    blocks = np.sqrt(np.einsum("nii->ni", dense)) / scale
+    shift = b / z[:, 0] * tube.rounding
+    late = (1 + axis.delay) * t * speed
 
-    rate = tube.drag * motion * swing * metric + float(tangent.max()) * swing
-    by_speed = (
-        0.5 * tube.mass_slope * float(drifts.max())
-        + tube.jacobian_slope * t * (1 + axis.delay) * force * push
-        + tube.mass_slope * t * float((np.sqrt(own) / z[:, 0]).max()) * total * metric
-        + tube.coriolis * motion * swing * metric
-        + tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * swing) / _least(forms, 2, scale)
+    newtons = (
+        tube.jacobian_slope * late * (force * level + b * course.pace * (1.0 - slow_share))
+        + tube.weight_slope * late
+        + (1.0 - share) * b * course.pace
+        + tube.coulomb
+        + (b + viscous) * float(shift.max()) + (k + tube.mass_slope * speed * b) * tube.rounding
+        + axis.slides * 0.5 * t * spring * v * swing * level
+    )  # fmt: skip
+    metric = (
+        tube.drag * (motion + np.sqrt(tube.mass_high) * pace)
+        + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
+        + tube.mass_slope * t * speed * float((lever / z[:, 0]).max()) * total * level
     )
-    drift = (
-        tube.coriolis * speed * np.sqrt(tube.mass_high) * pace * metric
-        + tube.drag * np.sqrt(tube.mass_high) * pace * metric
-        + tube.weight_slope * t * (1 + axis.delay) * speed * push
-        + tube.jacobian_slope * t * (1 + axis.delay) * speed * b * course.pace * (1.0 - slow_share) * push
-        + tube.jacobian_slope * speed * pace / _least(forms, 2, scale)
-        + (1.0 - share) * b * course.pace * push
-        + min(tube.coulomb * push, tube.coulomb_metric * metric)
-    )
+    slowest = _least(forms, 2, scale)
+    rate = 0.5 * tube.mass_slope * float(drifts.max()) * speed
+    rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * swing) / slowest * speed
+    drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
     if axis.slides:
         row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(n - 3)])
         turn = float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
@@ -160,24 +156,15 @@ def remainder(
         spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
         cross = 0.5 * spread / scale[0] ** 2 * e
         cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
-        pair = _pair(inverses, scale, e, v)
-        by_pair = bend * swing * pair * cross
-        rate += bend * pace * e * cross + bend * t * speed * v * swing * cross
-        rate += 0.5 * course.acceleration * pace_share / course.slowest * (v * turn + course.cosine) * SAFE
-        by_speed += 0.5 * bend * bend / max(course.curvature, 1e-9) * t * v * swing * cross
+        again = 0.5 * bend * bend / max(course.curvature, 1e-9)
+        rate += bend * (pace * e + swing * _pair(inverses, scale, e, v) * level) * cross
+        rate += (bend + again) * v * swing * t * speed * cross
+        rate += 0.5 * course.acceleration * pace_share / course.slowest * (v * turn + course.cosine)
         drift += pace_share**2 * course.acceleration * turn
-        drift += 0.5 * bend * bend / max(course.curvature, 1e-9) * t * speed * pace * cross
-    else:
-        by_pair = 0.0
-    shift = b / z[:, 0] * tube.rounding
-    blocks = np.sqrt(np.einsum("nii->ni", dense)) / scale
-    noise = 2.0 * blocks[:, 0] * shift + blocks[:, 1] * (z[:, 1] / z[:, 0] + tube.mass_slope * speed) * shift
-    noise += kicks * (b * shift + k * tube.rounding)
-    rate += by_speed * pace
+        drift += again * t * speed * pace * cross
     return Remainder(
-        rate=SAFE * rate, rate_by_level=SAFE * (by_speed * swing * v + by_pair),
-        drift=SAFE * (drift + float(noise.max())), push=push, shift=float((blocks[:, 1] * shift).max()),
-        distance=e, speed=v, force=force,
+        rate=SAFE * rate, drift=SAFE * drift, newtons=SAFE * newtons, metric=SAFE * metric,
+        shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
     )  # fmt: skip
 
 
