@@ -32,7 +32,7 @@ FIRM = 0.2  # share of the hands' intervals that is the firm part: the most mass
 LEVELS = 40  # of √V between 0 and 1
 HALF = 0.5  # level at which is told what is too much
 PARTS = (160, 8, 4, 1)  # of a cell of hands along μ, b_h, k_h, w
-BACKED_OFF = (0.97, 0.93, 0.85)  # of the rate that was asked for, where the check of the cells needs room
+BACKED_OFF = (0.97, 0.93, 0.85)  # of the rate that was asked for, as the check of the cells needs room
 
 
 class Found(NamedTuple):
@@ -91,9 +91,10 @@ def _levels(
 
 
 def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
-    """The form with the largest of a few rates at which every part of the cell passes."""
+    """The form with the largest of a few rates, and the least of its gains, at which every part of the cell passes."""
     for share in BACKED_OFF:
-        slower = form._replace(rate=share * form.rate)
+        gains = tuple(gain / share for gain in form.gains)
+        slower = form._replace(rate=share * form.rate, gains=gains)
         result = check_form(axis, slower, cell, PARTS)
         if result.least > 0.0:
             return slower, result

@@ -60,8 +60,8 @@ def test_a_form_decreases_between_the_corners_where_its_cells_say_so():
     cell = Cell(np.array([0.15, 2.0, 0.0, 0.99]), np.array([0.3, 4.0, 100.0, 1.0]), 0.15, 0.03)
     form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5, (0.15, 0.1)), 6.0)
     assert form is not None
-    slower = form._replace(rate=5.5)
-    checked = check_form(AXIS, slower, cell, (60, 6, 2, 1))
+    slower = form._replace(rate=5.5, gains=tuple(1.1 * gain for gain in form.gains))
+    checked = check_form(AXIS, slower, cell, (50, 4, 2, 1))
     assert checked.least > 0.0
     rng = np.random.default_rng(2)
     for z in rng.uniform(cell.low, cell.high, (300, 4)):
@@ -94,7 +94,7 @@ def test_what_the_nearest_point_takes_away_and_forces_that_change_cost_no_more_t
     fall = np.exp(-2.0 * 10.0 * AXIS.period)
     gains = np.array(form.gains) / np.array(form.units) ** 2
     tightest = 0.0
-    for _ in range(400):
+    for _ in range(100):
         masses = np.exp(rng.uniform(np.log(cell.low[0]), np.log(cell.high[0]), 3))
         along = rng.normal(size=3)
         along /= np.linalg.norm(along)
