@@ -69,7 +69,7 @@ def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Dev
 def certify_leading(
     field: Leading, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange
 ) -> dict[str, Verdict]:
-    """Stability in every regime, and passivity.
+    """Stability in every regime, passivity, the power that the force can give, and why there is no region.
 
     Parameters
     ----------
@@ -93,7 +93,36 @@ def certify_leading(
             verdict = Verdict("unknown", reason, verdict.margin, verdict.assumptions, {}, figures)
         verdicts[name] = replace(verdict, figures=figures)
     held = leading_river(field, Regime(True, True), curve, device, sampling)
-    return verdicts | {"passivity": passivity(held)}
+    return verdicts | {"passivity": passivity(held), "energy": leading_energy(field), "region": _NO_REGION}
+
+
+_NO_REGION = Verdict(
+    "unknown",
+    "no region is sought: a hand within the dead bands feels no spring, so there is no curve to which it is drawn",
+)
+
+
+def leading_energy(field: Leading) -> Verdict:
+    r"""Verdict on the power that the force gives a hand, whatever the hand and the figure do.
+
+    .. math:: F \cdot v = f(p, t) \cdot v - b\,|v|^2 \le |f|^2 / 4 b
+
+    with f what the springs pull. It does not ask for a potential, which the force has none of ahead and aside. The
+    margin is that power [W] where they pull as much as the limiter lets through.
+    """
+    force = ForceLimiter(1e-3).peak
+    if field.b == 0.0:
+        return Verdict(
+            "unknown", "without damping nothing bounds the power: ahead and aside the force has no potential"
+        )
+    power = force**2 / (4.0 * field.b)
+    reason = (
+        f"while the springs pull at most {force:g} N they give a hand at most {power:.3g} W, and drive it at most at "
+        f"{force / field.b:.3g} m/s; ahead and aside they can do so for as long as it goes round in a loop"
+    )
+    figures: dict[str, object] = {"power_bound": power, "speed_bound": force / field.b}
+    assumptions = ("damping by the hand's own velocity: what sampling, filter and delay add is told by passivity",)
+    return Verdict("certified", reason, power, assumptions, {}, figures)
 
 
 _FOLLOWED = (Regime(True, True), *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()))

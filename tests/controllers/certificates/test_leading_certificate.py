@@ -1,5 +1,7 @@
 """LEADING's certificate: its regimes are the executed law's, the walker moves as it does, and MuJoCo agrees."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from controllers.certificates.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
 from controllers.state import HandState
-from experiments.certified_leading import certify_leading, leading_field, leading_regimes
+from experiments.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
 from experiments.certify import phantom_device
 from experiments.config import RunConfig
 from experiments.lead import s_curve
@@ -117,6 +119,38 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
     assert np.abs(difference[-1][-2:]).max() > 1e-9
 
 
+def test_the_executed_law_gives_no_more_power_than_is_certified():
+    field = leading_field(RunConfig(mode="lead"), embedded("walk"))
+    verdict = leading_energy(field)
+    rng = np.random.default_rng(7)
+    most = 0.0
+    for _ in range(500):
+        p, way = rng.uniform([-0.03, -0.06, -0.02], [0.06, 0.06, 0.02]), rng.normal(size=3)
+        springs = np.asarray(field.wrench(HandState.at(p)).force)
+        if np.linalg.norm(springs) > 8.5:
+            continue
+        # The fastest that is worth it is along the springs, at half of what they would drive it to.
+        for v in (rng.uniform(0.0, 0.6) * way / np.linalg.norm(way), 0.5 * springs / field.b):
+            power = float(np.asarray(field.wrench(HandState.at(p, v)).force) @ v)
+            assert power <= verdict.figures["power_bound"]
+            most = max(most, power)
+    assert most > 0.5 * verdict.figures["power_bound"]
+    assert leading_energy(replace(field, b=0.0)).verdict == "unknown"
+
+
+def test_ahead_and_aside_the_force_has_no_potential():
+    """Round a small loop the executed springs do work, as much as the certificate's reason warns of."""
+    trial = TRIALS["too far ahead and aside, c = 2"]
+    field, place = trial.field(300.0), trial.curve.point(trial.phase)
+    ring = 2e-5 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+    pulls = np.array(
+        [field.wrench(HandState.at(place + 0.5 * (a + b))).force for a, b in zip(ring, ring[1:], strict=False)]
+    )
+    work = float(np.sum(pulls * np.diff(ring, axis=0)))
+    # The antisymmetric part of the springs' matrix, k_l c / 2 each way, times twice the square's area.
+    assert abs(work) == pytest.approx(300.0 * 2.0 * 2.0 * (2e-5) ** 2, rel=0.05)
+
+
 @pytest.mark.slow
 def test_led_figures_are_certified_and_one_with_little_damping_is_refuted():
     config = RunConfig(mode="lead")
@@ -126,7 +160,7 @@ def test_led_figures_are_certified_and_one_with_little_damping_is_refuted():
     verdicts = certify_leading(field, CURVE, DEVICE, Sampling(1e-3), hands)  # pyright: ignore
     assert {name: verdict.verdict for name, verdict in verdicts.items()} == {
         "stability": "certified", "stability_back": "certified", "stability_aside": "certified",
-        "stability_beyond": "certified", "passivity": "refuted",
+        "stability_beyond": "certified", "passivity": "refuted", "energy": "certified", "region": "unknown",
     }  # fmt: skip
     assert verdicts["stability"].figures["walker_radius"] < 1.0
     # A force that is no potential's: little damping lets it shake a hand that pulls too far ahead and aside.
