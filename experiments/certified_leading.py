@@ -108,13 +108,11 @@ def leading_energy(field: Leading) -> Verdict:
     .. math:: F \cdot v = f(p, t) \cdot v - b\,|v|^2 \le |f|^2 / 4 b
 
     with f what the springs pull. It does not ask for a potential, which the force has none of ahead and aside. The
-    margin is that power [W] where they pull as much as the limiter lets through.
+    bound is told for springs that pull as much as the limiter lets through.
     """
     force = ForceLimiter(1e-3).peak
     if field.b == 0.0:
-        return Verdict(
-            "unknown", "without damping nothing bounds the power: ahead and aside the force has no potential"
-        )
+        return Verdict("unknown", "without damping nothing bounds the power: ahead and aside there is no potential")
     power = force**2 / (4.0 * field.b)
     reason = (
         f"while the springs pull at most {force:g} N they give a hand at most {power:.3g} W, and drive it at most at "
@@ -122,7 +120,7 @@ def leading_energy(field: Leading) -> Verdict:
     )
     figures: dict[str, object] = {"power_bound": power, "speed_bound": force / field.b}
     assumptions = ("damping by the hand's own velocity: what sampling, filter and delay add is told by passivity",)
-    return Verdict("certified", reason, power, assumptions, {}, figures)
+    return Verdict("certified", reason, None, assumptions, {}, figures)
 
 
 _FOLLOWED = (Regime(True, True), *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()))

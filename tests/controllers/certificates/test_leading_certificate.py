@@ -143,9 +143,8 @@ def test_ahead_and_aside_the_force_has_no_potential():
     trial = TRIALS["too far ahead and aside, c = 2"]
     field, place = trial.field(300.0), trial.curve.point(trial.phase)
     ring = 2e-5 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
-    pulls = np.array(
-        [field.wrench(HandState.at(place + 0.5 * (a + b))).force for a, b in zip(ring, ring[1:], strict=False)]
-    )
+    middles = place + 0.5 * (ring[1:] + ring[:-1])
+    pulls = np.array([field.wrench(HandState.at(middle)).force for middle in middles])
     work = float(np.sum(pulls * np.diff(ring, axis=0)))
     # The antisymmetric part of the springs' matrix, k_l c / 2 each way, times twice the square's area.
     assert abs(work) == pytest.approx(300.0 * 2.0 * 2.0 * (2e-5) ** 2, rel=0.05)
