@@ -120,7 +120,7 @@ def _rounded(x: Array, theta: Array, step: Array) -> Array:
 
 
 def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = False) -> Failure | None:
-    """What went wrong with the hand of river `own`, if anything did.
+    """What went wrong with the hand of river `own`, if anything did; one that it never had is not taken over.
 
     Parameters
     ----------
@@ -136,6 +136,7 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
         Of the smooth form, whose force does not jump: only where the hand is in the end counts, and being lost.
     """
     window = max(CHANGES + 1, round(LOST / period))
+    had = np.logical_or.accumulate(river == own)
     changed = np.concatenate([[0.0], np.cumsum(np.diff(river) != 0.0)])
     lost = np.concatenate([[0.0], np.cumsum(river < 0.0)])
     for k in range(len(river)):
@@ -144,7 +145,7 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
             return Failure("chatters", k * period)
         if k >= window and lost[k + 1] - lost[k + 1 - window] >= window:
             return Failure("thrown out", k * period)
-        if not pushed and river[k] >= 0.0 and river[k] != own and (not smooth or k == len(river) - 1):
+        if not pushed and had[k] and river[k] >= 0.0 and river[k] != own and (not smooth or k == len(river) - 1):
             return Failure("taken over", k * period)
     return None
 
@@ -154,9 +155,9 @@ def counterexample(
 ) -> dict[str, object]:
     """First hand found that the field loses: initial state, force and time; empty if there is none.
 
-    Tried are hands that begin at rest on the river, 0.6 s before a phase, and are pushed towards the other river, away
-    from it, along and against, for 0.2 s shortly before; and one that begins at the phase with the rivers' mean
-    velocity.
+    Tried are hands that begin on the river 0.6 s before a phase, at rest, or at its pace where a hand at rest is
+    another river's, and are pushed towards the other river, away from it, along and against, for 0.2 s shortly before;
+    and one that begins at the phase with the rivers' mean velocity.
 
     Parameters
     ----------
@@ -191,8 +192,11 @@ def counterexample(
         for start, velocity in starts:
             for way in ways:
                 push = Push(tuple((newtons * way).tolist()), EARLIER - 0.15, 0.2)
+                led = start is place
                 went = course(field, loop, here, start, velocity, SECONDS, river.device, push)
-                led = not np.array_equal(velocity, 0.0 * ahead)
+                if not led and went.river[0] not in (-1.0, own):
+                    velocity = river.curve.velocity(before)
+                    went = course(field, loop, here, start, velocity, SECONDS, river.device, push)
                 ended = failure(went.river, river.sampling.period, own, newtons > 0.0 or led, smooth)
                 if ended is not None:
                     return {

@@ -149,6 +149,8 @@ def test_failures_are_told_apart():
     once = np.repeat([0.0, 1.0], 50)
     assert failure(once, 1e-3, 0, True) is None
     assert failure(once, 1e-3, 0, False).kind == "taken over"
+    assert failure(np.repeat([1.0, 0.0], 50), 1e-3, 0, False) is None, "what a river never had is not taken from it"
+    assert failure(np.tile([1.0], 100), 1e-3, 0, False) is None
     assert failure(np.repeat([0.0, -1.0], 50), 1e-3, 0, True).kind == "thrown out"
     assert failure(np.tile([0.0, 1.0], 50), 1e-3, 0, True).kind == "chatters"
 
