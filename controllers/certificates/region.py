@@ -263,6 +263,7 @@ ASSUMPTIONS = (
     "a hand of constant mass, damping and stiffness about the curve's nearest point, anywhere in the intervals",
     "a limiter that lets the region's forces through: motors not yet warm, no jump from rest above its rate",
     "pace, curvature and window of the curve are taken from a fine grid; terms of second order in the period by 5 %",
+    "rounding errors of what is not interval arithmetic, eigenvalues among it, are not bounded",
 )
 
 
