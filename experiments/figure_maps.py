@@ -9,11 +9,12 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.joint_limits import MARGIN
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config import RunConfig
 from experiments.modes import default_rivers
-from models.humanoid.skeleton import BODIES, FOOT_CONTACTS
+from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
 from models.mocap.clip import Clip
 
 Array = npt.NDArray[np.float64]
@@ -66,10 +67,12 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
         first, second, third = (BODIES.index(body) for body in bodies)
         offsets = np.array([figure.body(body).pos for body in bodies])
         sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
-        legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole))
+        # Where a joint that is held comes to rest is its limit.
+        limits = joint_range()[[first - 1, second - 1, third - 1]] + 0.5 * MARGIN * np.array([1.0, -1.0])
+        legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole, limits))
     return tuple(legs)
 
 
 def packed_legs(figure: mujoco.MjModel) -> Array:
-    """`figure_legs` as the kernel takes them, shape (2, 18)."""
+    """`figure_legs` as the kernel takes them, shape (2, 36)."""
     return np.array([leg.packed() for leg in figure_legs(figure)])

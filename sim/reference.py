@@ -16,6 +16,7 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.inertialization import stopping_way
+from controllers.haptic_map.limbs import LIMB
 from controllers.haptic_map.river_clips import RIVER_CLIPS, change_clip, heading_between, place_clip, takes_over
 from controllers.rotations import rotate
 from sim.compiled import entry_point
@@ -249,7 +250,7 @@ def make_reference(
         Of the tracking filter, ω/2π [Hz].
     blend : float
         In which one clip goes over into another [s]; 0: the figure jumps.
-    limbs : Array, shape (n, 18), optional
+    limbs : Array, shape (n, 36), optional
         Legs that step meanwhile, `Limb.packed`; without them the feet slide.
 
     Raises
@@ -259,7 +260,7 @@ def make_reference(
     """
     check_reference(period, bandwidth, blend)
     kind, params, memory = compiled
-    legs = np.zeros((0, 18)) if limbs is None else limbs
+    legs = np.zeros((0, LIMB)) if limbs is None else limbs
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,

@@ -25,7 +25,7 @@ class Transition(NamedTuple):
     change : Array
         Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
     limbs, steps : Array
-        Legs, shape (n, 18), and how they step, shape (n, 27).
+        Legs, shape (n, 36), and how they step, shape (n, 27).
     ends : Array
         Scratch: where the feet of the new motion are, shape (n, 7).
     shown : Array
@@ -47,7 +47,7 @@ class Transition(NamedTuple):
 
 
 def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transition:
-    """A transition before the first change, of poses of nq and tangents of nv numbers, with legs (n, 18) that step."""
+    """A transition before the first change, of poses of nq and tangents of nv numbers, with legs (n, 36) that step."""
     n = len(limbs)
     return Transition(
         seconds=seconds, since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)),

@@ -134,6 +134,7 @@ class AnimationMap(ClipMap):
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
         self.loops: list[Loop] = in_step(loops)
+        limbs = [limb.allowing(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):

@@ -25,6 +25,7 @@ def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limb
         arrays |= {f"clip/{name}/poses": np.array(poses, dtype=np.float64), f"clip/{name}/fps": np.array([fps])}
     for k, limb in enumerate(limbs):
         numbers = {"joints": limb.joints, "offsets": limb.offsets, "axis": limb.axis, "points": limb.points}
+        numbers["limits"] = limb.limits
         arrays |= {f"limb/{k}/{what}": np.array(value, dtype=np.float64) for what, value in numbers.items()}
     return arrays
 
@@ -77,5 +78,6 @@ def kept_limbs(arrays: Mapping[str, Array]) -> list[Limb]:
             raise ParameterError(f"'{key}joints' of the map must be finite, got {joints}")
         first, second, last = (int(joint) for joint in joints)
         offsets, axis = kept(arrays, f"{key}offsets", (3, 3)), kept(arrays, f"{key}axis", (3,))
-        limbs.append(Limb((first, second, last), offsets, axis, kept(arrays, f"{key}points", (None, 3))))
+        points, limits = kept(arrays, f"{key}points", (None, 3)), kept(arrays, f"{key}limits", (3, 3, 2))
+        limbs.append(Limb((first, second, last), offsets, axis, points, limits))
     return limbs

@@ -34,7 +34,7 @@ _SHARE_FREE = 0.5  # and as a share of the largest lift of the lap
 _LIFTED = 0.002  # [m] a foot that is never lifted more is not held
 _RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap, at least
-FADE = 4  # power of a clip's weight with which its own slides come back
+_FADE = 4  # power of a clip's weight with which its own slides come back
 _LAPS = 4  # until the path repeats
 
 
@@ -129,14 +129,18 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     Array, shape (n, k, 2 + 4 limbs)
         Channels of `inbetween`: those of the root zero.
     """
-    clips = channels.shape[1]
-    everything = np.concatenate([weights, np.eye(clips)])
+    everything = np.concatenate([weights, np.eye(channels.shape[1])])
     found = _found(channels, drifts, limbs, everything)
     own = found[:, len(weights) :]
-    # A clip that is given twice counts as one.
-    alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in range(clips)] for i in range(clips)])
-    shares = (weights @ alike) ** FADE / alike.sum(axis=0)
+    shares = own_shares(channels, weights)
     return found[:, : len(weights)] - np.einsum("km,nmc->nkc", shares, own)
+
+
+def own_shares(channels: Array, weights: Array) -> Array:
+    """How much of what clips slide alone a mixture keeps, shape (k, m); a clip that is given twice counts as one."""
+    clips = range(channels.shape[1])
+    alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in clips] for i in clips])
+    return (weights @ alike) ** _FADE / alike.sum(axis=0)
 
 
 def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:

@@ -66,7 +66,7 @@ def plan_steps(limbs: Array, steps: Array, shown: Array, asked: Pose, period: fl
 
     Parameters
     ----------
-    limbs : Array, shape (n, 18)
+    limbs : Array, shape (n, 36)
         `Limb.packed`.
     steps : Array, shape (n, STEP)
         Written.

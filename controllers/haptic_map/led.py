@@ -185,7 +185,7 @@ class Led(HapticMap):
         channels[:, :2] = turned(course, channels[:, :2])
         channels[:, 3:7] = yawed(course, channels[:, 3:7])
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
-        rows = channels
+        rows, limbs = channels, [limb.allowing([channels]) for limb in limbs]
         for limb in limbs:
             lag = end_lag(end_poses(channels[:, None], limb)[0], drift, np.ones(1))
             quaternions, ends = end_channels(channels[:, None], drift, limb, lag)

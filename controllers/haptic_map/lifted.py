@@ -166,6 +166,7 @@ class Lifted(ClipMap):
         self.margin = _checked_margin(margin)
         self.sites = checked_sites(sites, names, self.margin)
         self.transitions = _checked_transitions(transitions, m)
+        limbs = [limb.allowing([clip.poses for clip in self._placed]) for limb in limbs]
         super().__init__(LIFTED, lifted_map, self._packed(limbs), clips, names, limbs, self._drifts)
 
     @property

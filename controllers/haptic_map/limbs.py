@@ -10,23 +10,28 @@ and joints are, and the limb's three joints are corrected in closed form so that
 With c = (D² − A)/√(B² + C²), the cosine of the flexion asked for, and c₀ that of the blended joints, δ = f(c) − f(c₀);
 f is the arc cosine, levelled off near ±1 with two continuous derivatives. A limb asked to be longer than it is stays
 short, by a millimetre for a human leg, and moves smoothly; and δ is zero where nothing is to be corrected, however
-straight: a clip alone is left as it is.
+straight: a clip alone is left as it is. In the air, joints that would leave their limits are held (`joint_limits`).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numba import njit
+from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
+from controllers.haptic_map.joint_limits import hold_joint
 from controllers.haptic_map.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
 from controllers.state import Array, Vec3
 
-LIMB = 18  # numbers of a packed limb
+LIMB = 36  # numbers of a packed limb
 END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
 
 _STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
 _SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
+_ANY = 2.0 * np.pi  # [rad] that no rotation vector has
+_ROOM = 0.01  # [rad] left to what a clip uses, for what is between its frames
 _SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
 
 
@@ -44,22 +49,31 @@ class Limb:
         Flexion axis of the middle joint, in the frame of its own segment.
     points : Array, shape (k, 3)
         Of the last segment, those that may touch the ground; their centre is to be where it should [m].
+    limits : Array, shape (3, 3, 2), optional
+        Of the components of the joints' rotation vectors, beyond which they are held (`joint_limits`) [rad]. By
+        default there are none.
 
     Raises
     ------
     ParameterError
-        If numbers are not finite, or flexion cannot change the limb's length.
+        If numbers are not finite, limits do not increase, or flexion cannot change the limb's length.
     """
 
     joints: tuple[int, int, int]
     offsets: Array
     axis: Vec3
     points: Array
+    limits: Array = field(default_factory=lambda: np.tile([-_ANY, _ANY], (3, 3, 1)))
 
     def __post_init__(self) -> None:
         numbers = self.packed()
         if numbers.shape != (LIMB,) or not np.isfinite(numbers).all():
-            raise ParameterError(f"a limb has {LIMB} finite numbers (offsets 3 × 3, axis 3, centre 3), got {numbers}")
+            raise ParameterError(
+                f"a limb has {LIMB} finite numbers (joints 3, offsets 3 × 3, axis 3, centre 3, limits 3 × 3 × 2), got "
+                f"{numbers}"
+            )
+        if not (self.limits[..., 0] <= self.limits[..., 1]).all():
+            raise ParameterError(f"the limits of a limb's joints must increase, got {self.limits.tolist()}")
         if min(self.joints) < 1 or len(set(self.joints)) != 3:
             raise ParameterError(f"a limb has three joints, counted from 1; got {self.joints}")
         for offset in self.offsets[1:]:
@@ -67,10 +81,31 @@ class Limb:
                 raise ParameterError(f"flexion about {self.axis} does not move a limb with offsets {self.offsets}")
 
     def packed(self) -> Array:
-        """What the kernel reads: joints, offsets, unit axis, centre of the points; shape (18,)."""
+        """What the kernel reads: joints, offsets, unit axis, centre of the points, limits; shape (36,)."""
         axis = np.asarray(self.axis, dtype=np.float64)
         unit = axis / max(float(np.linalg.norm(axis)), 1e-300)
-        return np.concatenate([self.joints, np.ravel(self.offsets), unit, np.mean(self.points, axis=0)])
+        centre, limits = np.mean(self.points, axis=0), np.ravel(self.limits)
+        return np.concatenate([self.joints, np.ravel(self.offsets), unit, centre, limits])
+
+    def allowing(self, clips: Sequence[Array]) -> "Limb":
+        """The same limb with limits that hold none of the poses of clips, each of shape (n, nq).
+
+        Raises
+        ------
+        ParameterError
+            If the poses lack one of its joints.
+        """
+        most = min(((poses.shape[1] - 7) // 4 for poses in clips), default=max(self.joints))
+        if max(self.joints) > most:
+            raise ParameterError(f"the poses have {most} joints, a limb wants {self.joints}")
+        limits = self.limits.copy()
+        for joint, interval in zip(self.joints, limits, strict=True):
+            for poses in clips:
+                quaternions = poses[:, 3 + 4 * joint : 7 + 4 * joint]
+                vectors = Rotation.from_quat(quaternions, scalar_first=True).as_rotvec()
+                interval[:, 0] = np.minimum(interval[:, 0], vectors.min(axis=0) - _ROOM)
+                interval[:, 1] = np.maximum(interval[:, 1], vectors.max(axis=0) + _ROOM)
+        return replace(self, limits=limits)
 
 
 @njit
@@ -91,7 +126,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
 
     Parameters
     ----------
-    limb : Array, shape (18,)
+    limb : Array, shape (36,)
         `Limb.packed`.
     rotations : Array, shape (joints, 4)
         Root orientation, then joint rotations; the limb's last holds the orientation of the end and becomes its
@@ -168,3 +203,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
             rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
     for i in range(4):
         rotations[first, i], rotations[second, i], rotations[last, i] = n_first[i], n_second[i], n_last[i]
+    limits = limb[18:36].reshape(3, 3, 2)
+    for n in range(3):
+        joint = int(limb[n])
+        hold_joint(limits[n], end[:, 2], rotations[joint], rates[joint], tangents)

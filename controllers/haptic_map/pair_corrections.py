@@ -17,7 +17,7 @@ from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.state import Array, IntArray
 
-_TERMS = 5  # as many mixtures of two are met exactly
+_TERMS = 3  # as many mixtures of two are met exactly
 _ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
 
 

@@ -36,7 +36,7 @@ def corrected(clips, count):
     return found, cleared(found, clips, STILL, LEGS, nodes, between, interpolation(count, between[:, 1]))
 
 
-@pytest.mark.parametrize("count", [4, 5, 7])
+@pytest.mark.parametrize("count", [5, 6, 7])
 def test_feet_that_a_coarse_table_drags_are_lifted(count):
     found, raised = corrected(CLIPS, count)
     before, after = (dragged(CLIPS, values, 61) for values in (found, raised))
@@ -49,6 +49,14 @@ def test_feet_that_a_coarse_table_drags_are_lifted(count):
     np.testing.assert_array_equal(change[..., ~upwards], 0.0)
     assert change.min() >= 0.0
     assert 0.002 < change.max() < 0.01
+
+
+def test_a_clip_that_is_given_twice_counts_as_one():
+    clips = np.stack([CLIPS[:, 0], CLIPS[:, 0], CLIPS[:, 1]], axis=1)
+    nodes = np.array([[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.0, 1.0]])
+    found = foot_corrections(clips, np.zeros((3, 3)), LEGS, nodes)
+    raised = cleared(found, clips, np.zeros((3, 3)), LEGS, nodes, nodes, np.full((3, 3), 1.0 / 3.0))
+    np.testing.assert_array_equal(raised, found)
 
 
 def test_a_clip_alone_and_feet_that_are_not_dragged_are_left_as_they_are():

@@ -191,7 +191,8 @@ def test_a_turning_clip_does_not_drag_the_feet_of_its_blends():
     still = np.array([standing(np.array([0.0, 0.0, 0.85]), (0.05, 0.1))] * 121), 30.0
     h_map = Cylindrical([still, turning(), still, turning()], R, Z, [LEG])
     soles = np.array([foot(h_map.pose(stylus(0.05, 2 * np.pi * s, 0.0)))[0] for s in np.linspace(0.005, 0.995, 400)])
-    speed = np.array([np.linalg.norm(b - a) for a, b in pairwise(soles)]) * 400
+    # Over the ground: before it moves it is lifted.
+    speed = np.array([np.linalg.norm((b - a)[:2]) for a, b in pairwise(soles)]) * 400
     resting = (4.0 * np.linspace(0.005, 0.995, 400)[:-1]) % 1.0 < 0.42
     assert speed.max() > 0.3
     assert speed[resting].max() < 0.02 * speed.max()
@@ -203,7 +204,7 @@ def test_a_turning_clip_does_not_drag_the_feet_of_its_blends():
         ((1, 2, 2), (0.0, 1.0, 0.0), "three joints, counted from 1; got"),
         ((0, 1, 2), (0.0, 1.0, 0.0), "three joints, counted from 1; got"),
         ((1, 2, 3), (0.0, 0.0, 2.0), "does not move a limb"),
-        ((1, 2, 3), (0.0, np.nan, 1.0), "18 finite numbers"),
+        ((1, 2, 3), (0.0, np.nan, 1.0), "36 finite numbers"),
     ],
 )
 def test_what_is_not_a_limb_is_refused(joints, axis, says):

@@ -27,7 +27,7 @@ def correction(angle, w, changes=None, clips=ALL):
 
 
 @pytest.mark.parametrize(("i", "j"), PAIRS)
-@pytest.mark.parametrize("share", [1 / 6, 1 / 2, 5 / 6])
+@pytest.mark.parametrize("share", [1 / 4, 1 / 2, 3 / 4])
 def test_between_two_clips_it_is_what_the_footfalls_are(i, j, share):
     w = np.zeros(3)
     w[i], w[j] = 1.0 - share, share
