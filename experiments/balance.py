@@ -35,8 +35,8 @@ _SHARE = 0.6  # of the support, about its middle, in which the zero-moment point
 _FARTHEST = 0.2  # sway at most [m]
 
 
-class _Laps(NamedTuple):
-    """Laps at k mixtures: zero-moment points (k, n, 2), load (k, n), contact points (k, n, 8, 3), mean height."""
+class Laps(NamedTuple):
+    """Laps of k motions: zero-moment points (k, n, 2), load (k, n), contact points (k, n, 8, 3), mean height."""
 
     zmp: Array
     load: Array
@@ -68,7 +68,6 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
 
 def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
     weights = haptic_map.mixtures
-    frequency = np.arange(_ROWS // 2 + 1) / lap
     corners = weights.argmax(axis=0)
     # The laps begin a row before the seam, so they are measured in the second one.
     turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_ROWS) / _ROWS)
@@ -80,10 +79,8 @@ def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
         outside -= np.einsum("km,mnx->knx", weights, own)
         c, s = np.cos(turn), np.sin(turn)
         x, y = outside[..., 0], outside[..., 1]
-        error = np.fft.rfft(np.stack([c * x - s * y, s * x + c * y], axis=-1).transpose(1, 0, 2), axis=0)
-        error[frequency > _CUTOFF] = 0.0
-        error /= (1.0 + laps.height / GRAVITY * (2.0 * np.pi * frequency) ** 2)[:, None, None]
-        sway += np.fft.irfft(error, _ROWS, axis=0)
+        error = np.stack([c * x - s * y, s * x + c * y], axis=-1).transpose(1, 0, 2)
+        sway += sway_of(error, laps.height, lap)
         size = np.linalg.norm(sway, axis=-1, keepdims=True)
         sway *= np.minimum(1.0, _FARTHEST / np.maximum(size, 1e-12))
     return sway
@@ -124,22 +121,26 @@ def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
     return point + np.where(free[..., None], 0.0, np.take_along_axis(at, best, axis=-2)[..., 0, :])
 
 
-def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> _Laps:
-    data = mujoco.MjData(figure)
+def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
     kind, params, memory = haptic_map.compiled()
-    step = lap / _ROWS
-    rows = np.arange(-1, _ROWS + 1)
+    angles = 2.0 * np.pi * np.arange(-1, _ROWS + 1) / _ROWS
+    poses = np.empty((len(haptic_map.mixtures), len(angles), haptic_map.nq))
+    for node, places in enumerate(haptic_map.places(angles)):
+        poses_along(kind, params, memory.copy(), places, poses[node])
+    return measured_laps(poses, lap / _ROWS, figure)
+
+
+def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
+    """Dynamics of laps of poses (k, n + 2, 75) at equal steps of time [s], with one before and one after each lap."""
+    data = mujoco.MjData(figure)
     feet = [figure.geom(name).id for name in FOOT_CONTACTS]
-    k, n = len(haptic_map.mixtures), len(rows)
-    poses = np.empty((n, haptic_map.nq))
+    k, n = poses.shape[:2]
     com, spin, contacts = np.empty((k, n, 3)), np.empty((k, n, 3)), np.empty((k, n, len(feet), 3))
     velocity = np.empty(figure.nv)
-    for node, places in enumerate(haptic_map.places(2.0 * np.pi * rows / _ROWS)):
-        lap_memory = memory.copy()
-        poses_along(kind, params, lap_memory, places, poses)
+    for node in range(k):
         for i in range(n):
-            mujoco.mj_differentiatePos(figure, velocity, step, poses[max(i - 1, 0)], poses[i])
-            data.qpos, data.qvel = poses[i], velocity
+            mujoco.mj_differentiatePos(figure, velocity, step, poses[node, max(i - 1, 0)], poses[node, i])
+            data.qpos, data.qvel = poses[node, i], velocity
             mujoco.mj_kinematics(figure, data)
             mujoco.mj_comPos(figure, data)
             mujoco.mj_comVel(figure, data)
@@ -156,4 +157,13 @@ def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> _Laps:
     up = np.maximum(force[..., 2], 0.1 * GRAVITY)
     contacts[..., 2] -= CONTACT_RADIUS
     zmp = com[..., :2] - lever / up[..., None]
-    return _Laps(zmp, up / GRAVITY, contacts[:, 1:-1], float(com[..., 2].mean()))
+    return Laps(zmp, up / GRAVITY, contacts[:, 1:-1], float(com[..., 2].mean()))
+
+
+def sway_of(error: Array, height: float, lap: float) -> Array:
+    """Sway (n, …) that moves the zero-moment point of a lap by `error` (n, …), of a body so high [m]: cart-table."""
+    frequency = np.arange(len(error) // 2 + 1) / lap
+    spectrum = np.fft.rfft(error, axis=0)
+    spectrum[frequency > _CUTOFF] = 0.0
+    resistance = 1.0 + height / GRAVITY * (2.0 * np.pi * frequency) ** 2
+    return np.fft.irfft(spectrum / resistance.reshape(-1, *[1] * (error.ndim - 1)), len(error), axis=0)

@@ -24,6 +24,7 @@ _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
+_FLYING_FORWARD = 1.05  # and its largest pace: who is faster than that lands late, for he falls no faster
 
 
 def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
@@ -34,22 +35,25 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    standing = contacts(clip).planted.sum(axis=1)
     phases = np.linspace(0.0, 1.0, _PHASES, endpoint=False)
-    support = standing[np.round(phases * (clip.n_frames - 1)).astype(int)].astype(np.int64)
+    standing = contacts(clip).planted[np.round(phases * (clip.n_frames - 1)).astype(int)]
+    support = standing.sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at)
+    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing)
     return led, Gait(led.stride, led.stride / led.duration, np.roll(support, -first), led.reach)
 
 
-def gait_remark(name: str, gait: Gait) -> tuple[str, ...]:
+def gait_remark(name: str, gait: Gait, grounds: bool) -> tuple[str, ...]:
     """What is said of a clip that flies: a body in the air falls with g, at whatever pace it is led."""
-    if gait.support.all():
+    if not gait.flies:
         return ()
+    if grounds:
+        return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
     return (
-        f"the clip {name!r} flies: the animation can be led at any pace, the physical figure may fall where it is slow",
+        f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any pace, "
+        "the physical figure may fall where it is slow",
     )
 
 
@@ -92,10 +96,8 @@ def law(config: RunConfig, gait: Gait) -> Leading:
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
     scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
-    lateral = Leading.lateral if gait.support.all() else _FLYING_LATERAL
-    return Leading(
-        gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, lateral=lateral
-    )  # fmt: skip
+    flying = {"lateral": _FLYING_LATERAL, "forward": _FLYING_FORWARD} if gait.flies else {}
+    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, **flying)
 
 
 def leading_hand(field: Leading, period: float = 0.01) -> Arm:

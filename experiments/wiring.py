@@ -28,8 +28,9 @@ from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
 from experiments.hands import UPRIGHT, stylus_path, user_arm
-from experiments.lead import gait_remark, leading_hand, led_map, s_curve, walker_argument
+from experiments.lead import gait_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
+from experiments.led_balance import balanced_on_ground
 from experiments.lifted_runs import lifted_curve, lifted_rivers
 from experiments.map_files import MAP_SUFFIX, load_figure_map
 from experiments.modes import Field
@@ -100,7 +101,7 @@ def wire(
     if leading:
         blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
         led = lead_law(config, gait)
-        remarks += gait_remark(only(clips).name, gait)
+        remarks += gait_remark(only(clips).name, gait, blended.grounds)
     elif config.map.endswith(MAP_SUFFIX):
         blended, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)
@@ -117,6 +118,9 @@ def wire(
         # Its sway is found with compiled code, when everything has been checked.
         blended = balanced(blended, world.figure, config.lap)
         parts = _assemble(config, curve, blended, rivers, led, world)
+    if isinstance(blended, Led):
+        blended = balanced_on_ground(blended, world.figure)
+        parts = _assemble(config, curve, blended, rivers, led, world)
     haptic_map, field, program, compiled, user, limiter, tank, port = parts
     memory = program.fresh_memory()
     if leading:
@@ -127,7 +131,8 @@ def wire(
     reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs)
     start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
     poses = np.empty((1, haptic_map.nq))
-    argument = walker_argument(np.zeros(1)) if leading else stylus_path(start[None])
+    walker = memory[TRACE_SIZE + ARGUMENT :][:7]
+    argument = walker[None] if leading else stylus_path(start[None])
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
     # A walk at full speed cannot begin from rest.
@@ -150,7 +155,7 @@ def wire(
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
-        argument=memory[TRACE_SIZE + ARGUMENT :][:7] if leading else port.hand[1:8],
+        argument=walker if leading else port.hand[1:8],
     )  # fmt: skip
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)

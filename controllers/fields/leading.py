@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.curves.walked_path import (
@@ -28,6 +27,7 @@ from controllers.curves.walked_path import (
     straight_path,
 )
 from controllers.errors import ParameterError
+from controllers.fields.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.fields.instructions import (
     LEADING,
     TRACE_ATTRACTOR,
@@ -40,12 +40,14 @@ from controllers.fields.instructions import (
 )
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 
-# Memory: the walker as the seven numbers that a haptic map takes [s, 0, 0, 1, 0, 0, 0], its speed, the place on the
+# Memory: the walker as the seven numbers that a haptic map takes [s, u, 0, 1, 0, 0, 0], its speed, the place on the
 # path that is nearest to the stylus, when the last tick was, the bend with which the path is laid, the sum of which
-# its lean is made, then the path.
-ARGUMENT, SPEED, GOAL, LAST_TIME, BEND, SWAY, PATH = 0, 7, 8, 9, 10, 11, 12
+# its lean is made, what is decided of the next flight, then the path.
+ARGUMENT, SPEED, GOAL, LAST_TIME, BEND, SWAY, FLIGHT, PATH = 0, 7, 8, 9, 10, 11, 12, 12 + DECISION
+HELD = ARGUMENT + 1  # u
 _K_L, _B, _K_Z, _SCALE, _RATE, _PULL, _FORWARD, _BACKWARD, _LEAD, _LEAD_BACK = range(10)
-_TURN, _LATERAL, _CURVATURE, _AHEAD, _DECAY, _STRIDE, _PHASES, _SHARES = range(10, 18)
+_TURN, _LATERAL, _CURVATURE, _AHEAD, _DECAY, _STRIDE = range(10, 16)
+_TAKE_OFF, _LANDING, _HASTE, _STANCES, _PHASES, _SHARES = range(16, 22)
 
 _SEARCHES = 4  # steps of the search for the nearest place, warm-started
 _LONGEST_TICK = 0.05  # [s] a walker that was not asked for longer has not moved on
@@ -136,7 +138,7 @@ def _lay_path(params: Array, at: int, memory: Array, slot: int, x: float, y: flo
 @njit
 def _bent_speed(params: Array, at: int, memory: Array, path: int, s: float, speed: float) -> float:
     """Largest speed at s [m/s] from which the figure can brake for every bend that lies before it."""
-    pull, front = params[at + _PULL], memory[path]
+    pull, front = min(params[at + _PULL], params[at + _HASTE]), memory[path]
     square = params[at + _FORWARD] ** 2
     rows = int(0.5 * speed * speed / (pull * STEP)) + 6
     first = np.floor(s / STEP) - 2.0 if speed > 0.0 else np.floor(s / STEP) - rows + 4.0
@@ -153,7 +155,9 @@ def _bent_speed(params: Array, at: int, memory: Array, path: int, s: float, spee
 @njit
 def _walk(params: Array, at: int, memory: Array, slot: int, dt: float) -> None:
     """The figure follows with inertia: s̈ = ω² (g − D − s) − 2 ω ṡ, bounded, and slower where the path bends."""
-    rate, pull, path = params[at + _RATE], params[at + _PULL], slot + PATH
+    rate, path = params[at + _RATE], slot + PATH
+    on_ground = memory[slot + HELD] > 0.5 or params[at + _STANCES] == 0.0
+    pull = params[at + (_PULL if on_ground else _HASTE)]
     s, speed = memory[slot + ARGUMENT], memory[slot + SPEED]
     acceleration = walker_acceleration(memory[slot + GOAL] - params[at + _AHEAD] - s, speed, rate)
     speed += dt * min(max(acceleration, -pull), pull)
@@ -164,6 +168,15 @@ def _walk(params: Array, at: int, memory: Array, slot: int, dt: float) -> None:
     if s < least:
         s, speed = least, 0.0
     memory[slot + ARGUMENT], memory[slot + SPEED] = s, speed
+
+
+@njit
+def _decide_flight(params: Array, at: int, memory: Array, slot: int) -> None:
+    """How far the figure stays on the ground, by its place in the lap and its pace (see `controllers.fields.gait`)."""
+    first, lap = at + _SHARES + int(params[at + _PHASES]), memory[slot + ARGUMENT] / params[at + _STRIDE]
+    share = share_of_stance(params, first, int(params[at + _STANCES]), lap)
+    decide_flight(memory, slot + FLIGHT, share, memory[slot + SPEED], params[at + _TAKE_OFF], params[at + _LANDING])
+    memory[slot + HELD] = memory[slot + FLIGHT]
 
 
 @njit
@@ -184,6 +197,7 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
     # False for NaN, the first tick.
     if dt > 0.0:
         _walk(params, at, memory, slot, min(dt, _LONGEST_TICK))
+        _decide_flight(params, at, memory, slot)
         _lay_path(params, at, memory, slot, x, y)
     front = path_front(memory, path)
     nearest, beyond = min(goal, front), max(goal - front, 0.0)
@@ -205,40 +219,6 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
 
 
 @dataclass(frozen=True, eq=False)
-class Gait:
-    """How a figure goes straight on, over one lap of its clip.
-
-    Parameters
-    ----------
-    stride : float
-        Arc length of a lap [m].
-    speed : float
-        The clip's own [m/s].
-    support : Array
-        Feet that bear at equal steps of the lap, from s = 0 on: 0, 1 or 2.
-    reach : float
-        How far ahead of the figure, or behind it, a foot is on the path, at most [m].
-
-    Raises
-    ------
-    ParameterError
-        If a length or the speed is not positive and finite, or the support is not of 0, 1 and 2.
-    """
-
-    stride: float
-    speed: float
-    support: npt.NDArray[np.int64]
-    reach: float
-
-    def __post_init__(self) -> None:
-        checked("stride", self.stride, "m", least=0.01)
-        checked("speed", self.speed, "m/s", least=0.01)
-        checked("reach", self.reach, "m")
-        if self.support.ndim != 1 or len(self.support) < 2 or not np.isin(self.support, (0, 1, 2)).all():
-            raise ParameterError("the support of a gait is 0, 1 or 2 feet at two or more steps of the lap")
-
-
-@dataclass(frozen=True, eq=False)
 class Leading:
     r"""Force of a figure that is led, on a stylus that moves over the floor like a carrot on a stick.
 
@@ -251,6 +231,9 @@ class Leading:
     tangent and normal there. u_t is the part of g − D − s that lies beyond what the figure follows at its own pace;
     u_n the part of the stylus's distance from the path that lies beyond what bending it can reach: nothing on the path
     that is laid, so backwards the hand is guided along it.
+
+    Nobody flies slowly: a gait with flights begins on the ground, and at each stance decides by its pace whether it
+    flies the next one (`controllers.fields.gait`).
 
     The figure follows with bounded acceleration and speed. In front the path is laid towards the stylus, bent by at
     most κ_max, Ω/ṡ and a/ṡ² times the share of its support: 1 on two feet, less on one, 0 on none. On the path that
@@ -282,6 +265,10 @@ class Leading:
         a, largest lateral acceleration [m/s²].
     curvature : float
         κ_max [1/m].
+    take_off, landing : float
+        Paces, times the gait's own, from which on a gait that flies does so, and below which it stays on the ground.
+    haste : float
+        Largest |s̈| while it flies from step to step [m/s²].
 
     Raises
     ------
@@ -304,17 +291,25 @@ class Leading:
     turn_one: float = 0.9
     lateral: float = 2.5
     curvature: float = 1.0
+    take_off: float = 0.9
+    landing: float = 0.85
+    haste: float = 0.5
 
     def __post_init__(self) -> None:
         for name, unit in (("k_l", "N/m"), ("k_z", "N/m"), ("b", "N s/m"), ("turn_one", "rad/s")):
             checked(name, getattr(self, name), unit)
         for name, unit in (
             ("scale", ""), ("rate", "1/s"), ("pull", "m/s²"), ("forward", ""), ("backward", ""),
-            ("turn_two", "rad/s"), ("lateral", "m/s²"), ("curvature", "1/m"),
+            ("turn_two", "rad/s"), ("lateral", "m/s²"), ("curvature", "1/m"), ("take_off", ""), ("landing", ""),
+            ("haste", "m/s²"),
         ):  # fmt: skip
             checked(name, getattr(self, name), unit, least=1e-3)
         if not np.isfinite([*self.start, self.heading]).all():
             raise ParameterError(f"start and heading must be finite, got {self.start} m and {self.heading} rad")
+        if self.landing > self.take_off:
+            raise ParameterError(
+                f"a gait takes off at no lower pace than it lands at, got {self.take_off} and {self.landing} of its own"
+            )
         if self.turn_one > self.turn_two:
             raise ParameterError(
                 f"a figure turns no faster on one foot than on two, got {self.turn_one} and {self.turn_two} rad/s"
@@ -338,10 +333,14 @@ class Leading:
             self.k_l, self.b, self.k_z, self.scale, self.rate, self.pull, self.forward * gait.speed,
             self.backward * gait.speed, 2.0 * gait.speed / self.rate, 2.0 * self.backward * gait.speed / self.rate,
             self.turn_two, self.lateral, self.curvature, self.ahead, np.exp(-STEP / self._sway), gait.stride,
-            len(self.shares), *self.shares,
+            self.take_off * gait.speed, self.landing * gait.speed,
+            self.haste if gait.flies else np.inf, len(gait.stances), len(self.shares), *self.shares,
+            *gait.stances.ravel(),
         ]  # fmt: skip
         walker = np.zeros(PATH)
         walker[ARGUMENT + 3], walker[GOAL], walker[LAST_TIME] = 1.0, self.ahead, np.nan
+        walker[HELD] = float(gait.flies)
+        walker[FLIGHT:PATH] = fresh_decision(gait.flies)
         return Program.law(LEADING, numbers, np.concatenate([walker, path]).tolist())
 
     @property

@@ -6,6 +6,9 @@ A(s) ∈ SE(2) is the figure's path (`controllers.curves.walked_path`), ℓ the 
 a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓλ rests, and advances while it swings
 (`limbs`): so a foot that stands stays where it is, however path and pelvis turn over it. The legs follow. Bends are
 walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s).
+
+A clip that flies has a second form without flights (`grounded`), for paces at which nobody flies that long. Channels
+are (1 − u) ρ + u ρ_grounded; u, how far the figure stays on the ground, is the walker's second number.
 """
 
 from collections.abc import Sequence
@@ -25,6 +28,7 @@ from controllers.curves.walked_path import (
 )
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.haptic_map.grounded import Mask, grounded
 from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
 from controllers.haptic_map.loops import checked_clip, closed_loop, turned, yawed
@@ -33,7 +37,7 @@ from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
 
 LED = 7
-_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _HEADER = range(7)
+_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _HEADER = range(8)
 
 _LEAST_TRAVEL = 0.5  # [m] of a lap
 _LARGEST_TURN = np.deg2rad(30.0)  # of a lap
@@ -55,24 +59,41 @@ def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array)
 
 
 @njit
+def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slope: Array, change: Array) -> None:
+    """Channels of a clip's two forms, mixed by u; `change` becomes their derivatives by u."""
+    n = value.shape[0]
+    ground, ground_slope = np.empty(n), np.empty(n)
+    _channels(rows, samples, lap, value, slope)
+    _channels(rows[n * (samples + 3) :], samples, lap, ground, ground_slope)
+    for k in range(n):
+        change[k] = ground[k] - value[k]
+        value[k] += held * change[k]
+        slope[k] += held * (ground_slope[k] - slope[k])
+
+
+@njit
 def _carried(
     memory: Array, path: int, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
-    slope: Array, p: Array, q: Array, spin: Array,
+    slope: Array, by: int, p: Array, q: Array, spin: Array,
 ) -> None:  # fmt: skip
     """Carry what stands at a place in the frame A(s), leaning to the left about the path on the floor.
+
+    Derivatives are by one of the walker's two numbers x, the figure's arc length and u.
 
     Parameters
     ----------
     memory, path, s
         The path, and the arc length of the frame [m].
     pace, rate : float
-        Derivatives of s and of the lap by the figure's arc length [1, 1/m].
+        Derivatives of s by x, and of what x changes `value` by: the lap, or u itself.
     lean, leaning : float
-        φ [rad] and its derivative by the same [rad/m].
+        φ [rad] and its derivative by x.
     value, slope : Array, shape (7,)
-        Place and quaternion, and their derivatives by the lap.
-    p, q, spin : Array, shapes (2, 3), (4,), (3, 1)
-        Written: place and its derivative by the figure's arc length, unit quaternion, local angular velocity by it.
+        Place and quaternion, and their derivatives by that.
+    by : int
+        Which x, 0 or 1.
+    p, q, spin : Array, shapes (3, 3), (4,), (3, 2)
+        Written: place and its derivative by x, unit quaternion, local angular velocity by x.
     """
     (x, d_x), (y, d_y) = path_value(memory, path, s, PATH_X), path_value(memory, path, s, PATH_Y)
     heading, turn = path_value(memory, path, s, PATH_HEADING)
@@ -81,74 +102,85 @@ def _carried(
     side, high = upright * value[1] + over * value[2], upright * value[2] - over * value[1]
     d_side = rate * (upright * slope[1] + over * slope[2]) + leaning * high
     p[0, 0], p[0, 1], p[0, 2] = c * value[0] - sine * side, sine * value[0] + c * side, high
-    p[1, 0] = pace * (d_x - turn * p[0, 1]) + rate * c * slope[0] - sine * d_side
-    p[1, 1] = pace * (d_y + turn * p[0, 0]) + rate * sine * slope[0] + c * d_side
-    p[1, 2] = rate * (upright * slope[2] - over * slope[1]) - leaning * side
+    p[1 + by, 0] = pace * (d_x - turn * p[0, 1]) + rate * c * slope[0] - sine * d_side
+    p[1 + by, 1] = pace * (d_y + turn * p[0, 0]) + rate * sine * slope[0] + c * d_side
+    p[1 + by, 2] = rate * (upright * slope[2] - over * slope[1]) - leaning * side
     p[0, 0] += x
     p[0, 1] += y
-    _unit(value[3:], slope[3:], rate, q, spin)
+    _unit(value[3:], slope[3:], rate, by, q, spin)
     q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * lean), -np.sin(0.5 * lean), 0.0, 0.0, q[0], q[1], q[2], q[3])
-    spin[0, 0] -= leaning * (1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
-    spin[1, 0] -= leaning * 2.0 * (q[1] * q[2] - q[0] * q[3])
-    spin[2, 0] -= leaning * 2.0 * (q[1] * q[3] + q[0] * q[2])
+    spin[0, by] -= leaning * (1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
+    spin[1, by] -= leaning * 2.0 * (q[1] * q[2] - q[0] * q[3])
+    spin[2, by] -= leaning * 2.0 * (q[1] * q[3] + q[0] * q[2])
     up_x, up_y = 2.0 * (q[1] * q[3] - q[0] * q[2]), 2.0 * (q[2] * q[3] + q[0] * q[1])
-    spin[0, 0] += pace * turn * up_x
-    spin[1, 0] += pace * turn * up_y
-    spin[2, 0] += pace * turn * (1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
+    spin[0, by] += pace * turn * up_x
+    spin[1, by] += pace * turn * up_y
+    spin[2, by] += pace * turn * (1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
     q[0], q[1], q[2], q[3] = multiply(
         np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading), q[0], q[1], q[2], q[3]
     )  # fmt: skip
 
 
 @njit
-def _unit(value: Array, slope: Array, rate: float, q: Array, spin: Array) -> None:
-    """Unit quaternion of four channels and its local angular velocity (3, 1), 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
+def _unit(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Array) -> None:
+    """Unit quaternion of four channels and its local angular velocity (3, 2) by x, 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
     scale = 1.0 / np.sqrt(max(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2, 1e-12))
     for j in range(4):
         q[j] = scale * value[j]
     _, x, y, z = relative(q[0], q[1], q[2], q[3], slope[0], slope[1], slope[2], slope[3])
-    spin[0, 0], spin[1, 0], spin[2, 0] = 2.0 * rate * scale * x, 2.0 * rate * scale * y, 2.0 * rate * scale * z
+    spin[0, by], spin[1, by], spin[2, by] = 2.0 * rate * scale * x, 2.0 * rate * scale * y, 2.0 * rate * scale * z
 
 
 @njit
 def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Kernel of `Led`: h(s) with s = x[0], and h_* unless `jacobian` has no rows; the memory is only read."""
+    """Kernel of `Led`: h(s, u) with (s, u) = x[:2], and h_* unless `jacobian` has no rows; the memory is only read."""
     stride, path = params[_STRIDE], int(params[_PATH])
     samples, rotations, limbs = int(params[_SAMPLES]), int(params[_ROTATIONS]), int(params[_LIMBS])
-    n, s = 3 + 4 * rotations + END * limbs, x[0]
-    value, slope = np.empty(n), np.empty(n)
-    _channels(params[_HEADER + LIMB * limbs :], samples, s / stride + params[_PHASE], value, slope)
-    q, spins, root, end = np.empty((rotations, 4)), np.empty((rotations, 3, 1)), np.empty((2, 3)), np.empty((2, 3))
-    rate, tangents = 1.0 / stride, 1 if jacobian.shape[0] > 0 else 0
+    n, s, rate = 3 + 4 * rotations + END * limbs, x[0], 1.0 / stride
+    value, slope, change = np.empty(n), np.empty(n), np.zeros(n)
+    rows, lap = params[_HEADER + LIMB * limbs :], s / stride + params[_PHASE]
+    if params[_FORMS] > 1.0:
+        _mixed(rows, samples, lap, x[1], value, slope, change)
+    else:
+        _channels(rows, samples, lap, value, slope)
+    q, spins, root, end = np.empty((rotations, 4)), np.empty((rotations, 3, 2)), np.empty((3, 3)), np.empty((3, 3))
+    tangents = 2 if jacobian.shape[0] > 0 else 0
     lean, leaning = path_value(memory, path, s, PATH_LEAN)
-    _carried(memory, path, s, 1.0, rate, lean, leaning, value, slope, root, q[0], spins[0])
+    _carried(memory, path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
+    _carried(memory, path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
     for joint in range(1, rotations):
         at = 3 + 4 * joint
-        _unit(value[at : at + 4], slope[at : at + 4], rate, q[joint], spins[joint])
-    part, change = np.empty(7), np.empty(7)
+        _unit(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
+        _unit(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
+    part, by_lap, by_form = np.empty(7), np.empty(7), np.empty(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
         last, at = int(limb[2]), 3 + 4 * rotations + END * i
-        part[:3], change[:3] = value[at : at + 3], slope[at : at + 3]
-        part[3:], change[3:] = value[3 + 4 * last : 7 + 4 * last], slope[3 + 4 * last : 7 + 4 * last]
+        for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
+            numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
         there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
-        _carried(memory, path, there, pace, rate, 0.0, 0.0, part, change, end, q[last], spins[last])
+        _carried(
+            memory, path, there, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last]
+        )
+        _carried(memory, path, there, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
         place_limb(limb, q, spins, root, end, tangents)
     pose[:3] = root[0]
     for joint in range(rotations):
         pose[3 + 4 * joint : 7 + 4 * joint] = q[joint]
     if tangents:
         jacobian[:] = 0.0
-        jacobian[:3, 0] = root[1]
-        for joint in range(rotations):
-            jacobian[3 + 3 * joint : 6 + 3 * joint, 0] = spins[joint, :, 0]
+        for by in range(2):
+            jacobian[:3, by] = root[1 + by]
+            for joint in range(rotations):
+                jacobian[3 + 3 * joint : 6 + 3 * joint, by] = spins[joint, :, by]
 
 
 class Led(HapticMap):
     r"""A clip that travels, on the path of a figure that is led (see `controllers.fields.leading`).
 
-    The map's argument is not the stylus but the walker: ``[s, 0, 0, 1, 0, 0, 0]``, s the arc length [m]. The memory
-    is the field's, in which the path lies; `compiled` gives one of its own, with a path straight on from the origin.
+    The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, s the arc length [m] and u from 0,
+    the clip, to 1, the clip without its flights. The memory is the field's, in which the path lies; `compiled` gives
+    one of its own, with a path straight on from the origin.
 
     Parameters
     ----------
@@ -160,6 +192,10 @@ class Led(HapticMap):
         Share of the lap at which the figure is at s = 0.
     at : int
         Where the packed path begins in the memory.
+    standing : array of bool, shape (m, limbs), optional
+        Which limbs stand, at m equal steps of the lap: between its flights. Without it u changes nothing.
+    sway : Array, shape (k, 2), optional
+        By which the root moves over the floor where no flight is left [m], at k equal steps of the lap.
 
     Raises
     ------
@@ -167,9 +203,19 @@ class Led(HapticMap):
         If the clip does not travel by 0.5 m a lap, or turns by more than 30° meanwhile.
     """
 
-    def __init__(self, clip: tuple[Array, float], limbs: Sequence[Limb], phase: float = 0.0, at: int = 0) -> None:
+    def __init__(
+        self,
+        clip: tuple[Array, float],
+        limbs: Sequence[Limb],
+        phase: float = 0.0,
+        at: int = 0,
+        standing: Mask | None = None,
+        sway: Array | None = None,
+    ) -> None:
+        self._made_of = (clip, tuple(limbs), phase, at, standing)
         poses, fps = clip
         loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
+        self.phase = phase
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration
         if self.stride < _LEAST_TRAVEL or abs(loop.drift[2]) > _LARGEST_TURN:
@@ -193,15 +239,26 @@ class Led(HapticMap):
             rows = np.concatenate([rows, ends[:, 0]], axis=1)
             rows[:, column : column + 4] = quaternions[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        lags = rows[:, channels.shape[1] + 3 :: END]
-        self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         signs = np.ones(rows.shape[1])
         for first in range(3, channels.shape[1], 4):
             signs[first : first + 4] = 1.0 if rows[-1, first : first + 4] @ rows[0, first : first + 4] >= 0.0 else -1.0
-        header = [self.stride, phase, at, samples, self._rotations, len(limbs)]
-        self._params = np.concatenate(
-            [header, *(limb.packed() for limb in limbs), control_points(rows, signs).ravel()]
-        )  # fmt: skip
+        forms = [rows]
+        if standing is not None:
+            nearest = np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)
+            low = grounded(
+                rows, signs, self.stride, limbs, standing[nearest], np.zeros((2, 2)) if sway is None else sway
+            )
+            forms += [] if low is None else [low]
+        self.grounds = len(forms) > 1
+        lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
+        self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
+        header = [self.stride, phase, at, samples, self._rotations, len(limbs), len(forms)]
+        packed = (control_points(form, signs).ravel() for form in forms)
+        self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
+
+    def with_sway(self, sway: Array) -> "Led":
+        """The same map with another sway (k, 2) where no flight is left."""
+        return Led(*self._made_of, sway)
 
     @property
     def nq(self) -> int:
@@ -219,11 +276,11 @@ class Led(HapticMap):
         return CompiledMap(LED, self._params, np.concatenate([np.zeros(at), straight_path(0.0, 0.0, 0.0, half)]))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration at x = [s, …], shape (nq,), on the memory's path, or on a straight one."""
+        """Configuration at x = [s, u, …], shape (nq,), on the memory's path, or on a straight one."""
         return self._evaluate(x, memory, 0)[0]
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative by x, shape (nv, 6): the first column is the one by s, the others are zero."""
+        """Derivative by x, shape (nv, 6): columns by s and u, the others are zero."""
         return self._evaluate(x, memory, self.nv)[1]
 
     def _evaluate(self, x: Array, memory: Array | None, rows: int) -> tuple[Pose, Array]:

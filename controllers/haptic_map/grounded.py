@@ -1,0 +1,118 @@
+r"""A gait that flies, kept on the ground: what a body does that goes too slowly to fly.
+
+A flight lasts as long as gravity lets it, whatever the pace; so a gait with flights cannot be played slowly as it is.
+Here each flight is shared out between the foot that pushed off and the one that lands: the first stands longer, the
+other lands sooner, both where they stand in the clip. A leg goes through its motion at a phase ψ(s) instead of s,
+
+.. math:: \psi(b - \sigma_+ g_-) = b, \qquad \psi(a + \sigma_- g_+) = a
+
+for a stance from b to a with flights g₋ before and g₊ after it: it stands longer, and swings faster. The root is
+lowered until both legs reach the ground, and keeps its height.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import convolve1d, minimum_filter1d
+from scipy.spatial.transform import Rotation
+
+from controllers.haptic_map.limbs import END, Limb
+from controllers.haptic_map.splines import round_lap
+from controllers.state import Array
+
+Mask = npt.NDArray[np.bool_]
+
+_AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
+_STRETCHED = 0.985  # of its length a leg may have between its ends, or as much as in the clip
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First sample of each run of a mask that goes round, and the first sample after it, which may be beyond the end.
+
+    A mask without an end has none.
+    """
+    n = len(mask)
+    first = np.flatnonzero(mask & ~np.roll(mask, 1))
+    last = np.flatnonzero(mask & ~np.roll(mask, -1)) + 1
+    return [(int(start), int(np.append(last, last + n)[np.append(last, last + n) > start][0])) for start in first]
+
+
+def grounded(
+    rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
+) -> Array | None:
+    """Rows of a led clip (`led`) on which no flight is left, or None: it does not fly, or hops on one foot.
+
+    Parameters
+    ----------
+    rows : Array, shape (n, nq + 5 limbs)
+        Channels at equal steps of the lap: remainder, then each limb's end.
+    signs : Array, shape (nq + 5 limbs,)
+        −1 where a channel comes back with the opposite sign after a lap.
+    stride : float
+        Way of a lap [m], along x.
+    limbs : sequence of Limb
+    standing : array of bool, shape (n, limbs)
+        Which of them stand.
+    sway : Array, shape (m, 2)
+        By which the root is moved over the floor [m], at m equal steps of the lap.
+    """
+    flights = runs(~np.any(standing, axis=1))
+    warps = [_warp(standing, j, flights) for j in range(len(limbs))]
+    if not flights or any(warp is None for warp in warps):
+        return None
+    n, result = len(rows), rows.copy()
+    twice = np.concatenate([rows, signs * rows, rows[:1]])
+    spline = CubicSpline(np.arange(2 * n + 1), twice, bc_type="periodic")
+    first = rows.shape[1] - END * len(limbs)
+    for j, (limb, warp) in enumerate(zip(limbs, warps, strict=True)):
+        assert warp is not None
+        joints = [np.arange(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints]
+        columns = np.concatenate([*joints, np.arange(first + END * j, first + END * (j + 1))])
+        result[:, columns] = spline(np.mod(warp, 2 * n))[:, columns]
+        for joint in joints:
+            result[:, joint] /= np.linalg.norm(result[:, joint], axis=1, keepdims=True)
+            # The same rotation as in the clip, so that both can be mixed.
+            result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
+        result[:, first + END * j + 3] += (warp - np.arange(n)) / n
+    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
+    excess = np.max([_excess(rows, result, stride, limb, first + END * j) for j, limb in enumerate(limbs)], axis=0)
+    width = max(3, round(n / len(flights)))
+    window = np.hanning(width + 2)[1:-1]
+    ceiling = minimum_filter1d(rows[:, 2] - excess, width, mode="wrap")
+    result[:, 2] = convolve1d(ceiling, window / window.sum(), mode="wrap")
+    return result
+
+
+def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
+    """ψ n of a limb at the samples of the lap; None if it never stands, or would land before it has left."""
+    n, own = len(standing), runs(standing[:, j])
+    if not own:
+        return None
+    before = {end % n: end - start for start, end in flights}
+    after = {start: end - start for start, end in flights}
+    here, there = list[float](), list[float]()
+    for start, end in own:
+        here += [start - _BEFORE * before.get(start, 0), end + _AFTER * after.get(end % n, 0)]
+        there += [float(start), float(end)]
+    if np.any(np.diff([*here, here[0] + n]) <= 0.0):
+        return None
+    laps = np.arange(-2, 3) * n
+    return PchipInterpolator(np.add.outer(laps, here).ravel(), np.add.outer(laps, there).ravel())(np.arange(n))
+
+
+def _excess(rows: Array, grounded_rows: Array, stride: float, limb: Limb, at: int) -> Array:
+    """How much lower the root must be for a limb to reach its end [m], shape (n,)."""
+    length = float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2]))
+    place = 3 + 4 * limb.joints[2]
+    lines = list[Array]()
+    for channels in (rows, grounded_rows):
+        foot = Rotation.from_quat(channels[:, place : place + 4], scalar_first=True)
+        root = Rotation.from_quat(channels[:, 3:7], scalar_first=True)
+        line = channels[:, at : at + 3] - foot.apply(limb.points.mean(axis=0))
+        line[:, 0] += stride * channels[:, at + 3]
+        lines.append(line - channels[:, :3] - root.apply(limb.offsets[0]))
+    longest = max(_STRETCHED * length, float(np.linalg.norm(lines[0], axis=1).max()))
+    away = np.linalg.norm(lines[1][:, :2], axis=1)
+    return np.maximum(0.0, -lines[1][:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))

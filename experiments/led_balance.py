@@ -1,0 +1,36 @@
+"""A led figure that goes too slowly to fly stands on its feet: its root sways (see `experiments.balance`)."""
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.led import Led
+from experiments.balance import measured_laps, nearest_supported, sway_of
+from sim.reference import poses_along
+
+Array = npt.NDArray[np.float64]
+
+_ROWS = 192  # of a lap
+_ROUNDS = 6
+_PACE = 0.8  # of the clip's own
+_SHARE = 0.6  # of the support, about its middle, in which the zero-moment point is asked to lie
+
+
+def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
+    """The same map, whose form without flights sways such that the floor can bear it at the pace of going back."""
+    if not led.grounds:
+        return led
+    sway, result, seconds = np.zeros((_ROWS, 2)), led, led.duration / _PACE
+    walker = np.zeros((_ROWS + 2, 7))
+    walker[:, 0] = led.stride * (np.arange(-1, _ROWS + 1) / _ROWS - led.phase)
+    walker[:, 1] = walker[:, 3] = 1.0
+    poses = np.empty((1, _ROWS + 2, led.nq))
+    for _ in range(_ROUNDS):
+        compiled = result.compiled()
+        poses_along(compiled.kind, compiled.params, compiled.memory, walker, poses[0])
+        laps = measured_laps(poses, seconds / _ROWS, figure)
+        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
+        # Where the root is on average is the clip's affair: the way back to it, at take-off, would throw the figure.
+        sway += sway_of(outside[0] - outside[0].mean(axis=0), laps.height, seconds)
+        result = led.with_sway(sway)
+    return result

@@ -1,0 +1,118 @@
+"""When a led figure flies: decided by its pace where a stance is entered, carried out in it, never in the air."""
+
+import numpy as np
+import pytest
+
+from controllers.errors import ParameterError
+from controllers.fields.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import HELD, SPEED, Leading
+from controllers.fields.program import evaluate
+
+RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)
+FIELD = Leading(RUN, (-0.06, 0.0), scale=160.0, forward=1.05)
+RATE = 1e-3
+
+
+def decided(shares, speed, memory=None):
+    memory = fresh_decision(True) if memory is None else memory
+    held = []
+    for share in shares:
+        decide_flight(memory, 0, share, speed, 2.7, 2.5)
+        held.append(memory[0])
+    return np.array(held), memory
+
+
+def test_stances_are_where_a_foot_bears():
+    np.testing.assert_allclose(RUN.stances, [[0.0, 32 / 88], [0.5, 32 / 88]])
+    turned = Gait(2.2, 3.0, np.roll(RUN.support, -10), 0.6)
+    np.testing.assert_allclose(np.sort(turned.stances[:, 0]), [34 / 88, 78 / 88])
+    table = turned.stances.ravel()
+    shares = np.array([share_of_stance(table, 0, 2, lap) for lap in (np.arange(176) + 0.5) / 88])
+    np.testing.assert_array_equal(shares >= 0.0, np.tile(turned.support, 2) > 0)
+    assert share_of_stance(table, 0, 2, -1.0 + 40.5 / 88) == pytest.approx(share_of_stance(table, 0, 2, 40.5 / 88))
+    assert Gait(1.4, 1.25, np.array([2, 1]), 0.4).stances.shape == (0, 2)
+
+
+@pytest.mark.parametrize(("speed", "ends"), [(2.8, 0.0), (2.6, 1.0), (-2.9, 1.0)])
+def test_from_the_ground_it_flies_from_the_pace_of_taking_off_on(speed, ends):
+    _, memory = decided([-1.0], speed)
+    held, _ = decided(np.linspace(0.0, 1.0, 201), speed, memory)
+    assert held[0] == 1.0
+    assert held[-1] == ends
+    # Pushing off is the clip's own.
+    assert np.all(held[np.linspace(0.0, 1.0, 201) > WITHIN] == ends)
+
+
+@pytest.mark.parametrize(("speed", "ends"), [(2.6, 0.0), (2.4, 1.0)])
+def test_having_flown_it_goes_on_until_it_is_slower_than_landing(speed, ends):
+    held, memory = decided([-1.0], 3.0, np.zeros(4))
+    held, memory = decided(np.linspace(0.0, 1.0, 201), speed, memory)
+    assert held[-1] == pytest.approx(ends, abs=1e-12)
+    # Landing is the clip's own.
+    assert np.all(held[np.linspace(0.0, 1.0, 201) < 1.0 - WITHIN] == 0.0)
+
+
+def test_what_is_decided_does_not_change_within_the_stance_and_nothing_does_in_the_air():
+    _, memory = decided([-1.0], 3.0)
+    _, memory = decided(np.linspace(0.0, 0.3, 50), 3.0, memory)
+    held, memory = decided(np.linspace(0.3, 1.0, 50), 0.5, memory)
+    assert held[-1] == 0.0
+    held, _ = decided(np.full(10, -1.0), 0.5, memory)
+    np.testing.assert_array_equal(held, 0.0)
+
+
+def test_going_back_in_a_stance_takes_back_what_was_done_in_it():
+    _, memory = decided([-1.0], 3.0)
+    shares = np.linspace(0.0, 0.6, 61)
+    there, memory = decided(shares, 3.0, memory)
+    back, _ = decided(shares[::-1], -1.0, memory)
+    np.testing.assert_allclose(back, there[::-1], atol=1e-14)
+
+
+def led(seconds):
+    """A hand that leads straight on at the gait's own pace for three seconds and then stops."""
+    program = FIELD.program()
+    memory, hand, wrench = program.fresh_memory(), np.zeros(15), np.zeros(6)
+    hand[4] = 1.0
+    trail = np.empty((round(seconds / RATE), 3))
+    for k in range(len(trail)):
+        hand[0] = k * RATE
+        hand[1] = FIELD.start[0] + min(hand[0], 3.0) * RUN.speed / FIELD.scale
+        evaluate(program.ops, program.params, memory, hand, wrench)
+        trail[k] = memory[TRACE_SIZE], memory[TRACE_SIZE + HELD], memory[TRACE_SIZE + SPEED]
+    return trail
+
+
+def test_led_from_rest_to_rest_it_flies_only_at_the_pace_for_it():
+    s, held, speed = led(7.0).T
+    lap = s / RUN.stride
+    flying = RUN.support[(88 * (lap - np.floor(lap))).astype(int)] == 0
+    assert held[0] == 1.0
+    assert held[-1] == 1.0
+    assert held.min() == 0.0
+    # In the air either all is flown or nothing, and what is flown has nearly the pace at which that was decided.
+    assert np.minimum(held[flying], 1.0 - held[flying]).max() < 1e-6
+    flown = flying & (held < 1e-6)
+    assert flown.sum() > 200
+    assert speed[flown].min() > 0.75 * RUN.speed
+    assert speed[flown].max() <= 1.05 * RUN.speed
+    # And flying it hardly hastens.
+    haste = np.abs(np.diff(speed)) / RATE
+    assert haste[held[1:] < 0.5].max() < 1.001 * FIELD.haste
+    assert haste.max() == pytest.approx(FIELD.pull, rel=1e-3)
+    # The form changes smoothly with the place.
+    assert np.abs(np.diff(held)).max() < 0.012
+
+
+@pytest.mark.parametrize(
+    ("numbers", "says"),
+    [
+        ({"landing": 0.95}, "takes off at no lower pace"),
+        ({"haste": 0.0}, "haste"),
+        ({"take_off": np.nan}, "take_off"),
+    ],
+)
+def test_bad_numbers_of_flights_are_refused(numbers, says):
+    with pytest.raises(ParameterError, match=says):
+        Leading(RUN, **numbers)
