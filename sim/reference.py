@@ -210,8 +210,14 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
 
 
 def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
-    """Let a reference begin with the stylus in motion: position, velocity and acceleration in H, shape (3, 3)."""
-    reference.started[0], reference.hand[:] = 1.0, motion
+    """Let a reference begin with the stylus in motion: position, velocity and acceleration in H, shape (3, 3).
+
+    They are those of the first update, so the filter begins a period before, from where it predicts them.
+    """
+    p, v, a = motion
+    period = reference.period
+    reference.started[0] = 1.0
+    reference.hand[:] = p - period * v + 0.5 * period**2 * a, v - period * a, a
 
 
 def check_reference(period: float, bandwidth: float, blend: float) -> None:

@@ -10,6 +10,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
 from controllers.haptic_map.combination import combine, figure_channels, packed_figure
+from controllers.haptic_map.cores import draw_in
 from controllers.haptic_map.cylinder import cylinder
 from controllers.haptic_map.frames import (
     CLOSES,
@@ -68,7 +69,17 @@ def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chan
     sites, slopes = np.empty((total, SITE)), np.empty((total, SITE))
     neighbours = params[int(params[_NEAR_AT]) :]
     count = near_clips(neighbours, angle, r, z, near, sites, slopes)
-    near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
+    place, change = np.empty(2), np.empty((3, 2))
+    if not draw_in(r, z, sites[:count], slopes[:count], place, change):
+        near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
+        return angle, count
+    count = near_clips(neighbours, angle, place[0], place[1], near, sites, slopes)
+    near_weights(neighbours, place[0], place[1], sites[:count], slopes[:count], w[:count], changes[:, :count])
+    for i in range(count):
+        by_r, by_z = changes[1, i], changes[2, i]
+        changes[0, i] += by_r * change[0, 0] + by_z * change[0, 1]
+        for way in (1, 2):
+            changes[way, i] = by_r * change[way, 0] + by_z * change[way, 1]
     return angle, count
 
 
@@ -102,10 +113,10 @@ class Lifted(ClipMap):
 
     θ = atan2(y, x) is the phase, and in the half plane (r, z) at θ the clips have their sites q_i = (r_i, z_i):
     periodic C² splines of θ. The pose is the mean of the clips that are near, with the weights of `neighbours`; each
-    contributes its own at θ by splines with a knot at every frame (`frames`). On its curve a clip is alone, and exact
-    up to the displacement over the ground by which it was moved to the origin (`placed`). What is blended, how, and
-    the lap's frame A are told in `combination`; a closed clip whose angles begin at θ₀ > 0 has its frames beyond 2π
-    in the next lap.
+    contributes its own at θ by splines with a knot at every frame (`frames`). On its curve a clip is alone, in its core
+    (`cores`) nearly so, and exact up to the displacement over the ground by which it was moved to the origin
+    (`placed`). What is blended, how, and the lap's frame A are told in `combination`; a closed clip whose angles begin
+    at θ₀ > 0 has its frames beyond 2π in the next lap.
 
     With limbs, in-betweens of neighbours are corrected (`pair_corrections`): feet move one at a time, while they are
     lifted.

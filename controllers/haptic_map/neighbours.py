@@ -12,17 +12,19 @@ least squares methods"; W is that of Franke & Nielson 1980, C² where a clip com
 where there is nothing to hold it; χ = (1 + (E/E₀)⁴)^(−1/4), E² = Σ e_i², keeps |w_i − ŵ_i| below E₀ everywhere.
 
 Why not simply ŵ: weights that are never negative, differentiable, and 0 or 1 at the sites have their least or
-greatest values there, so their derivatives vanish, and a hand that leaves a curve would at first change nothing.
+greatest values there, so their derivatives vanish however far the neighbours are. Close to a curve that is what is
+wanted, and there is a core for it (`cores`), of a width that is chosen; outside of cores the plane counts.
 """
 
 import numpy as np
 from numba import njit
 from scipy.spatial import KDTree
 
+from controllers.haptic_map.cores import core_points
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.state import Array, IntArray
 
-SITE = 3  # channels of a site: r, z, R
+SITE = 4  # channels of a site: r, z, R, and the core b
 
 _NEAR = 1e-7  # [m] ε
 _MOST = 0.35  # E₀
@@ -52,8 +54,8 @@ def near_clips(numbers: Array, angle: float, r: float, z: float, clips: IntArray
         θ in [0, 2π], and the place, within the domain [m].
     clips : IntArray, shape (m,)
         Written: their numbers.
-    sites, slopes : Array, shape (m, 3)
-        Written: their q and R, and the derivatives by θ.
+    sites, slopes : Array, shape (m, 4)
+        Written: their q, R and core (see `cores`), and the derivatives by θ.
 
     Returns
     -------
@@ -93,7 +95,7 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
         `packed_neighbours`.
     r, z : float
         The place [m].
-    sites, slopes : Array, shape (m, 3)
+    sites, slopes : Array, shape (m, 4)
         Of the clips that are near, from `near_clips`.
     w : Array, shape (m,)
         Written; of sum 1.
@@ -204,7 +206,8 @@ def packed_neighbours(sites: Array, r_range: tuple[float, float], z_range: tuple
     """
     rows, m, _ = sites.shape
     reach = reaches(sites, r_range, z_range)
-    control = control_points(np.concatenate([sites, reach[..., None]], axis=2), np.ones((m, SITE)))
+    smooth = control_points(np.concatenate([sites, reach[..., None]], axis=2), np.ones((m, 3)))
+    control = np.concatenate([smooth, core_points(sites)[..., None]], axis=2)
     cells = int(np.clip(np.sqrt(2.0 * m), 1.0, 24.0))
     edges = [np.linspace(low, high, cells + 1) for low, high in (r_range, z_range)]
     low = np.stack(np.meshgrid(edges[0][:-1], edges[1][:-1], indexing="ij"), axis=-1).reshape(-1, 1, 2)

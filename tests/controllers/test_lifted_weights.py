@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.neighbours import _MOST, near_clips, near_weights, packed_neighbours, reaches
+from controllers.haptic_map.neighbours import _MOST, SITE, near_clips, near_weights, packed_neighbours, reaches
 from controllers.haptic_map.splines import round_lap
 
 TURN = 2.0 * np.pi
@@ -27,7 +27,7 @@ class Weights:
         self.m, self.numbers = sites.shape[1], packed_neighbours(sites, R, Z)
 
     def near(self, angle, r, z):
-        clips, sites, slopes = np.empty(self.m, dtype=np.int64), np.empty((self.m, 3)), np.empty((self.m, 3))
+        clips, sites, slopes = np.empty(self.m, dtype=np.int64), np.empty((self.m, SITE)), np.empty((self.m, SITE))
         count = near_clips(self.numbers, angle, r, z, clips, sites, slopes)
         return clips[:count], sites[:count], slopes[:count]
 
