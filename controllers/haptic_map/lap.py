@@ -1,11 +1,22 @@
-"""The frame of the lap: how a steady drift over the ground moves the figure, and carries it over the seam."""
+r"""The frame of the lap: how a drift over the ground moves the figure, over the seam and where the drift changes.
+
+In the frame A of the lap a pose is at exp(s ξ), s the share of the lap. Where the drift ξ changes with the hand, clips
+that travel differently are blended differently, and how far the figure has come must not follow: a hand that goes
+aside late in a lap would else carry it over the floor by metres. So A takes up the change,
+
+.. math:: A \leftarrow A\,\exp(\bar s\,\xi_{before})\,\exp(-\bar s\,\xi_{now}), \qquad
+          \bar s = \tfrac12 (s_{before} + s_{now}),
+
+and the figure goes by ∫ ξ ds along the hand's path (by the trapezoid rule, to second order in the step).
+"""
 
 import numpy as np
 from numba import njit
 
 from controllers.state import Array
 
-LAP_X, LAP_Y, LAP_HEADING, LAST_ANGLE, LAPS, MEMORY = range(6)
+LAP_X, LAP_Y, LAP_HEADING, LAST_ANGLE, LAPS, LAST_DRIFT = range(6)
+MEMORY = LAST_DRIFT + 3
 
 
 @njit
@@ -25,20 +36,32 @@ def sine_quotients(angle: float) -> tuple[float, float, float, float]:
 
 
 @njit
+def _move_frame(memory: Array, s: float, drift: Array) -> None:
+    """A ← A·exp(s ξ), for a drift ξ in the memory or of the map, shape (3,)."""
+    q_s, q_c, _, _ = sine_quotients(s * drift[2])
+    x, y = s * (q_s * drift[0] - q_c * drift[1]), s * (q_c * drift[0] + q_s * drift[1])
+    cosine, sine = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
+    memory[LAP_X] += cosine * x - sine * y
+    memory[LAP_Y] += sine * x + cosine * y
+    memory[LAP_HEADING] += s * drift[2]
+
+
+@njit
 def update_lap(memory: Array, angle: float, drift: Array) -> None:
-    """Carry the lap's frame A over the seam: A·exp(ξ) forwards, A·exp(−ξ) backwards."""
-    change = angle - memory[LAST_ANGLE]
+    """Carry the frame of the lap over the seam, A·exp(ξ) forwards and A·exp(−ξ) backwards, and over changes of ξ."""
+    before, last = memory[LAST_ANGLE], memory[LAST_DRIFT : LAST_DRIFT + 3]
     memory[LAST_ANGLE] = angle
     # False for NaN, the first tick.
-    if abs(change) > np.pi:
-        way = 1.0 if change < 0.0 else -1.0
-        s, c, _, _ = sine_quotients(way * drift[2])
-        x, y = way * (s * drift[0] - c * drift[1]), way * (c * drift[0] + s * drift[1])
-        cosine, sine = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
-        memory[LAP_X] += cosine * x - sine * y
-        memory[LAP_Y] += sine * x + cosine * y
-        memory[LAP_HEADING] += way * drift[2]
+    if abs(angle - before) > np.pi:
+        way = 1.0 if angle < before else -1.0
+        _move_frame(memory, way, last)
+        before -= way * 2.0 * np.pi
         memory[LAPS] += way
+    if before == before and (drift[0] != last[0] or drift[1] != last[1] or drift[2] != last[2]):
+        s = (before + angle) / (4.0 * np.pi)
+        _move_frame(memory, s, last)
+        _move_frame(memory, -s, drift)
+    last[:] = drift
 
 
 @njit
