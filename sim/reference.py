@@ -17,7 +17,16 @@ from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.inertialization import stopping_way
 from controllers.haptic_map.limbs import LIMB
-from controllers.haptic_map.river_clips import RIVER_CLIPS, change_clip, heading_between, place_clip, takes_over
+from controllers.haptic_map.river_clips import (
+    PHASE,
+    RIVER_CLIPS,
+    change_clip,
+    heading_between,
+    lets_go,
+    place_clip,
+    stop_clip,
+    takes_over,
+)
 from controllers.rotations import rotate
 from sim.compiled import entry_point
 from sim.errors import SimError
@@ -133,6 +142,21 @@ def _change_river(reference: CompiledReference, river: float, phase: float) -> N
 
 
 @njit
+def _stop(reference: CompiledReference, params: Array) -> None:
+    """Let the clip that plays come to rest: at the phase at which it would, with an offset that decays."""
+    transition, memory, period = reference.transition, reference.memory, reference.period
+    _look_around(reference)
+    # Of the clip's own pace, not of a hand that is thrown along the curve or against it.
+    pace = min(max((reference.scratch_memory[PHASE] - memory[PHASE]) / period, -1.0), 1.0)
+    _carry(reference)
+    transition.shown[0], transition.shown[1], transition.shown[2] = reference.pose, reference.before, reference.after
+    stop_clip(params, memory, stopping_way(pace, 0.0, transition.seconds))
+    _look_around(reference)
+    note_change(transition, reference.figure_model, period, reference.pose, reference.before, reference.after)
+    transition.since[0] = 0.0
+
+
+@njit
 def update_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
     r"""Advance the reference by one period.
 
@@ -159,8 +183,12 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
     reference.transition.since[0] += period
     kind, params = base_of(reference.kind, reference.params)
-    if kind == RIVER_CLIPS and takes_over(params, reference.memory, trace[TRACE_RIVER]):
+    # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
+    settled = reference.transition.since[0] >= reference.transition.seconds
+    if kind == RIVER_CLIPS and settled and takes_over(params, reference.memory, trace[TRACE_RIVER]):
         _change_river(reference, trace[TRACE_RIVER], trace[TRACE_PHASE])
+    elif kind == RIVER_CLIPS and lets_go(params, reference.memory, trace[TRACE_RIVER], hand[0]):
+        _stop(reference, params)
     _look_around(reference)
     _carry(reference)
     for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):

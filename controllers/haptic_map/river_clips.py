@@ -27,8 +27,8 @@ from controllers.rotations import multiply
 from controllers.state import Array, Pose
 
 RIVER_CLIPS = 5
-# The memory: the lap of the clip that plays, then its river and the last phase on it.
-RIVER, PHASE, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2
+# The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
+RIVER, PHASE, STILL, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3
 # Parameters: a header, offsets of the packed curves, the curves, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
@@ -55,7 +55,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     """Kernel of `RiverClips`: h(x), and h_*(x) unless `jacobian` has no rows."""
     river, rivers = int(memory[RIVER]), int(params[_RIVERS])
     curve = int(params[_CURVES + river])
-    phase = _phase_near(params, curve, x, memory[PHASE])
+    phase = memory[PHASE] if memory[STILL] > 0.0 else _phase_near(params, curve, x, memory[PHASE])
     memory[PHASE] = phase
     pace = 2.0 * np.pi / (params[curve + END] - params[curve + START])
     there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
@@ -66,7 +66,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
         slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
     chain = np.zeros((3, 6))
     for i in range(3):
-        chain[0, i] = pace * along[i] / slope if slope > 0.0 else 0.0
+        chain[0, i] = pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
     weights, changes = np.zeros((1, rivers)), np.zeros((1, 3, rivers))
     weights[0, river] = 1.0
     angle = pace * (phase - params[curve + START])
@@ -75,14 +75,32 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
 
 @njit
 def takes_over(params: Array, memory: Array, river: float) -> bool:
-    """Whether a river, by its number in the trace of the field, is another than the one whose clip plays; −1 is not."""
-    return 0.0 <= river < params[_RIVERS] and river != memory[RIVER]
+    """Whether a river, by its number in the trace of the field, takes the hand from another, or from none; −1 is none.
+
+    What plays another clip, or the clip that stands still, begins at the phase of the hand on that river.
+    """
+    return 0.0 <= river < params[_RIVERS] and (river != memory[RIVER] or memory[STILL] > 0.0)
+
+
+@njit
+def lets_go(params: Array, memory: Array, river: float, x: Array) -> bool:
+    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays."""
+    curve, found = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2))
+    free = river < 0.0 and memory[STILL] == 0.0
+    return free and branches(params, curve, x[0], x[1], x[2], params[_TUBE], found) == 0
 
 
 @njit
 def change_clip(memory: Array, river: float, phase: float) -> None:
     """Let the clip of another river play, from a phase on, in the frame of the lap that is."""
-    memory[RIVER], memory[PHASE], memory[LAST_ANGLE] = river, phase, np.nan
+    memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
+
+
+@njit
+def stop_clip(params: Array, memory: Array, way: float) -> None:
+    """Let the clip that plays stand still, at a phase that is `way` farther on, wherever the stylus is."""
+    curve = int(params[_CURVES + int(memory[RIVER])])
+    memory[PHASE], memory[STILL] = wrap_phase(params, curve, memory[PHASE] + way), 1.0
 
 
 @njit
@@ -109,6 +127,7 @@ class RiverClips(AnimationMap):
 
     i is the river that has the hand, a number that the field leaves in its trace; t*_i the phase of its curve nearest
     to the stylus (of the branch that goes on, where the curve passes twice); a lap of the river is a lap of its clip.
+    A hand that no river has, outside the tube of the last, has no frame: who shows h stops there (`stop_clip`).
     Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
     as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
     jumps: who shows it goes on from where the figure stands (`place_clip`), with the offset decaying
@@ -155,4 +174,4 @@ class RiverClips(AnimationMap):
 
     def compiled(self) -> CompiledMap:
         """The map as its kernel takes it, with the memory of a new run: the first river has the hand."""
-        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), [0.0, np.nan]]))
+        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), [0.0, np.nan, 0.0]]))

@@ -8,7 +8,16 @@ from clips_for_maps import LEG, difference, matrices, swinging
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.river_clips import RIVER, RiverClips, change_clip, heading_between, place_clip, takes_over
+from controllers.haptic_map.river_clips import (
+    RIVER,
+    RiverClips,
+    change_clip,
+    heading_between,
+    lets_go,
+    place_clip,
+    stop_clip,
+    takes_over,
+)
 
 CLIPS = [(swinging(1, travel=1.3), 30.0), (swinging(2, turns=1.0), 30.0)]
 RNG = np.random.default_rng(5)
@@ -91,6 +100,23 @@ def test_no_river_and_none_that_there_is_not_take_over() -> None:
     memory = _memory(0)
     assert [takes_over(params, memory, river) for river in (-1.0, 0.0, 1.0, 2.0, np.nan)] == [0, 0, 1, 0, 0]
     assert memory[RIVER] == 0.0
+
+
+def test_a_hand_outside_the_tube_is_let_go_once_and_has_no_frame_then() -> None:
+    params, memory = MAP.compiled().params, _memory(0, 1.0)
+    inside, outside = CURVES[0].point(1.0) * 1.3, CURVES[0].point(1.0) * 1.5
+    assert [lets_go(params, memory, river, p) for river in (-1.0, 0.0) for p in (inside, outside)] == [0, 1, 0, 0]
+    stop_clip(params, memory, 0.25)
+    stopped = MAP.pose(_stylus(outside), memory)
+    np.testing.assert_array_equal(MAP.pose(_stylus(CURVES[0].point(3.0)), memory), stopped)
+    np.testing.assert_array_equal(MAP.jacobian(_stylus(outside), memory), 0.0)
+    expected = MAP.pose(_stylus(CURVES[0].point(1.25)), _memory(0, 1.25))
+    np.testing.assert_allclose(stopped, expected, atol=1e-9)
+    assert not lets_go(params, memory, -1.0, outside)
+    # Its own river takes it from none.
+    assert takes_over(params, memory, 0.0)
+    change_clip(memory, 0.0, 3.0)
+    assert not takes_over(params, memory, 0.0)
 
 
 @pytest.mark.parametrize(

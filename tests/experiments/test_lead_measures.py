@@ -85,8 +85,11 @@ def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int
 
 def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     legs = figure_legs(figure_model())
-    assert gait_remark("walk", led_map(embedded("walk"), legs, 0)[1]) == ()
-    assert "flies" in gait_remark("run", led_map(embedded("run"), legs, 0)[1])[0]
+    _, walk = led_map(embedded("walk"), legs, 0)
+    led, run = led_map(embedded("run"), legs, 0)
+    assert gait_remark("walk", walk, False) == ()
+    assert "led slowly it goes without flights" in gait_remark("run", run, led.grounds)[0]
+    assert "may fall where it is slow" in gait_remark("hop", run, False)[0]
 
 
 def test_the_lines_tell_it() -> None:

@@ -114,6 +114,53 @@ def test_while_no_river_has_the_hand_the_last_clip_plays(clips_of_rivers) -> Non
     np.testing.assert_array_equal(_played(clips_of_rivers, BLEND, True), _played(clips_of_rivers, BLEND))
 
 
+def _thrown(clips: RiverClips, let_go: bool) -> np.ndarray:
+    """Poses of a hand that is thrown far out of its river at 1.4 s, swings about, comes back, and is taken at 4.5 s."""
+    t = np.arange(700) * PERIOD
+    away = np.clip((t - 1.4) / 0.3, 0.0, 1.0) * np.clip((4.2 - t) / 0.3, 0.0, 1.0)
+    away = away**3 * (10.0 - 15.0 * away + 6.0 * away**2)
+    place = 0.15 * np.stack([np.sin(9.0 * t), np.cos(7.0 * t), np.ones(len(t))], axis=1)
+    points = CURVES[0].point(t % LAP) + away[:, None] * place
+    traces = np.zeros((len(t), TRACE_SIZE))
+    traces[:, TRACE_PHASE] = t % LAP
+    traces[(t >= 1.45) & (t < 4.5), TRACE_RIVER] = -1.0 if let_go else 0.0
+    reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, BLEND, packed_legs(FIGURE))
+    poses = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(points), traces, poses)
+    return poses
+
+
+def test_a_hand_that_leaves_all_rivers_leaves_the_figure_standing(clips_of_rivers) -> None:
+    poses = _thrown(clips_of_rivers, True)
+    joint, root = _rates(poses)
+    velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
+    # It comes to rest, stands still however the hand swings, and goes on: without a jump of pose or velocity.
+    assert np.abs(np.diff(velocity, axis=0)).max() < 10.0
+    still = slice(round(2.1 / PERIOD), round(4.2 / PERIOD))
+    assert joint[still].max() < 1e-9
+    assert root[still].max() < 1e-9
+    assert joint[round(4.8 / PERIOD) :].max() > 0.5
+    assert joint[: round(1.4 / PERIOD)].max() > 0.5
+    # A river that keeps such a hand has the figure thrown about: the control.
+    assert _rates(_thrown(clips_of_rivers, False))[0][still].max() > 20.0
+
+
+def test_rivers_that_have_the_hand_in_turns_change_the_clip_once_in_a_blend_time(clips_of_rivers) -> None:
+    t = np.arange(300) * PERIOD
+    traces = np.zeros((len(t), TRACE_SIZE))
+    traces[:, TRACE_PHASE] = t % LAP
+    traces[:, TRACE_RIVER] = np.where(t > 0.5, np.floor(t / 0.03) % 3, 0.0)
+    poses, shown = np.empty((len(t), 75)), stylus_path(CURVES[0].point(t))
+    reference = make_reference(FIGURE, clips_of_rivers.compiled(), PERIOD, 6.0, BLEND, packed_legs(FIGURE))
+    reference_along(reference, shown, traces, poses)
+    velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
+    assert np.abs(np.diff(velocity, axis=0)).max() < 10.0
+    hasty = make_reference(FIGURE, clips_of_rivers.compiled(), PERIOD, 6.0, 0.0, packed_legs(FIGURE))
+    reference_along(hasty, shown, traces, poses)
+    velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
+    assert np.abs(np.diff(velocity, axis=0)).max() > 60.0
+
+
 def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
     poses = _played(clips_of_rivers, BLEND)[::15]
     np.testing.assert_allclose(poses, np.loadtxt(GOLDEN, delimiter=","), atol=1e-7)
