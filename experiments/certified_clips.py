@@ -7,8 +7,8 @@ from pathlib import Path
 from controllers.certificates.report import Verdict
 from experiments.ballistics import clip_ballistics
 from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.map_files import MAP_SUFFIX, load_figure_map
+from experiments.config import MAP_SUFFIX, RunConfig
+from experiments.map_files import load_figure_map
 from experiments.run import RECORDING, clips_of, config_of
 from models.mocap.clip import Clip
 from sim.recording import Recording

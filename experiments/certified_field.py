@@ -91,14 +91,15 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
 
         return {"": s_curve()}
     if config.map.endswith(".npz"):
-        from experiments.lifted_runs import curve_number, lifted_curve
+        from experiments.lifted_runs import curve_number, lifted_course, lifted_curve
         from experiments.map_files import Lifted, load_map
 
         found = load_map(Path(config.map))
         if isinstance(found, Lifted):
             first = found.names[curve_number(found, config.curve)]
             names = [first, *(name for name in found.names if name != first)]
-            return {"" if name == first else f"_{name}": lifted_curve(found, name) for name in names}
+            courses = [lifted_course(lifted_curve(found, name), config) for name in names]
+            return {"" if name == first else f"_{name}": course for name, course in zip(names, courses, strict=True)}
     return {"": Trajectory.circle(config.radius, config.lap)}
 
 

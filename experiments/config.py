@@ -6,6 +6,7 @@ from typing import Literal
 from models.scene import SceneConfig
 from sim.users.intent import Grab, Push, Turn
 
+MAP_SUFFIX = ".npz"  # of a map's file
 FIGURE_CLIPS = ("squat_dance", "cheer", "angry", "spin")
 MAP_CLIPS = {"composite": ("squat_dance", "angry", "cheer"), "rivers": ("squat_dance", "cheer", "angry")}
 STRETCHING = ("stretch", "stretch-then-follow")
@@ -98,7 +99,8 @@ class RunConfig:
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
     figure_ticks : int
-        Servo ticks between two updates of the figure.
+        Servo ticks between two updates of the figure; 0: 8, but 2 on a map from a file, whose clips are played as they
+        are: a flight lands between two updates.
     scene : SceneConfig
         Figure's size, servo period and physics step.
     pushes : tuple of Push
@@ -145,7 +147,7 @@ class RunConfig:
     reach: float = 0.025
     cutoff: float = 150.0
     smoothing: float = 6.0
-    figure_ticks: int = 8
+    figure_ticks: int = 0
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
     turns: tuple[Turn, ...] = ()
@@ -155,6 +157,8 @@ class RunConfig:
         if not self.clips:
             clips = ("walk",) if self.mode == "lead" else MAP_CLIPS.get(self.map, FIGURE_CLIPS)
             object.__setattr__(self, "clips", clips)
+        if self.figure_ticks == 0:
+            object.__setattr__(self, "figure_ticks", 2 if self.map.endswith(MAP_SUFFIX) else 8)
 
 
 @dataclass(frozen=True)

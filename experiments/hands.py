@@ -1,5 +1,7 @@
 """The hand of a run: what the simulated user does, and how the stylus is held."""
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,10 +17,48 @@ Array = npt.NDArray[np.float64]
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 
+_AWAY = 1e-3  # [m] by which beginnings differ
+_SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
+
 
 def stylus_path(points: Array) -> Array:
     """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
     return np.hstack((points, np.tile(UPRIGHT, (len(points), 1))))
+
+
+class Beginning(NamedTuple):
+    """Where the stylus is when a run begins, and how it moves, in H.
+
+    Attributes
+    ----------
+    point, velocity, acceleration : Array
+        [m], [m/s], [m/s²], shape (3,).
+    """
+
+    point: Array
+    velocity: Array
+    acceleration: Array
+
+
+def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Beginning:
+    """Where a run begins: about a millimetre from the start of a curve.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        Timed as the hand is to move.
+    rng : numpy.random.Generator
+        Of where exactly.
+    moves : bool
+        Whether it begins in motion: then further along the curve, not beside it, for a hand is drawn back to its curve
+        within a fiftieth of a second, and a figure at full speed cannot follow it there.
+    """
+    away = rng.normal(scale=_AWAY, size=3)
+    if not moves:
+        return Beginning(curve.point(curve.start) + away, np.zeros(3), np.zeros(3))
+    speed = float(np.linalg.norm(curve.velocity(curve.start)))
+    phase = curve.start + min(float(np.linalg.norm(away)) / max(speed, _SLOW), _FURTHEST * curve.duration)
+    return Beginning(curve.point(phase), curve.velocity(phase), curve.acceleration(phase))
 
 
 def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Arm:

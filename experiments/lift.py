@@ -16,9 +16,10 @@ from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.motion_features import Motion
 from controllers.haptic_map.room import Room
 from experiments.clips import load_clips
+from experiments.config import MAP_SUFFIX
 from experiments.figure_maps import figure_legs
 from experiments.in_betweens import MotionMeasure
-from experiments.map_files import MAP_SUFFIX, save_map
+from experiments.map_files import save_map
 from experiments.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model

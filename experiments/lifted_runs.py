@@ -10,6 +10,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
 from experiments.config import RunConfig
 from experiments.modes import river_time
+from experiments.pace import paced
 from sim.users.intent import Grab
 from sim.world import phantom_angles
 
@@ -53,18 +54,32 @@ def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
 
 
 def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
-    """A river for every clip, by its name.
+    """A river for every clip, by its name, that leads the Phantom at the clip's pace (`paced`).
 
     Raises
     ------
     ParameterError
         If a gain is out of its interval.
+    SimError
+        If the Phantom does not reach a curve.
     """
     tau = river_time(config)
-    curves = [haptic_map.curve(i) for i in range(len(haptic_map.names))]
+    curves = [paced(haptic_map.curve(i), config.damping) for i in range(len(haptic_map.names))]
     return RiverBundle(
         tuple(River(curve, config.river_tube, tau, config.damping) for curve in curves), haptic_map.names
     )
+
+
+def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
+    """The curve along which the field of a run leads, so timed that friction leaves the hand the pace of `curve`.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    led = config.mode in ("follow", "rivers") and config.damping > 0.0
+    return paced(curve, config.damping) if led else curve
 
 
 def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float) -> Grab:

@@ -12,8 +12,6 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.errors import SimError
 
-MAP_SUFFIX = ".npz"
-
 _KINDS = {"Cylindrical": Cylindrical, "Composite": Composite, "Lifted": Lifted}
 
 

@@ -12,9 +12,9 @@ from controllers.fields.leading import Leading
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.led import Led
-from experiments.config import RunConfig
+from experiments.config import MAP_SUFFIX, RunConfig
 from experiments.lead import lead_static
-from experiments.map_files import MAP_SUFFIX, map_digest
+from experiments.map_files import map_digest
 from experiments.modes import Field
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5

@@ -23,16 +23,16 @@ from experiments.balance import balanced
 from experiments.budget import energy_tank
 from experiments.clips import only
 from experiments.compiling import compiled_parts
-from experiments.config import STRETCHING, RunConfig
+from experiments.config import MAP_SUFFIX, STRETCHING, RunConfig
 from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
-from experiments.hands import UPRIGHT, stylus_path, user_arm
+from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
 from experiments.lead import gait_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
 from experiments.led_balance import balanced_on_ground
-from experiments.lifted_runs import lifted_curve, lifted_rivers
-from experiments.map_files import MAP_SUFFIX, load_figure_map
+from experiments.lifted_runs import lifted_course, lifted_curve, lifted_rivers
+from experiments.map_files import load_figure_map
 from experiments.modes import Field
 from experiments.session import Session
 from experiments.stretch import law as stretch_law
@@ -97,7 +97,7 @@ def wire(
     curve = s_curve() if leading else Trajectory.circle(config.radius, config.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
-    rivers, led = None, None
+    rivers, led, course = None, None, curve
     if leading:
         blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
         led = lead_law(config, gait)
@@ -108,19 +108,20 @@ def wire(
         if isinstance(blended, Lifted):
             curve = lifted_curve(blended, config.curve)
             rivers = lifted_rivers(blended, config) if config.mode == "rivers" else None
+            course = lifted_course(curve, config)
     else:
         blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
-    parts = _assemble(config, curve, blended, rivers, led, world)
+    parts = _assemble(config, (curve, course), blended, rivers, led, world)
     ready(compiled_parts("figure", parts.compiled, parts.program.ops))
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
         blended = balanced(blended, world.figure, config.lap)
-        parts = _assemble(config, curve, blended, rivers, led, world)
+        parts = _assemble(config, (curve, course), blended, rivers, led, world)
     if isinstance(blended, Led):
         blended = balanced_on_ground(blended, world.figure)
-        parts = _assemble(config, curve, blended, rivers, led, world)
+        parts = _assemble(config, (curve, course), blended, rivers, led, world)
     haptic_map, field, program, compiled, user, limiter, tank, port = parts
     memory = program.fresh_memory()
     if leading:
@@ -129,19 +130,20 @@ def wire(
     period = config.scene.servo_period * config.figure_ticks
     legs = packed_legs(world.figure)
     reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs)
-    start = curve.point(curve.start) + np.random.default_rng(config.seed).normal(scale=1e-3, size=3)
+    # A walk at full speed cannot begin from rest.
+    moves = isinstance(blended, Lifted) and config.mode not in STRETCHING
+    begin = beginning(curve, np.random.default_rng(config.seed), moves)
     poses = np.empty((1, haptic_map.nq))
     walker = memory[TRACE_SIZE + ARGUMENT :][:7]
-    argument = walker[None] if leading else stylus_path(start[None])
+    argument = walker[None] if leading else stylus_path(begin.point[None])
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
-    # A walk at full speed cannot begin from rest.
-    if isinstance(blended, Lifted) and config.mode not in STRETCHING:
-        v_H = curve.velocity(curve.start)
+    if moves:
+        v_H = begin.velocity
         velocity = haptic_map.jacobian(argument[0])[:, :3] @ v_H
-        begin_in_motion(reference, np.array([start, v_H, curve.acceleration(curve.start)]))
+        begin_in_motion(reference, np.array(begin))
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
-    world.reset(start, poses[0], orientation, v_H, velocity)
+    world.reset(begin.point, poses[0], orientation, v_H, velocity)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
     servo = Servo(
         plant=make_plant(world),
@@ -159,7 +161,7 @@ def wire(
     )  # fmt: skip
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)
-    return Session(config, clips, remarks, curve, field, blended, haptic_map, world, figure, servo)
+    return Session(config, clips, remarks, course, field, blended, haptic_map, world, figure, servo)
 
 
 class _Parts(NamedTuple):
@@ -177,13 +179,17 @@ class _Parts(NamedTuple):
 
 def _assemble(
     config: RunConfig,
-    curve: Trajectory,
+    curves: tuple[Trajectory, Trajectory],
     blended: ClipMap | Led,
     rivers: RiverBundle | None,
     led: Leading | None,
     world: World,
 ) -> _Parts:
-    """Make the parts of a run and check all its numbers, without a call of what would have to be compiled."""
+    """Make the parts of a run and check all its numbers, without a call of what would have to be compiled.
+
+    Of the curves, a hand of its own keeps the pace of the first, and the field leads along the second.
+    """
+    curve, course = curves
     haptic_map = blended if isinstance(blended, Led) or not config.expressive else expressive_figure(blended)
     grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
     urged = 0.0
@@ -193,8 +199,8 @@ def _assemble(
         field = stretch_law(config, curve, grabs)
     else:
         assert not isinstance(blended, Led)
-        field, urged = governed_law(config, curve, blended, rivers)
-    program = field.program() if led is not None else oriented(field.program(), config, curve)
+        field, urged = governed_law(config, course, blended, rivers)
+    program = field.program() if led is not None else oriented(field.program(), config, course)
     if config.walls:
         walls = figure_walls(haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
         program = program + walls.program()
@@ -202,7 +208,7 @@ def _assemble(
     check_reference(period * config.figure_ticks, config.smoothing, config.blend)
     user = user_arm(config, curve, grabs) if led is None else leading_hand(led)
     limiter = ForceLimiter(period)
-    tank = energy_tank(config, curve, limiter, grabs, urged)
+    tank = energy_tank(config, course, limiter, grabs, urged)
     port = phantom_port(world.model, world.data, period, config.cutoff)
     return _Parts(haptic_map, field, program, compiled, user, limiter, tank, port)
 
