@@ -40,7 +40,7 @@ from experiments.stretch import stretch_grabs
 from experiments.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
-from sim.devices.phantom_port import PhantomPort, phantom_port
+from sim.devices.phantom_port import PhantomPort, phantom_port, sense_in_motion
 from sim.figure import Figure
 from sim.kernel_units import law_units
 from sim.plant import make_hand, make_plant
@@ -144,6 +144,8 @@ def wire(
         begin_in_motion(reference, np.array(begin))
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
+    if moves:
+        sense_in_motion(port)
     figure = Figure(world.model, world.data, world.figure, FIGURE)
     servo = Servo(
         plant=make_plant(world),

@@ -149,6 +149,22 @@ def sense(port: PhantomPort, t: float, switch: float) -> None:
     hand[14] = switch
 
 
+def sense_in_motion(port: PhantomPort) -> None:
+    """Let a device whose joints move begin as if it had been sensed before: its velocity is known from the first tick.
+
+    Else a field takes the hand for one that rests, and pushes it on.
+    """
+    a, g = port.arm_q, port.gimbal_q
+    for i in range(3):
+        port.memory[6 + i] = port.qvel[port.arm_v[i]]
+    theta = port.qpos[list(a)]
+    port.memory[:3] = encoder_reading.py_func(theta - port.period * port.memory[6:9])
+    port.hand[4:8] = stylus_orientation.py_func(
+        encoder_reading.py_func(theta), gimbal_reading.py_func(port.qpos[list(g)])
+    )
+    port.hand[0], port.memory[12] = -port.period, 1.0
+
+
 @njit
 def has_sensed(port: PhantomPort) -> bool:
     """Whether `sense` has been called before."""
