@@ -86,7 +86,8 @@ def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, star
     """A hand that carries the stylus from one curve to another past the transition between them.
 
     From `_LEAD` before the transition on the first curve to `_LEAD` behind it on the second, and beyond it, because an
-    arm yields: it stays behind where it means to be.
+    arm yields: it stays behind where it means to be. It moves at about the pace of the curves: one that carried the
+    stylus from rest to rest would stop the figure.
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, star
     here, there = _point(haptic_map, first, before), _point(haptic_map, second, behind)
     beyond = _OVERSHOOT * (there - _point(haptic_map, first, behind))
     x, y, z = (float(value) for value in there + beyond - here)
-    return Grab(start, (x, y, z), duration=0.4, hold=0.05)
+    return Grab(start, (x, y, z), duration=0.3, hold=0.0, steady=True)
 
 
 def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:

@@ -104,7 +104,7 @@ def grab_force(
     stiffness, damping : float
         k [N/m], b [N s/m].
     grabs : Array
-        Rows of `sim.users.intent.grab_table`, shape (n, 10).
+        Rows of `sim.users.intent.grab_table`, shape (n, 11).
     held : Array
         Where the hand was when each grab began, NaN before it has; shape (n, 3), updated.
     t, p, v, force
@@ -122,7 +122,10 @@ def grab_force(
         if math.isnan(held[i, 0]):
             held[i] = p
         reached, reaching = (1.0, 0.0) if grabs[i, 1] == 0.0 else _least_jerk((t - grabs[i, 0]) / grabs[i, 1])
-        carried, carrying = _least_jerk((t - pressed_at) / grabs[i, 8])
+        share = (t - pressed_at) / grabs[i, 8]
+        carried, carrying = _least_jerk(share)
+        if grabs[i, 10] != 0.0:
+            carried, carrying = min(max(share, 0.0), 1.0), 1.0 if 0.0 <= share < 1.0 else 0.0
         for k in range(3):
             way = 0.0 if math.isnan(grabs[i, 2]) else grabs[i, 2 + k] - held[i, k]
             wanted = held[i, k] + reached * way + carried * grabs[i, 5 + k]

@@ -18,8 +18,8 @@ Array = npt.NDArray[np.float64]
 PUSH_COLUMNS = 11
 """A push as a row: start, duration, peak, direction (3), outward, place (3), radius. A radius of 0 means any place."""
 
-GRAB_COLUMNS = 10
-"""A grab as a row: start, reach, place (3) or NaN, carry (3), duration, hold."""
+GRAB_COLUMNS = 11
+"""A grab as a row: start, reach, place (3) or NaN, carry (3), duration, hold, steady."""
 
 TURN_COLUMNS = 5
 """A turn as a row: start, duration, rotation vector at its peak (3)."""
@@ -106,6 +106,8 @@ class Grab:
         In the hand frame [m]; by default where the hand is.
     reach : float
         Time to get there [s]; ignored without a place.
+    steady : bool
+        Carry at a steady speed, σ(s) = s: the hand takes hold of a stylus that moves and lets go of it moving.
 
     Raises
     ------
@@ -119,6 +121,7 @@ class Grab:
     hold: float = 0.3
     place: tuple[float, float, float] | None = None
     reach: float = 1.0
+    steady: bool = False
 
     def __post_init__(self) -> None:
         numbers = [self.start, self.duration, self.hold, self.reach, *self.carry, *(self.place or ())]
@@ -133,13 +136,13 @@ class Grab:
         return self.start + (self.reach if self.place else 0.0) + self.duration + self.hold
 
     def row(self) -> Array:
-        """The grab as numbers for the compiled hand, shape (10,)."""
+        """The grab as numbers for the compiled hand, shape (11,)."""
         place, reach = (np.full(3, np.nan), 0.0) if self.place is None else (np.array(self.place), self.reach)
-        return np.array([self.start, reach, *place, *self.carry, self.duration, self.hold])
+        return np.array([self.start, reach, *place, *self.carry, self.duration, self.hold, float(self.steady)])
 
 
 def grab_table(grabs: Sequence[Grab]) -> Array:
-    """Rows of all grabs in the order of their beginnings, shape (n, 10).
+    """Rows of all grabs in the order of their beginnings, shape (n, 11).
 
     Raises
     ------

@@ -33,13 +33,20 @@ def test_the_file_holds_the_transitions_that_were_found(map_file: Path) -> None:
     assert main(["lift", *CLIPS, "--out", str(map_file)]) == 2
 
 
-def test_follow_traces_a_curve_of_the_map_at_the_clip_s_pace(map_file: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("curve", "seconds"), [("walk", 2.2), ("run", 2.2), ("jump", 2.4)])
+def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
+    map_file: Path, tmp_path: Path, curve: str, seconds: float
+) -> None:
     out = tmp_path / "follow"
-    command = ["run", "--map", str(map_file), "--curve", "run", "--seconds", "8", "--out", str(out)]
+    command = ["run", "--map", str(map_file), "--curve", curve, "--seconds", "10", "--out", str(out)]
     assert main(command) == 0
-    path = json.loads((out / "summary.json").read_text())["path"]
-    assert path["deviation_rms_mm"] < 1.0
-    assert path["lap_seconds"] == pytest.approx(2.2, rel=0.1)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["path"]["deviation_rms_mm"] < 1.0
+    assert summary["path"]["lap_seconds"] == pytest.approx(seconds, rel=0.01)
+    assert summary["figure"]["fell_at"] is None
+    assert summary["figure"]["root_error_max_cm"] < 5.0
+    assert summary["figure"]["residual_force_rms"] < 0.1
+    assert summary["figure"]["residual_in_flight_max"] == 0.0
 
 
 def test_a_hand_changes_over_from_walk_to_run_where_lifting_found_a_transition(map_file: Path, tmp_path: Path) -> None:

@@ -1,12 +1,17 @@
 """A run that begins in motion: stylus and figure move from the first moment as they are told to."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
 
+from controllers.curves.trajectory import Trajectory
 from models.humanoid.skeleton import N_TANGENT, rest_pose
 from models.scene import FIGURE, PHANTOM
-from sim.devices.phantom_port import phantom_port, true_motion
+from sim.devices.phantom_port import phantom_port, sense, sense_in_motion, true_motion
+from sim.reference import begin_in_motion
+from sim.stylus_filter import smooth_hand
 from sim.world import World
 
 
@@ -48,3 +53,29 @@ def test_without_velocities_both_rest():
     world = World()
     world.reset(np.array([0.03, 0.0, 0.0]), rest_pose())
     assert not world.data.qvel.any()
+
+
+def test_the_device_knows_its_velocity_from_the_first_tick():
+    world, p, v_H = World(), np.array([0.03, -0.02, 0.02]), np.array([0.1, -0.05, 0.08])
+    errors = []
+    for moves in (False, True):
+        world.reset(p, rest_pose(), None, v_H)
+        port = phantom_port(world.model, world.data, 0.001, 150.0)
+        if moves:
+            sense_in_motion(port)
+        sense(port, 0.0, 0.0)
+        assert port.hand[0] == 0.0
+        np.testing.assert_allclose(port.hand[1:4], p, atol=5e-5)
+        errors.append(np.linalg.norm(port.hand[8:11] - v_H))
+    # An encoder step in a period, filtered, is what is left; without it the hand is taken to rest.
+    assert errors[0] > 0.9 * np.linalg.norm(v_H)
+    assert errors[1] < 0.03
+
+
+def test_the_filter_of_the_stylus_is_where_the_motion_is_at_its_first_update():
+    lap, period = Trajectory.circle(0.05, 2.0), 0.008
+    reference = SimpleNamespace(period=period, smoothing=0.7, started=np.zeros(1), hand=np.zeros((3, 3)))
+    begin_in_motion(reference, np.array([lap.point(0.0), lap.velocity(0.0), lap.acceleration(0.0)]))
+    stylus = np.append(lap.point(0.0), [1.0, 0.0, 0.0, 0.0])
+    smooth_hand(reference.hand, stylus[:3], reference.smoothing, period)
+    np.testing.assert_allclose(reference.hand, [lap.point(0.0), lap.velocity(0.0), lap.acceleration(0.0)], atol=1e-12)

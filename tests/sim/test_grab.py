@@ -46,6 +46,17 @@ def test_it_goes_to_the_place_presses_carries_holds_and_lets_go() -> None:
         assert pressed == switch
 
 
+def test_a_steady_one_moves_from_its_first_moment_to_its_last() -> None:
+    grab = Grab(1.0, (0.0, 0.02, 0.0), duration=0.5, hold=0.0, steady=True)
+    hand, damped = (Hand(Arm(stiffness=k, damping=b, grabs=(grab,))) for k, b in ((200.0, 0.0), (1e-9, 5.0)))
+    for share in (0.0, 0.1, 0.5, 0.99):
+        force, pressed = hand.at(1.0 + 0.5 * share)
+        np.testing.assert_allclose(force, [0.0, 200.0 * 0.02 * share, 0.0], atol=1e-9)
+        np.testing.assert_allclose(damped.at(1.0 + 0.5 * share)[0], [0.0, 5.0 * 0.04, 0.0], atol=1e-9)
+        assert pressed == 1.0
+    assert not hand.at(1.501)[0].any()
+
+
 def test_it_damps_towards_the_speed_that_it_wants() -> None:
     still = Hand(Arm(stiffness=200.0, damping=0.0, grabs=(GRAB,)))
     damped = Hand(Arm(stiffness=200.0, damping=3.0, grabs=(GRAB,)))
