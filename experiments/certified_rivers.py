@@ -1,6 +1,7 @@
 """Certificates of the rivers of a run: stability of each, and the switching where they meet."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import permutations
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River as FieldRiver
 from controllers.safety import ForceLimiter
 from experiments.config import RunConfig
+from experiments.crossing_simulation import simulated_course
 from experiments.modes import default_rivers, law, river_time
 
 Array = npt.NDArray[np.float64]
@@ -128,13 +130,14 @@ def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meetin
     """First counterexample: unpushed hands first, at every meeting; none is looked for where torques are late."""
     if rivers[0].sampling.delay > 0.0:
         return {}
+    simulate = partial(simulated_course, field, rivers[0].sampling)
     for newtons in dict.fromkeys((0.0, push)):
         for place in places:
             held, other = rivers[place.own], rivers[place.other]
             grid = other.phases()
             near = int(np.argmin(np.linalg.norm(other.curve.point(grid) - held.curve.point(place.phase), axis=1)))
             towards = other.curve.velocity(grid[near])
-            found = counterexample(field, place.own, held, place.phase, towards, (newtons,))
+            found = counterexample(field, place.own, held, place.phase, towards, (newtons,), simulate)
             if found:
                 return found
     return {}

@@ -17,7 +17,7 @@ from controllers.certificates.laws import FOLLOW_LAW
 from controllers.certificates.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from experiments.trial_onset import predicted
 from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
 from sim.errors import SimError

@@ -4,13 +4,11 @@ import json
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.certificates.device import Device
 from controllers.certificates.energy import energy
 from controllers.certificates.hand import HandRange
 from controllers.certificates.laws import FOLLOW_LAW, LAWS
@@ -21,6 +19,7 @@ from controllers.certificates.stability import River, boundary, stability
 from controllers.errors import ParameterError
 from controllers.safety import ForceLimiter
 from experiments.certified_clips import certify_clips
+from experiments.certified_device import phantom_device
 from experiments.certified_field import (
     certificate_inputs,
     certified_curves,
@@ -32,31 +31,11 @@ from experiments.certified_leading import certify_leading, leading_field, leadin
 from experiments.certified_rivers import certify_rivers
 from experiments.config import RunConfig
 from models.mocap.clip import Clip
-from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
-from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
-from models.phantom.parameters import PREMIUM_1_5
-from sim.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
 
 CERTIFICATE, PAGE, PLOT = "certificate.json", "certificate.html", "stability.png"
 REGION_PLOT = "region.png"
-
-
-def phantom_device() -> Device:
-    """The Phantom as certificates know it: its own kernels, on symbols, in the hand frame."""
-
-    def jacobian_H(theta: Any) -> Any:
-        columns = zip(*jacobian.py_func(theta), strict=True)
-        return tuple(zip(*(vector_to_hand_frame.py_func(column) for column in columns), strict=True))
-
-    p = PREMIUM_1_5
-    return Device(
-        position=lambda theta: vector_to_hand_frame.py_func(forward_kinematics.py_func(theta)),
-        jacobian=jacobian_H, mass=mass_matrix.py_func, coriolis=coriolis_matrix.py_func,
-        gravity=gravity_torques.py_func, angles=phantom_angles, viscous=p.viscous_friction,
-        coulomb=p.coulomb_friction, encoder_step=p.encoder_step, peak_torque=p.peak_torque,
-    )  # fmt: skip
 
 
 def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:

@@ -23,7 +23,7 @@ from controllers.curves.walked_path import STEP
 from controllers.fields.instructions import Program
 from controllers.fields.leading import Gait, Leading
 from controllers.state import HandState
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from experiments.lead import s_curve
 from experiments.trial_onset import observed, predicted
 from experiments.trial_simulation import LAP, Conditions, Trial

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from controllers.certificates.sampled_loop import SampledLoop
 from controllers.certificates.stability import critical_stiffness, slowest_mode
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from experiments.trial_simulation import Conditions, Trial, simulate
 
 Array = npt.NDArray[np.float64]

@@ -22,7 +22,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import Program
 from controllers.fields.program import evaluate
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
 from models.scene import PHANTOM, R_WP
 from sim.compiled import entry_point

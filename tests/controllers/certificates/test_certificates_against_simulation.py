@@ -13,7 +13,7 @@ from controllers.certificates.sampling import Sampling
 from controllers.certificates.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from experiments.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
 from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
 from sim.users.arm import Arm

@@ -14,8 +14,8 @@ from controllers.certificates.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
 from controllers.state import HandState
+from experiments.certified_device import phantom_device
 from experiments.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
-from experiments.certify import phantom_device
 from experiments.config import RunConfig
 from experiments.lead import s_curve
 from experiments.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial

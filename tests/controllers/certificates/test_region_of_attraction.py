@@ -17,7 +17,7 @@ from controllers.certificates.sampling import Sampling
 from controllers.certificates.stability import River
 from controllers.certificates.tube_bounds import tube_bounds
 from controllers.curves.trajectory import Trajectory
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 
 SLOW = Trajectory.circle(0.0477, 12.0)
 RIVER = River(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))

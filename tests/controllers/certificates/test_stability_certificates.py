@@ -31,7 +31,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_SWITCH, HandState
-from experiments.certify import phantom_device
+from experiments.certified_device import phantom_device
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     forward_kinematics,

@@ -1,6 +1,7 @@
 """Switching of rivers: Lyapunov functions judged independently, bounds that hold in MuJoCo, hands lost there."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ from controllers.certificates.common_lyapunov import common_lyapunov, contractio
 from controllers.certificates.hand import HandRange
 from controllers.certificates.sampling import Sampling
 from controllers.certificates.switching import Keeping, Sharing, hysteresis_dwell, switching
-from controllers.certificates.switching_search import SECONDS, Push, counterexample, failure
+from controllers.certificates.switching_search import SECONDS, Course, Push, counterexample, failure
+from experiments.certified_device import phantom_device
 from experiments.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
-from experiments.certify import certified_rivers, phantom_device
+from experiments.certify import certified_rivers
 from experiments.config import RunConfig
+from experiments.crossing_simulation import simulated_course
 from experiments.modes import law
-from experiments.switching_trials import simulated_course, straight_pair, trials
+from experiments.switching_trials import straight_pair, trials
 
 CLOCK = Sampling(1e-3)
 SLOW_FILTER = Sampling(1e-3, 0.0, 50.0)
@@ -34,7 +37,8 @@ def _lost(field, clock, newtons):
     rivers = _rivers(field, clock)
     place = meetings(rivers)[0]
     towards = rivers[place.other].curve.velocity(0.8)
-    return counterexample(field, place.own, rivers[place.own], place.phase, towards, (newtons,))
+    simulate = partial(simulated_course, field, clock)
+    return counterexample(field, place.own, rivers[place.own], place.phase, towards, (newtons,), simulate)
 
 
 def _in_mujoco(field, clock, found):
@@ -108,6 +112,21 @@ def test_without_hysteresis_a_hand_between_shallow_rivers_chatters_in_mujoco_too
     # The same start with the hysteresis that is certified: it does not.
     calm = _in_mujoco(straight_pair(10.0, "discrete", 2.0), CLOCK, found)
     assert failure(calm.river, CLOCK.period, found["river"], True) is None
+
+
+def test_what_the_simulation_keeps_is_no_counterexample():
+    field = straight_pair(20.0, "discrete", 0.15)
+    rivers, tried = _rivers(field), []
+
+    def keeps(start, velocity, seconds, push):
+        tried.append(push)
+        n = round(seconds / CLOCK.period)
+        return Course(np.zeros((n, 3)), np.zeros(n))
+
+    place = meetings(rivers)[0]
+    towards = rivers[place.other].curve.velocity(0.8)
+    assert counterexample(field, place.own, rivers[place.own], place.phase, towards, (1.0,), keeps) == {}
+    assert tried
 
 
 def test_a_hand_that_is_pushed_hard_is_thrown_out_in_mujoco_too():
