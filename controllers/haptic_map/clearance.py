@@ -52,7 +52,7 @@ def cleared(
     """
     n = len(values)
     feet = blended_feet(channels, drifts, limbs, between)
-    lacking = _lacking(feet, np.einsum("ck,nkx->ncx", shares, values))
+    lacking = _lacking(feet, shares @ values)
     width = max(1, round(_SPREAD * n))
     bump = np.hanning(2 * width + 3)
     wide = maximum_filter1d(lacking, 2 * width + 1, axis=0, mode="wrap")

@@ -55,11 +55,11 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
 
 def _mixtures(steps: int) -> tuple[Array, Array]:
     """Places (steps², 2) at equal steps of the corrections' table, as shares of r and z, and weights (steps², 4)."""
-    share = np.linspace(0.0, 1.0, 4001)
-    nodes = np.interp(np.linspace(0.0, 1.0, steps), [eased(at, _EDGE)[0] for at in share], share)
+    ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # compiling it would take longer than all of this
+    nodes = np.interp(np.linspace(0.0, 1.0, steps), [ease(at, _EDGE)[0] for at in share], share)
     z, r = np.meshgrid(nodes, nodes)
     places = np.stack([r.ravel(), z.ravel()], axis=-1)
-    a, b = (np.array([eased(at)[0] for at in way]) for way in places.T)
+    a, b = (np.array([ease(at)[0] for at in way]) for way in places.T)
     return places, np.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], axis=-1)
 
 

@@ -71,8 +71,9 @@ def _raise(lift: Array) -> Array:
 
 def _mean_rotations(quaternions: Array, weights: Array) -> Array:
     """Chordal means (n, k, 4) of rotations (n, m, 4) with weights (k, m); signs continuous along n."""
-    moment = np.einsum("km,nmx,nmy->nkxy", weights, quaternions, quaternions)
-    mean = np.linalg.eigh(moment)[1][..., -1]
+    n, m, _ = quaternions.shape
+    squares = (quaternions[..., :, None] * quaternions[..., None, :]).reshape(n, m, 16)
+    mean = np.linalg.eigh((weights @ squares).reshape(n, -1, 4, 4))[1][..., -1]
     dots = np.einsum("nkx,nkx->nk", mean[:-1], mean[1:])
     mean[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[..., None]
     return mean

@@ -27,7 +27,7 @@ def packed_table(values: Array) -> Array:
         system[k, k : k + 3] = 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0
     system[nodes, :3] = system[nodes + 1, -3:] = 1.0, -2.0, 1.0
     inverse = np.linalg.inv(system)[:, :nodes]
-    control = np.einsum("ai,bj,nijc->nabc", inverse, inverse, values)
+    control = np.einsum("ai,bj,nijc->nabc", inverse, inverse, values, optimize=True)
     return np.concatenate([[rows, nodes, channels], control_points(control, np.ones(1)).ravel()])
 
 
