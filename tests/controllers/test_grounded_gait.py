@@ -1,14 +1,14 @@
 """A gait that flies, kept on the ground: no flight is left, feet stand where they stood, legs are long enough."""
 
-import mujoco
 import numpy as np
 import pytest
+from figure_soles import slide, soles
 
 from controllers.haptic_map.grounded import runs
 from controllers.haptic_map.led import Led
 from experiments.figure_maps import figure_legs
 from experiments.lead import led_map
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 from models.mocap.contacts import contacts
 from models.mocap.library import embedded
@@ -26,30 +26,6 @@ def figure():
 @pytest.fixture(scope="module")
 def run(figure):
     return led_map(embedded("run"), figure_legs(figure), 0)
-
-
-def soles(figure, poses):
-    data, geoms = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    places = []
-    for pose in poses:
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(figure, data)
-        places.append(data.geom_xpos[geoms] - [0.0, 0.0, CONTACT_RADIUS])
-    return np.array(places)
-
-
-def slide(places, touch=0.003):
-    worst = 0.0
-    for point in range(places.shape[1]):
-        since = None
-        for place in places[:, point]:
-            if place[2] >= touch:
-                since = None
-            elif since is None:
-                since = place[:2]
-            else:
-                worst = max(worst, float(np.hypot(*(place[:2] - since))))
-    return worst
 
 
 def test_runs_of_a_mask_go_round():

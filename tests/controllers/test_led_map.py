@@ -1,16 +1,16 @@
 """The led figure: the clip itself where its path is straight, feet that stay where they stand, exact derivatives."""
 
-import mujoco
 import numpy as np
 import pytest
 from clips_for_maps import LEG, difference, swinging
+from figure_soles import slide, soles
 
 from controllers.curves.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from experiments.figure_maps import figure_legs
 from experiments.lead import led_map
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 from models.mocap.contacts import contacts
 from models.mocap.library import embedded
@@ -35,30 +35,6 @@ def winding(gait, bend, length=9.0):
 @pytest.fixture(scope="module")
 def figure():
     return figure_model()
-
-
-def soles(figure, poses):
-    data, geoms = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    places = []
-    for pose in poses:
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(figure, data)
-        places.append(data.geom_xpos[geoms] - [0.0, 0.0, CONTACT_RADIUS])
-    return np.array(places)
-
-
-def slide(places, touch=0.003):
-    worst = 0.0
-    for point in range(places.shape[1]):
-        since = None
-        for place in places[:, point]:
-            if place[2] >= touch:
-                since = None
-            elif since is None:
-                since = place[:2]
-            else:
-                worst = max(worst, float(np.hypot(*(place[:2] - since))))
-    return worst
 
 
 @pytest.mark.parametrize("name", ["walk", "run"])
