@@ -6,13 +6,17 @@ At the rate σ the acceleration is σ² a, so
 .. math:: \sigma^2 (\lVert a_h \rVert - \mu a_z) \le \mu g .
 
 In a turn of radius r at speed v this is v² / r ≤ μ g; with nothing but a_z it says that the floor cannot pull.
+
+Accelerations are those of the best parabola through a window of frames, a = Σ c_i p_i (Savitzky & Golay 1964). As a
+mean with weights ≥ 0 of what the acceleration is in between, it is within the cone for whatever body the floor carries.
+So if a misses the cone by d, each such body misses some frame of the window by at least d / Σ|c_i|.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from controllers.certificates.ballistic import BodyMotion, FlightJudgement
 from controllers.certificates.flight_fit import GRAVITY
@@ -99,16 +103,31 @@ def floor_rates(motion: BodyMotion, friction: float) -> Array:
     """
     if not (np.isfinite(friction) and friction > 0.0):
         raise ParameterError(f"the coefficient of friction is {friction}; expected a finite number > 0")
-    half = max(2, round(_WINDOW * motion.fps / 2))
-    if len(motion.com) < 2 * half + 1:
+    window = _frames_of_window(motion.fps)
+    if len(motion.com) < window:
         return np.full(len(motion.com), np.inf)
-    a: Array = np.asarray(savgol_filter(motion.com, 2 * half + 1, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
+    a = _mean_acceleration(motion)
     needed = np.linalg.norm(a[:, :2], axis=1) - friction * a[:, 2]
     return np.where(needed > 0.0, np.sqrt(friction * GRAVITY / np.maximum(needed, 1e-12)), np.inf)
 
 
+def _frames_of_window(fps: float) -> int:
+    return 2 * max(2, round(_WINDOW * fps / 2)) + 1
+
+
+def _mean_acceleration(motion: BodyMotion) -> Array:
+    """Of the best parabola about each frame, (n, 3); the first and last windows serve all of their half."""
+    window = _frames_of_window(motion.fps)
+    return np.asarray(savgol_filter(motion.com, window, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
+
+
 def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], friction: float, frames: int) -> Verdict:
-    """Whether friction can turn, start and stop the first frames as recorded; the margin is the least σ² − 1."""
+    """Whether friction can turn, start and stop the first frames as recorded; the margin is the least σ² − 1.
+
+    The counterexample is the window of frames ``start`` to ``end`` about the hardest ``frame``, with the centre of mass
+    [m] and its velocity [m/s] as it begins, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which any
+    body on that floor misses the window, whatever its own state is as it begins.
+    """
     high = floor_rates(motion, friction)
     for flight in flights:
         high[flight.fit.start : flight.fit.end + 1] = np.inf
@@ -123,8 +142,26 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     reason = f"the floor gives it up to {rate:.2f} of its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0, assumptions)
-    counterexample = {"frame": frame, "rate": rate}
+    counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
+    reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.1f} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
+
+
+def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str, Any]:
+    window, delta = _frames_of_window(motion.fps), 1.0 / motion.fps
+    start = int(np.clip(frame - window // 2, 0, len(motion.com) - window))
+    a = _mean_acceleration(motion)[frame]
+    drift = float(np.linalg.norm(a[:2]))
+    push = float(a[2]) + GRAVITY
+    # The nearest point of the cone is its apex for a push that points below the cone's polar.
+    outside = (drift - friction * push) / np.hypot(1.0, friction) if push > -friction * drift else np.hypot(drift, push)
+    per_metre = float(np.abs(savgol_coeffs(window, 2, deriv=2, delta=delta)).sum())
+    span = slice(start, start + window)
+    velocity = savgol_filter(motion.com[span], window, 2, deriv=1, delta=delta, axis=0)[0]
+    return {
+        "start": start, "end": start + window - 1, "com": motion.com[start], "velocity": velocity, "acceleration": a,
+        "distance": float(outside) / per_metre,
+    }  # fmt: skip
 
 
 def turn_speed(radius: Array, friction: float) -> Array:

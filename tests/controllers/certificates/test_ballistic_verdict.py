@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from controllers.certificates.ballistic import BallisticTolerance, BodyMotion, ballistic_verdict, judge_flights
 from controllers.certificates.rate_bounds import floor_rates, rate_bounds, turn_rate, turn_speed, turns_verdict
@@ -111,6 +112,31 @@ def test_a_turn_may_be_run_as_fast_as_friction_holds(speed):
     assert turn_rate(np.array([fastest, 0.0]), 0.8) == pytest.approx([fastest / 2.0, np.inf])
     expected = "certified" if speed < fastest else "refuted"
     assert turns_verdict(motion, (), 0.8, 600).verdict == expected
+
+
+def test_no_body_on_the_floor_comes_nearer_to_a_turn_than_the_verdict_says():
+    motion, friction = circling(4.6, radius=2.0), 0.8
+    example = turns_verdict(motion, (), friction, 600).counterexample
+    window = motion.com[example["start"] : example["end"] + 1]
+    inwards = np.asarray(example["acceleration"])[:2] / np.linalg.norm(example["acceleration"][:2])
+    across = np.append(inwards, -friction) / np.hypot(1.0, friction)  # normal of the cone where it is nearest
+    # The best of all bodies along that normal, by linear programming: place, velocity, and a push in each interval.
+    n, steps = len(window), 4 * (len(window) - 1)
+    dt = 1.0 / FPS / 4.0
+    velocity = np.tril(np.ones((steps + 1, steps)), -1) * dt
+    position = np.cumsum(np.vstack([np.zeros(steps), 0.5 * (velocity[:-1] + velocity[1:]) * dt]), axis=0)[::4]
+    t = np.arange(n)[:, None] / FPS
+    error = np.hstack([np.ones((n, 1)), t, position])  # of place, speed and acceleration along the normal
+    most = friction * 9.81 / np.hypot(1.0, friction)  # what the cone lets through along it
+    wanted, one = window @ across, np.ones((n, 1))
+    best = linprog(
+        np.r_[np.zeros(2 + steps), 1.0],
+        np.vstack([np.hstack([error, -one]), np.hstack([-error, -one])]), np.r_[wanted, -wanted],
+        bounds=[(None, None)] * 2 + [(None, most)] * steps + [(0.0, None)],
+    )  # fmt: skip
+    assert best.success
+    assert example["distance"] <= best.fun <= 1.5 * example["distance"]
+    assert example["distance"] > 3e-4
 
 
 def test_flights_bound_the_rate_from_both_sides_and_stance_from_above():
