@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from controllers.certificates.ballistic import FlightJudgement
-from controllers.certificates.flight_fit import GRAVITY, best_fall
+from controllers.certificates.flight_fit import best_fall
+from controllers.certificates.tolerance import GRAVITY
 from experiments.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 

@@ -1,7 +1,6 @@
 """Ballistics of clips: certify their flights, fly them with the physical figure, repair them."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,28 +9,26 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from controllers.certificates.ballistic import (
-    BallisticTolerance,
     BodyMotion,
     FlightJudgement,
     ballistic_verdict,
     judge_flights,
 )
-from controllers.certificates.flight_fit import GRAVITY, FlightFit, best_fall
+from controllers.certificates.flight_fit import FlightFit, best_fall
 from controllers.certificates.rate_bounds import RateBounds, rate_bounds, turns_verdict
-from controllers.certificates.report import Certificate, Verdict, hash_of
+from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
+from controllers.certificates.tolerance import GRAVITY, JUDGING, Judging
+from experiments.certified_field import clip_inputs
 from models.humanoid.skeleton import N_POSE
 from models.mocap import quaternions
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.contacts import contacts
-from models.mocap.library import load
 from models.mocap.momentum import momentum
 from sim.clip_motion import clip_motion
-from sim.compiled import source_hash
 from sim.tracking import TrackingConfig, tracked_motion
 
 Array = npt.NDArray[np.float64]
 
-FRICTION = 0.9  # of soles on the floor of the scene
 _LIFT = 10.0  # flown so high that nothing but gravity acts [m]
 _FINE = 480.0  # frames per second at which a flight is flown [1/s]
 _AFTER = 8  # of them after the landing, which shape the reference's spline
@@ -112,49 +109,30 @@ def body_motion(clip: Clip) -> BodyMotion:
 
 def clip_ballistics(
     clip: Clip,
-    tolerance: BallisticTolerance | None = None,
-    friction: float = FRICTION,
+    judging: Judging = JUDGING,
     assumptions: tuple[str, ...] = (),
 ) -> ClipBallistics:
     """Judge all flights of a clip, and the turns between them; `assumptions` are added to those of the verdict."""
-    tolerance = tolerance or BallisticTolerance()
     laps = clip
     if clip.closes():
         laps = Clip(np.vstack([clip.poses, clip.displacement.moved(clip.poses[1:])]), clip.fps, clip.name)
     motion = body_motion(laps)
-    flights = judge_flights(motion, tolerance)
+    flights = judge_flights(motion, judging.tolerance)
     if laps is not clip:
         # A flight that a cut lap begins with is the second half of the one at its end.
         first, last = int(np.argmax(motion.supported)), clip.n_frames - 1
         flights = tuple(flight for flight in flights if first <= flight.fit.start < last)
-    bounds = rate_bounds(motion, flights, friction)
-    verdict = ballistic_verdict(motion, flights, tolerance)
+    bounds = rate_bounds(motion, flights, judging.friction)
+    verdict = ballistic_verdict(motion, flights, judging.tolerance)
     if verdict.verdict == "refuted":
         verdict = _with_initial_state(verdict, laps, flights)
     verdict = replace(verdict, assumptions=(*verdict.assumptions, *assumptions))
-    certificate = Certificate(
-        {"ballistic": verdict, "turns": turns_verdict(motion, flights, friction, clip.n_frames)},
-        hash_of([clip.poses, clip.fps, tolerance, friction, source_hash()]),
-    )
+    turns, inputs = turns_verdict(motion, flights, judging.friction, clip.n_frames), clip_inputs(clip, judging)
+    certificate = Certificate({"ballistic": verdict, "turns": turns}, hash_of(inputs), hashes_of(inputs))
     lap = slice(0, clip.n_frames)
     return ClipBallistics(
         clip.duration, laps, motion, flights, RateBounds(bounds.low[lap], bounds.high[lap]), certificate
     )
-
-
-def certify_file(path: Path, tolerance: BallisticTolerance | None = None, friction: float = FRICTION) -> ClipBallistics:
-    """Judge the flights of the motion in a file, on the figure.
-
-    Raises
-    ------
-    MotionFileError
-        If the file cannot be read.
-    """
-    clip, report = load(path)
-    scaled = (
-        () if report is None else (f"lengths, and gravity with them, are scaled to the figure; {report.lines()[1]}",)
-    )
-    return clip_ballistics(clip, tolerance, friction, scaled)
 
 
 def _with_initial_state(verdict: Verdict, clip: Clip, flights: tuple[FlightJudgement, ...]) -> Verdict:

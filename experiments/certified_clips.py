@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from controllers.certificates.report import Verdict
+from controllers.certificates.tolerance import JUDGING, Judging
 from experiments.ballistics import clip_ballistics
 from experiments.clips import load_clips
 from experiments.config import MAP_SUFFIX, RunConfig
@@ -32,9 +33,9 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     return config, load_clips(config.clips)[0]
 
 
-def certify_clips(clips: Sequence[Clip]) -> dict[str, Verdict]:
+def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:
     """Verdicts ``ballistic`` and ``turns`` on clips together: the worst of them, which is named, and all in figures."""
-    found = [(clip.name, clip_ballistics(clip).certificate.verdicts) for clip in clips]
+    found = [(clip.name, clip_ballistics(clip, judging).certificate.verdicts) for clip in clips]
     told: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(((name, of[kind]) for name, of in found), key=lambda pair: _ORDER.index(pair[1].verdict))

@@ -1,18 +1,19 @@
-"""What a certificate of a field is of: laws and gains, curve, clock, device, hands and code; and whether it still is.
+"""What a certificate is of, and whether it still is: laws, gains, curve, clock, device, hands, clips and code.
 
 Nothing here needs CasADi, so a stored certificate is checked without starting it.
 """
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
 from controllers.certificates.hand import HandRange
-from controllers.certificates.report import Certificate, CertificateError
+from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
 from controllers.certificates.sampling import Sampling
+from controllers.certificates.tolerance import JUDGING, Judging
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.stretchy_tubes import StretchyTubes
@@ -109,7 +110,12 @@ def certified_sampling(config: RunConfig, delay: float) -> Sampling:
 
 
 def certificate_inputs(
-    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = ()
+    config: RunConfig,
+    delay: float,
+    hands: HandRange,
+    push: float,
+    clips: Sequence[Clip] = (),
+    judging: Judging = JUDGING,
 ) -> dict[str, object]:
     """All that the verdicts on a run's field depend on, by name, for `hash_of`.
 
@@ -125,14 +131,16 @@ def certificate_inputs(
         Largest force of the hand [N].
     clips : sequence of Clip
         Those that are judged besides, and that set the gait of a figure that is led.
+    judging : Judging
+        By what clips are judged.
     """
-    sampling, folder = certified_sampling(config, delay), Path(__file__).parent
-    makers = [*sorted(folder.glob("certif*.py")), *(folder / name for name in ("ballistics.py", "lead.py", "modes.py"))]
+    sampling = certified_sampling(config, delay)
     return {
         "gains": certified_laws(config),
         "crossing": (config.crossing, config.reach) if config.mode == "rivers" else None,
         "curve": certified_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
+        "judging": judging if clips else None,
         "figure": (config.scene.stature, config.scene.mass, config.floor_scale) if config.mode == "lead" else None,
         "period": sampling.period,
         "delay": sampling.delay,
@@ -140,12 +148,23 @@ def certificate_inputs(
         "device": PREMIUM_1_5,
         "hand": hands,
         "push": push,
-        "code": [
-            source_hash(),
-            [hashlib.sha256(file.read_bytes()).hexdigest() for file in makers],
-            [version(library) for library in ("casadi", "numpy", "scipy")],
-        ],
+        "code": _code(),
     }
+
+
+def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
+    """All that the verdicts on a clip depend on, by name, for `hash_of`."""
+    return {"clip": (clip.fps, clip.poses), "judging": judging, "code": _code()}
+
+
+def _code() -> list[object]:
+    folder = Path(__file__).parent
+    makers = [*sorted(folder.glob("certif*.py")), *(folder / name for name in ("ballistics.py", "lead.py", "modes.py"))]
+    return [
+        source_hash(),
+        [hashlib.sha256(file.read_bytes()).hexdigest() for file in makers],
+        [version(library) for library in ("casadi", "numpy", "scipy")],
+    ]
 
 
 def read_certificate(file: Path) -> Certificate:
@@ -158,25 +177,25 @@ def read_certificate(file: Path) -> Certificate:
     """
     try:
         return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise CertificateError(f"{file}: cannot be opened ({error.strerror}); expected a certificate.json") from None
     except (ValueError, RecursionError) as error:
         raise CertificateError(f"{file}: {error}") from None
 
 
-def verify_certificate(
-    file: Path, config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = ()
-) -> Certificate:
-    """The certificate of a file, if it is of this run's field and of this code.
+def verify_certificate(file: Path, inputs: Mapping[str, object]) -> Certificate:
+    """The certificate of a file, if it is of these inputs: `certificate_inputs` or `clip_inputs`.
 
     Raises
     ------
     CertificateError
-        If the file holds none, or any input differs; the message says which.
-    ParameterError
-        If there is no certificate for the run's mode.
+        If the file holds none.
+    ChangedInputs
+        If any input differs; the message says which.
     """
     certificate = read_certificate(file)
     try:
-        certificate.check(certificate_inputs(config, delay, hands, push, clips))
-    except CertificateError as error:
-        raise CertificateError(f"{file}: {error}") from None
+        certificate.check(inputs)
+    except ChangedInputs as error:
+        raise ChangedInputs(f"{file}: {error}") from None
     return certificate

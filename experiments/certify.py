@@ -1,12 +1,9 @@
-"""Certificates of a run's field: what is known of its stability, passivity and energy before it is felt."""
+"""Certificates of a run's field, before it is felt, and of a clip, before it is played; kept in a folder."""
 
 import json
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.certificates.energy import energy
@@ -15,9 +12,12 @@ from controllers.certificates.laws import FOLLOW_LAW, LAWS
 from controllers.certificates.passivity import passivity
 from controllers.certificates.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
-from controllers.certificates.stability import River, boundary, stability
+from controllers.certificates.stability import River, stability
+from controllers.certificates.tolerance import JUDGING, Judging
 from controllers.errors import ParameterError
 from controllers.safety import ForceLimiter
+from experiments.ballistics import clip_ballistics
+from experiments.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
 from experiments.certified_clips import certify_clips
 from experiments.certified_device import phantom_device
 from experiments.certified_field import (
@@ -25,17 +25,17 @@ from experiments.certified_field import (
     certified_curves,
     certified_laws,
     certified_sampling,
+    clip_inputs,
     read_certificate,
 )
 from experiments.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certified_rivers import certify_rivers
+from experiments.clips import load_clips
 from experiments.config import RunConfig
 from models.mocap.clip import Clip
 
-Array = npt.NDArray[np.float64]
-
-CERTIFICATE, PAGE, PLOT = "certificate.json", "certificate.html", "stability.png"
-REGION_PLOT = "region.png"
+CERTIFICATE, PAGE = "certificate.json", "certificate.html"
+PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
 def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
@@ -75,6 +75,7 @@ def certify_into(
     hands: HandRange | None = None,
     push: float = 1.0,
     clips: Sequence[Clip] = (),
+    judging: Judging = JUDGING,
 ) -> Certificate:
     """Certify a run's field and clips, or take the certificate that the folder holds if it is of the same inputs.
 
@@ -92,6 +93,8 @@ def certify_into(
         U_max of the bound on the distance [N].
     clips : sequence of Clip
         Whose flights are judged besides; in the mode "lead" the first of them is led.
+    judging : Judging
+        What passes for a flight, and the floor's friction.
 
     Raises
     ------
@@ -99,26 +102,68 @@ def certify_into(
         If a number is out of its interval, or the curve is out of the workspace.
     """
     hands = hands or HandRange()
-    inputs = certificate_inputs(config, delay, hands, push, clips)
-    file = out / CERTIFICATE
-    if file.exists() and (out / PAGE).exists():
-        try:
-            held = read_certificate(file)
-            held.check(inputs)
-            return held
-        except CertificateError:
-            pass  # of another river, or of none: certified anew
+    inputs = certificate_inputs(config, delay, hands, push, clips, judging)
+    held = _held(out, inputs)
+    if held is not None:
+        return held
     main, verdicts = _field_verdicts(config, delay, hands, push, clips)
     if clips:
-        verdicts |= certify_clips(clips)
+        verdicts |= certify_clips(clips, judging)
     certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
-    out.mkdir(parents=True, exist_ok=True)
-    stability_figure(main, verdicts["stability"]).savefig(out / PLOT, dpi=150)
+    plots: dict[str, tuple[Figure, str]] = {PLOT: (stability_figure(main, verdicts["stability"]), "stability boundary")}
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
-        region_figure(verdicts["region"]).savefig(out / REGION_PLOT, dpi=150)
-    (out / PAGE).write_text(certificate_page(certificate), encoding="utf-8")
-    file.write_text(json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
+    _write(certificate, plots, out)
     return certificate
+
+
+def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certificate:
+    """Certify flights and turns of a clip, or take the certificate that the folder holds if it is of the same inputs.
+
+    Parameters
+    ----------
+    name : str
+        An embedded clip, or a motion file.
+    out : Path
+        Folder; written are ``certificate.json``, ``certificate.html``, ``flights.png``.
+    judging : Judging
+        What passes for a flight, and the floor's friction.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or the file cannot be read.
+    """
+    (clip,), remarks = load_clips([name])
+    held = _held(out, clip_inputs(clip, judging))
+    if held is not None:
+        return held
+    scaled = f"lengths, and gravity with them, are scaled to the figure; {remarks[1]}" if remarks else ""
+    found = clip_ballistics(clip, judging, (scaled,) if scaled else ())
+    _write(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
+    return found.certificate
+
+
+def _held(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
+    """The certificate that a folder holds with its page, if it is of these inputs."""
+    if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
+        return None
+    try:
+        held = read_certificate(out / CERTIFICATE)
+        held.check(inputs)
+    except CertificateError:
+        return None  # of something else, or none: certified anew
+    return held
+
+
+def _write(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    for file, (figure, _) in plots.items():
+        figure.savefig(out / file, dpi=150)
+    shown = {file: shows for file, (_, shows) in plots.items()}
+    (out / PAGE).write_text(certificate_page(certificate, shown), encoding="utf-8")
+    text = json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n"
+    (out / CERTIFICATE).write_text(text, encoding="utf-8")
 
 
 def _field_verdicts(
@@ -140,66 +185,3 @@ def _field_verdicts(
         if name:
             verdicts["stability" + name] = stability(main._replace(curve=curve), hands.hands())
     return main, verdicts
-
-
-def stability_figure(river: River, verdict: Verdict) -> Figure:
-    """Boundary of the gains with the river's own, and the critical stiffness along the curve."""
-    damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
-    critical = boundary(river, damping)
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
-    gains, along = figure.subplots(1, 2)
-    gains.fill_between(damping, 1.0, np.maximum(critical, 1.0), color="#dbe7f4", label="stable at every phase, no hand")
-    gains.plot(damping, critical, color="#2f6db3")
-    gains.plot(river.b_d, river.k_r, "o", color="#c2473b", label="this river")
-    gains.set(xscale="log", yscale="log", xlabel="b_d [N s/m]", ylabel="k_r [N/m]", ylim=(10.0, None))
-    gains.set_title("stability boundary", loc="left")
-    gains.legend(frameon=False, fontsize=8, loc="lower center")
-    phases = np.asarray(verdict.figures["phases"], dtype=np.float64)
-    along.plot(phases, np.asarray(verdict.figures["critical_stiffness"], dtype=np.float64), color="#2f6db3")
-    along.axhline(river.k_r, color="#c2473b", label="this river")
-    along.set(yscale="log", xlabel="phase [s]", ylabel="critical k_r [N/m]")
-    along.set_title("along the curve, worst hand", loc="left")
-    along.legend(frameon=False, fontsize=8)
-    return figure
-
-
-def region_figure(verdict: Verdict) -> Figure:
-    """Edge of the region and of the ball over offset and wrong speed, for the lightest and the heaviest hand."""
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
-    edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
-    masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
-    for axes, (outer, inner), mass in zip(figure.subplots(1, 2), edges, masses, strict=True):
-        label = "region, firm hands" if "firm_hands" in verdict.figures else "region"
-        axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4", label=label)
-        axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3")
-        axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
-        axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
-        axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
-        axes.legend(frameon=False, fontsize=8, loc="upper right")
-    return figure
-
-
-def certificate_page(certificate: Certificate) -> str:
-    """A readable page of a certificate, with the plot beside it."""
-    colour = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
-    parts = [
-        "<!doctype html><meta charset='utf-8'><title>Certificate</title>",
-        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#222}"
-        "td{padding:.1rem .8rem .1rem 0;vertical-align:top}img{width:100%}small{color:#666}</style>",
-        f"<h1>Certificate</h1><p><small>inputs {escape(certificate.inputs)}</small></p>",
-    ]
-    for name, verdict in certificate.verdicts.items():
-        numbers = {key: value for key, value in verdict.figures.items() if isinstance(value, float)}
-        rows = "".join(f"<tr><td>{escape(key)}</td><td>{value:.5g}</td></tr>" for key, value in numbers.items())
-        margin = "" if verdict.margin is None else f" <small>margin {verdict.margin:.4g}</small>"
-        parts.append(
-            f"<h2>{escape(name)}: <span style='color:{colour[verdict.verdict]}'>{verdict.verdict}</span>{margin}</h2>"
-            f"<p>{escape(verdict.reason)}</p><ul>{''.join(f'<li>{escape(a)}</li>' for a in verdict.assumptions)}</ul>"
-            f"<table>{rows}</table>"
-        )
-        if verdict.counterexample:
-            parts.append(f"<p>Counterexample: <code>{escape(str(dict(verdict.counterexample)))}</code></p>")
-    parts.append(f"<img src='{PLOT}' alt='stability boundary'>")
-    if "region" in certificate.verdicts and "ellipse" in certificate.verdicts["region"].figures:
-        parts.append(f"<img src='{REGION_PLOT}' alt='region of attraction'>")
-    return "\n".join(parts)

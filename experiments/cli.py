@@ -17,6 +17,8 @@ from typing import Annotated  # noqa: E402
 import tyro  # noqa: E402
 
 from controllers.certificates.hand import NO_HANDS, HandRange  # noqa: E402
+from controllers.certificates.report import Certificate, ChangedInputs  # noqa: E402
+from controllers.certificates.tolerance import BallisticTolerance, Judging  # noqa: E402
 from controllers.errors import ControllerError  # noqa: E402
 from controllers.haptic_map.room import Room  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
@@ -112,10 +114,11 @@ class Certify:
     config: tyro.conf.OmitArgPrefixes[RunConfig]
     run: Annotated[Path | None, tyro.conf.Positional] = None
     """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
-    clip: Path | None = None
-    """Judge the flights of this motion file instead of a field."""
-    out: Path = Path("runs/certificate")
-    """Folder for the certificate of a field; one that is there already is taken if nothing has changed."""
+    clip: str | None = None
+    """Judge this motion instead of a field: a file, or the name of an embedded clip."""
+    out: Path | None = None
+    """Folder for the certificate, runs/certificate by default, runs/certificate-CLIP of a clip; one that is there
+    already is taken if nothing has changed."""
     delay: float = 0.0
     """Of the motors' torques, for a field [s]."""
     hand_push: float = 1.0
@@ -123,31 +126,33 @@ class Certify:
     hand: HandRange = field(default_factory=HandRange)
     no_hand: bool = False
     """Certify for nobody's hand on the stylus."""
+    tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
+    friction: float = Judging.friction
+    """Coefficient of friction of soles on the floor, for clips."""
     verify: Path | None = None
-    """Only check that this certificate.json is of the same field, hands and code; exit code 1 if it is not."""
+    """Only check that this certificate.json is of the same field, hands, clips and code; exit code 1 if it is not."""
     json: bool = False
     """Print the certificate as JSON."""
 
     def __call__(self) -> int:
         """Certify, or verify."""
-        hands = NO_HANDS if self.no_hand else self.hand
-        config, clips = self._what()
-        if self.verify is not None:
-            return self._verify(self.verify, config, hands, clips)
-        if self.clip is not None:
-            from experiments.ballistics import certify_file
-
-            certificate = certify_file(self.clip).certificate
-        else:
-            from experiments.certify import certify_into
-
-            certificate = certify_into(config, self.out, self.delay, hands, self.hand_push, clips)
+        certificate = self._checked(self.verify) if self.verify is not None else self._made()
+        if certificate is None:
+            return 1
         if self.json:
             print(json.dumps(certificate.to_json(), indent=2))
             return 0
+        if self.verify is not None:
+            print(f"{self.verify}: all that it is of is as it was")
         for name, verdict in certificate.verdicts.items():
             print(f"{name}: {verdict.verdict}; {verdict.reason}")
         return 0
+
+    def _hands(self) -> HandRange:
+        return NO_HANDS if self.no_hand else self.hand
+
+    def _judging(self) -> Judging:
+        return Judging(self.tolerance, self.friction)
 
     def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
         """The field, and the clips that are certified with it; gains alone have none."""
@@ -157,19 +162,31 @@ class Certify:
 
         return run_and_clips(self.run, self.config)
 
-    def _verify(self, file: Path, config: RunConfig, hands: HandRange, clips: tuple[Clip, ...]) -> int:
-        from controllers.certificates.report import CertificateError
-        from experiments.certified_field import verify_certificate
+    def _made(self) -> Certificate:
+        from experiments.certify import certify_clip_into, certify_into
 
+        if self.clip is not None:
+            folder = self.out or Path(f"runs/certificate-{Path(self.clip).stem}")
+            return certify_clip_into(self.clip, folder, self._judging())
+        config, clips = self._what()
+        folder = self.out or Path("runs/certificate")
+        return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
+
+    def _checked(self, file: Path) -> Certificate | None:
+        from experiments.certified_field import certificate_inputs, clip_inputs, verify_certificate
+
+        if self.clip is not None:
+            from experiments.clips import load_clips
+
+            inputs = clip_inputs(load_clips([self.clip])[0][0], self._judging())
+        else:
+            config, clips = self._what()
+            inputs = certificate_inputs(config, self.delay, self._hands(), self.hand_push, clips, self._judging())
         try:
-            certificate = verify_certificate(file, config, self.delay, hands, self.hand_push, clips)
-        except CertificateError as error:
+            return verify_certificate(file, inputs)
+        except ChangedInputs as error:
             print(f"hvf: {error}", file=sys.stderr)
-            return 1
-        print(f"{file}: of this field, these hands and this code")
-        for name, verdict in certificate.verdicts.items():
-            print(f"{name}: {verdict.verdict}")
-        return 0
+            return None
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from controllers.certificates.ballistic import BallisticTolerance
-from controllers.certificates.flight_fit import GRAVITY
 from controllers.certificates.repair import RepairPlan, RepairTask, repair
+from controllers.certificates.tolerance import GRAVITY, JUDGING, Judging
 from experiments.ballistics import ClipBallistics, clip_ballistics
 from models.errors import ModelError
 from models.mocap.clip import Clip
@@ -82,7 +81,7 @@ def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired
     return repaired
 
 
-def repair_clip(clip: Clip, tolerance: BallisticTolerance | None = None) -> Repaired:
+def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
     """The nearest motion whose flights fall with g, contacts kept; a clip without refuted flights stays as it is.
 
     Raises
@@ -90,7 +89,7 @@ def repair_clip(clip: Clip, tolerance: BallisticTolerance | None = None) -> Repa
     RepairError
         If there is no feasible motion near it.
     """
-    before = clip_ballistics(clip, tolerance)
+    before = clip_ballistics(clip, judging)
     n, closed = clip.n_frames, clip.closes()
     spans = [(f.fit.start, f.fit.end) for f in before.flights if f.verdict != "unknown" and f.fit.end < n]
     refuted = [f.fit for f in before.flights if f.verdict == "refuted" and f.fit.end < n]
@@ -112,7 +111,7 @@ def repair_clip(clip: Clip, tolerance: BallisticTolerance | None = None) -> Repa
         )
     )  # fmt: skip
     done = _carried_out(clip, plan, first, touched, touching.standing)
-    return Repaired(done, before, clip_ballistics(done, tolerance), plan)
+    return Repaired(done, before, clip_ballistics(done, judging), plan)
 
 
 def _carried_out(

@@ -17,8 +17,8 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from controllers.certificates.ballistic import BodyMotion
-from controllers.certificates.flight_fit import GRAVITY
-from experiments.ballistics import FRICTION, clip_ballistics
+from controllers.certificates.tolerance import GRAVITY, JUDGING
+from experiments.ballistics import clip_ballistics
 from experiments.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.clip import Clip
@@ -172,7 +172,7 @@ def main(names: list[str]) -> None:
         if verdict.verdict != "refuted":
             print(f"| {clip.name} | {pace:.2f} | {verdict.reason} |")
             continue
-        done = trial(played.motion, verdict.counterexample, FRICTION)
+        done = trial(played.motion, verdict.counterexample, JUDGING.friction)
         print(
             f"| {clip.name} | {pace:.2f} | {done.rate:.3f} | "
             f"{done.onset:.3f} | {100.0 * (done.onset / done.rate - 1.0):+.2f} % | {1e3 * done.bound:.1f} mm | "

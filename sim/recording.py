@@ -117,7 +117,8 @@ class Recording:
         try:
             self._file = _opened(path)
         except OSError as error:
-            raise RecordingError(f"{path}: cannot be opened ({error}); expected the run.h5 of a run") from None
+            said = error if path.exists() else "there is no such file"
+            raise RecordingError(f"{path}: cannot be opened ({said}); expected the run.h5 of a run") from None
         try:
             self._read()
         except (KeyError, OSError, TypeError, ValueError) as error:

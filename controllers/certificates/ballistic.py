@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.certificates.flight_fit import (
-    GRAVITY,
     FlightFit,
     Mask,
     best_fall,
@@ -23,47 +22,9 @@ from controllers.certificates.flight_fit import (
     reachable_rates,
 )
 from controllers.certificates.report import Outcome, Verdict
+from controllers.certificates.tolerance import GRAVITY, BallisticTolerance
 from controllers.errors import ParameterError
 from controllers.state import Array
-
-
-@dataclass(frozen=True)
-class BallisticTolerance:
-    """What passes for a flight.
-
-    Parameters
-    ----------
-    gravity : (float, float)
-        Least and greatest gravity that viewers take for natural [m/s²] (after Reitsma & Pollard 2003; what that rests
-        on is said in docs/ballistics.md).
-    distance : float
-        How far a body that really falls may stray from the recorded centre of mass [m].
-    misfit : float
-        RMS distance of the recorded centre of mass from its own parabola [m].
-    drift : float
-        How far the body may turn away from where constant angular momentum would have turned it [rad].
-    clearance : float
-        A body that never rises higher than this and does not fall is taken to stand on a floor that was missed [m].
-
-    Raises
-    ------
-    ParameterError
-        If the interval of gravity does not hold the true one, or a tolerance is not positive.
-    """
-
-    gravity: tuple[float, float] = (9.0, 12.7)
-    distance: float = 0.05
-    misfit: float = 0.06
-    drift: float = float(np.deg2rad(30.0))
-    clearance: float = 0.08
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.gravity[0] < GRAVITY < self.gravity[1]:
-            raise ParameterError(f"tolerance of gravity {self.gravity} m/s²; expected 0 < low < {GRAVITY} < high")
-        for name in ("distance", "misfit", "drift", "clearance"):
-            value = float(getattr(self, name))
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"BallisticTolerance.{name} is {value}; expected a finite number > 0")
 
 
 @dataclass(frozen=True, eq=False)

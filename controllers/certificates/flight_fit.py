@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
+from controllers.certificates.tolerance import GRAVITY
 from controllers.state import Array
 
 Mask = npt.NDArray[np.bool_]
 
-GRAVITY = 9.81
 NOISE = 3e-3  # the centre of mass of a captured body is not known better [m]
 FEWEST = 5  # frames: two more than a parabola has coefficients
 _SHORTEST = 0.08  # what is shorter is a foot that rolls over [s]

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from controllers.certificates.ballistic import BodyMotion, FlightJudgement
-from controllers.certificates.flight_fit import GRAVITY
 from controllers.certificates.report import Verdict
+from controllers.certificates.tolerance import GRAVITY
 from controllers.errors import ParameterError
 from controllers.state import Array
 

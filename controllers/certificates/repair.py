@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.flight_fit import GRAVITY, Mask
+from controllers.certificates.flight_fit import Mask
+from controllers.certificates.tolerance import GRAVITY
 from controllers.errors import ControllerError, ParameterError
 from controllers.state import Array
 

@@ -15,7 +15,11 @@ Json: TypeAlias = bool | int | float | str | list["Json"] | dict[str, "Json"] | 
 
 
 class CertificateError(ControllerError):
-    """A certificate that cannot be read, or that is of other inputs than those at hand."""
+    """A certificate that cannot be read."""
+
+
+class ChangedInputs(CertificateError):
+    """A certificate that is of other inputs than those at hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,7 @@ class Certificate:
 
         Raises
         ------
-        CertificateError
+        ChangedInputs
             If any of them has changed.
         """
         found = hash_of(inputs)
@@ -120,7 +124,7 @@ class Certificate:
         now = hashes_of(cast(Mapping[str, object], inputs)) if self.parts and isinstance(inputs, Mapping) else {}
         changed = [name for name in (*self.parts, *now) if self.parts.get(name) != now.get(name)]
         told = f"; changed: {', '.join(dict.fromkeys(changed))}" if now else ""
-        raise CertificateError(f"the certificate is of inputs {self.inputs}, these are {found}{told}; certify again")
+        raise ChangedInputs(f"the certificate is of inputs {self.inputs}, these are {found}{told}; certify again")
 
 
 def hash_of(inputs: object) -> str:

@@ -12,8 +12,8 @@ from controllers.certificates.hand import HandRange
 from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
 from experiments import certified_field
-from experiments.certified_field import read_certificate, verify_certificate
-from experiments.certify import CERTIFICATE, PAGE, PLOT, certified_rivers, certify_into
+from experiments.certified_field import certificate_inputs, read_certificate, verify_certificate
+from experiments.certify import CERTIFICATE, FLIGHTS_PLOT, PAGE, PLOT, certified_rivers, certify_into
 from experiments.cli import main
 from experiments.config import RunConfig
 
@@ -64,17 +64,17 @@ FINE_FILTER = replace(RunConfig().scene, servo_period=5e-4)
 )
 def test_a_certificate_is_of_one_field_only(folder, change, said):
     file = folder / CERTIFICATE
-    verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+    verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
     with pytest.raises(CertificateError, match=f"changed: {said}; certify again"):
-        verify_certificate(file, replace(RunConfig(), **change), 0.0, HANDS, 1.0)
+        verify_certificate(file, certificate_inputs(replace(RunConfig(), **change), 0.0, HANDS, 1.0))
 
 
 def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
     file = folder / CERTIFICATE
     with pytest.raises(CertificateError, match="changed: delay;"):
-        verify_certificate(file, RunConfig(), 1e-4, HANDS, 1.0)
+        verify_certificate(file, certificate_inputs(RunConfig(), 1e-4, HANDS, 1.0))
     with pytest.raises(CertificateError, match="changed: hand, push;"):
-        verify_certificate(file, RunConfig(), 0.0, HandRange(), 2.0)
+        verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HandRange(), 2.0))
 
 
 def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
@@ -83,10 +83,10 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(certified_field, "PREMIUM_1_5", heavier)
         with pytest.raises(CertificateError, match="changed: device;"):
-            verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+            verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
     monkeypatch.setattr(certified_field, "source_hash", lambda: "0")
     with pytest.raises(CertificateError, match="changed: code;"):
-        verify_certificate(file, RunConfig(), 0.0, HANDS, 1.0)
+        verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
 
 
 def test_the_command_verifies_without_casadi_or_splines_and_says_what_changed(folder, capsys):
@@ -138,3 +138,26 @@ def test_a_held_file_that_is_no_certificate_is_replaced(folder, tmp_path):
     (tmp_path / CERTIFICATE).write_text("not json")
     (tmp_path / PAGE).write_text("")
     assert certify_into(RunConfig(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
+
+
+def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged_by(tmp_path, capsys):
+    out = tmp_path / "jump"
+    clip = ["certify", "--clip", "jump", "--out", str(out)]
+    assert main(clip) == 0
+    assert "ballistic: certified" in capsys.readouterr().out
+    assert (out / FLIGHTS_PLOT).read_bytes().startswith(b"\x89PNG")
+    assert f"src='{FLIGHTS_PLOT}'" in (out / PAGE).read_text()
+    written = (out / CERTIFICATE).stat().st_mtime_ns
+    assert main(clip) == 0
+    assert (out / CERTIFICATE).stat().st_mtime_ns == written
+    check = ["certify", "--verify", str(out / CERTIFICATE), "--clip"]
+    assert main([*check, "jump"]) == 0
+    assert main([*check, "jump", "--friction", "0.5"]) == 1
+    assert "changed: judging;" in capsys.readouterr().err
+    assert main([*check, "walk"]) == 1
+    assert "changed: clip;" in capsys.readouterr().err
+    assert main([*clip, "--tolerance.gravity", "9.0", "9.81001"]) == 0
+    assert main([*clip, "--friction", "0"]) == 2
+    assert "coefficient of friction is 0" in capsys.readouterr().err
+    assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
+    assert "expected a certificate.json" in capsys.readouterr().err

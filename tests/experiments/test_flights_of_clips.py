@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from controllers.certificates.tolerance import Judging
 from experiments.ballistics import clip_ballistics, fly
 from experiments.repair import repair_clip, repair_file
 from models.errors import ModelError
@@ -51,7 +52,10 @@ def test_a_floor_that_is_missed_by_centimetres_changes_no_verdict(height):
 def test_the_certificate_is_of_one_clip_and_one_tolerance():
     clip = embedded("jump")
     moved = Clip(clip.poses + np.eye(75)[0] * 1e-9, clip.fps, "jump")
-    hashes = {clip_ballistics(c, friction=mu).certificate.inputs for c, mu in ((clip, 0.9), (clip, 0.8), (moved, 0.9))}
+    hashes = {
+        clip_ballistics(c, Judging(friction=mu)).certificate.inputs
+        for c, mu in ((clip, 0.9), (clip, 0.8), (moved, 0.9))
+    }
     assert len(hashes) == 3
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.ballistics import FRICTION, clip_ballistics
+from controllers.certificates.tolerance import JUDGING
+from experiments.ballistics import clip_ballistics
 from experiments.turn_trials import follow, parabola, trial
 from models.mocap.clip import Clip
 from models.mocap.library import embedded
@@ -16,11 +17,11 @@ def test_what_the_floor_cannot_give_is_missed_and_what_it_can_is_followed(name, 
     verdict = played.certificate.verdicts["turns"]
     assert verdict.verdict == "refuted"
     example = verdict.counterexample
-    done = trial(played.motion, example, FRICTION)
+    done = trial(played.motion, example, JUDGING.friction)
     assert done.onset == pytest.approx(done.rate, rel=0.005)
     assert min(done.miss, done.miss_of_mean) > done.bound > 3e-3
     seconds = (example["end"] - example["start"]) / played.motion.fps
-    assert parabola(example["acceleration"], seconds, FRICTION, 0.98 * done.rate).miss < 0.1 * done.bound
+    assert parabola(example["acceleration"], seconds, JUDGING.friction, 0.98 * done.rate).miss < 0.1 * done.bound
 
 
 def test_only_the_floor_refuses():
