@@ -17,7 +17,7 @@ from controllers.certificates.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.report import Verdict
 from controllers.certificates.sampled_loop import SampledLoop
 from controllers.certificates.sampling import Sampling
-from controllers.certificates.stability import River
+from controllers.certificates.stability import River, unstable_start
 from controllers.state import Array
 
 DIRECTIONS = 24  # across the curve, over half a turn
@@ -92,10 +92,7 @@ def passivity(river: River) -> Verdict:
         loop = SampledLoop(river.still(hand), river.sampling)
         radius = loop.radius(river.k_r, river.b_d)
         if radius.max() > 1.0:
-            at = int(radius.argmax())
-            phase = float(river.phases()[at])
-            growth = float(np.log(radius[at])) / period
-            example = {"phase": phase, "p": river.curve.point(phase), "hand": hand, "growth_rate": growth}
+            example = unstable_start(river, hand, int(radius.argmax()))
             reason += f"; a spring of {stiffness:.3g} N/m on the stylus makes it unstable"
             return Verdict("refuted", reason, margin, assumptions, example, figures)
     return Verdict("unknown", f"{reason}; no spring was found that makes it unstable", margin, assumptions, {}, figures)

@@ -158,7 +158,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         below = critical_stiffness(SampledLoop(river.still(hand), river.sampling), river.b_d, 1e-3)[at]
         said = said.replace(f"critical k_r = {least:.4g}", f"critical k_r = {below:.4g}")
         margin = min(float(below) / max(river.k_r, 1e-3), 1.0) - 1.0
-        return Verdict("refuted", f"unstable: {said}", margin, assumptions, _counterexample(river, hand, at), figures)
+        return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
     if multipliers and max(multipliers) >= 1.0:
         reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"
         return Verdict("unknown", reason, margin, assumptions, {}, figures)
@@ -168,8 +168,18 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     return Verdict("certified", f"stable: {said}", margin, assumptions, {}, figures)
 
 
-def _counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
-    """Where, with which hand and from which state the river is unstable."""
+def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
+    """Where, with which hand and from which state ξ a river that is unstable at one of its phases grows, and how fast.
+
+    Parameters
+    ----------
+    river : River
+        Of the law.
+    hand : HandImpedance
+        On the stylus.
+    at : int
+        Which phase.
+    """
     state, growth = growing_mode(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d, at)
     phase = float(river.phases()[at])
     return {"phase": phase, "p": river.curve.point(phase), "hand": hand, "state": state, "growth_rate": growth}
