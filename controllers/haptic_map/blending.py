@@ -65,7 +65,10 @@ def blend_corrected(
     channels = figure_channels(figure)
     value, slope = np.empty((clips, channels)), np.empty((clips, channels))
     _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
-    combine(figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, pose, jacobian)
+    combine(
+        figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
+        np.empty((0, 0, 3)), 0.0, 0.0, pose, jacobian,
+    )  # fmt: skip
 
 
 def _closing_signs(channels: Array, rotations: int) -> Array:

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.haptic_map.floor import keep_above
+from controllers.haptic_map.footing import go_on, keep_footing, mixed
 from controllers.haptic_map.inbetween import FOOT, ROOT
 from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
@@ -88,7 +90,8 @@ def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
 @njit
 def combine(
     figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
-    correction: Array, chain: Array, memory: Array, pose: Array, jacobian: Array,
+    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
+    floor: float, pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
     """Mean of poses, and its derivative unless `jacobian` has no rows.
 
@@ -112,6 +115,12 @@ def combine(
         Derivatives of the three by the stylus.
     memory : Array
         The frame of the lap; updated.
+    footing : Array
+        Memory of the ends' footing (see `footing`); updated. Empty: they have none.
+    soles : Array, shape (limbs, k, 3)
+        Points of each end that may touch, from their centre [m]. None: they go wherever they go.
+    ground, floor : float
+        Height at which they touch, and below which none goes [m].
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
@@ -127,6 +136,15 @@ def combine(
             for way in range(_WAYS):
                 drift[1 + way, k] += changes[0, way, i] * drifts[i, k]
     update_lap(memory, angle, drift[0])
+    # The root is in the frame of the drift, and that in the frame of the lap.
+    s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
+    frame, ahead, mixture = np.empty(3), 0.0, 0.0
+    if footing.shape[0] > 0:
+        x, y = drift_motion(drift, s, 1.0, shift, turn)
+        frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
+        frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
+        frame[2] = s * drift[0, 2] + lap
+        ahead, mixture = go_on(footing, angle), mixed(weights[0])
 
     unit, spin = np.empty((clips, 4)), np.empty((clips, 3))
     q, rates = np.empty((rotations, 4)), np.empty((rotations, 3, 3))
@@ -160,15 +178,17 @@ def combine(
         if corrected:
             turn += correction[1:, ROOT + FOOT * n + 3]
         _turn_rotation(lag * drift[0, 2] + heading, turn, q[last], rates[last])
+        if soles.shape[0] > 0:
+            keep_above(floor, soles[n], end, q[last], rates[last], tangents)
+        if footing.shape[0] > 0:
+            keep_footing(footing, n, ahead, mixture, soles[n], ground, frame, end[0], q[last])
         place_limb(limb, q, rates, root, end, tangents)
 
-    # The root is in the frame of the drift, and that in the frame of the lap.
-    s = angle / (2.0 * np.pi)
     x, y = drift_motion(drift, s, 1.0, shift, turn)
     _turn_position(s * drift[0, 2], turn, x, y, shift, root)
-    _turn_rotation(s * drift[0, 2] + memory[LAP_HEADING], turn, q[0], rates[0])
+    _turn_rotation(s * drift[0, 2] + lap, turn, q[0], rates[0])
     shift[:], turn[:] = 0.0, 0.0
-    _turn_position(memory[LAP_HEADING], turn, memory[LAP_X], memory[LAP_Y], shift, root)
+    _turn_position(lap, turn, memory[LAP_X], memory[LAP_Y], shift, root)
     pose[0], pose[1], pose[2] = root[0, 0], root[0, 1], root[0, 2]
     for joint in range(rotations):
         for j in range(4):

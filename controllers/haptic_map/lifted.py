@@ -8,10 +8,13 @@ from numba import njit
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
-from controllers.haptic_map.combination import combine, figure_channels, packed_figure
+from controllers.haptic_map.combination import combine, figure_channels, fresh_lap, packed_figure
 from controllers.haptic_map.cores import draw_in
 from controllers.haptic_map.cylinder import cylinder
+from controllers.haptic_map.floor import SOFTNESS
+from controllers.haptic_map.footing import fresh_footing
 from controllers.haptic_map.frames import (
     CLOSES,
     PlacedClip,
@@ -21,7 +24,8 @@ from controllers.haptic_map.frames import (
     lap_spline,
     packed_frames,
 )
-from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
+from controllers.haptic_map.lap import MEMORY
+from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses, lowest_point
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
@@ -35,10 +39,13 @@ LIFTED = 3
 
 _LAGS = 128  # samples of λ round the lap
 _ROWS = 256  # of the corrections' table round the lap, at most
+_HARD = 5e-4  # [m] of the minimum of a sole's heights that tells where the ground is
+_RARE = 0.02  # share of frames in which a clip may be below the ground on which it stands
 _PAIR_STEPS = 24  # of the lap, at which clips are looked for that are neighbours
-_R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT, _FIGURE = (
-    range(12)
-)
+(
+    _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT,
+    _SOLES_AT, _FIGURE,
+) = range(13)  # fmt: skip
 
 
 @njit
@@ -102,7 +109,14 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
     d = np.empty((4, pair_channels(pairs)))
     if d.shape[1] > 0:
         pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
-    combine(figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory, pose, jacobian)
+    limbs, ground, at = int(figure[1]), 0.0, int(params[_SOLES_AT])
+    for i in range(count):
+        ground += w[0, i] * params[at + 1 + near[i]]
+    soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else np.empty((0, 0, 3))
+    combine(
+        figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory[:MEMORY],
+        memory[MEMORY:], soles, ground, params[at], pose, jacobian,
+    )  # fmt: skip
 
 
 class Lifted(ClipMap):
@@ -119,7 +133,7 @@ class Lifted(ClipMap):
     at θ₀ > 0 has its frames beyond 2π in the next lap.
 
     With limbs, in-betweens of neighbours are corrected (`pair_corrections`): feet move one at a time, while they are
-    lifted.
+    lifted. They stay above the floor (`floor`), and where they stand though the mixture changes (`footing`).
 
     h is C² but on the axis r = 0, where the phase is not defined. Beyond the box round all sites r and z are clamped
     to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
@@ -183,6 +197,10 @@ class Lifted(ClipMap):
     @property
     def _drifts(self) -> Array:
         return np.stack([clip.drift for clip in self._placed])
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run."""
+        return CompiledMap(LIFTED, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))]))
 
     @property
     def closed(self) -> tuple[bool, ...]:
@@ -256,14 +274,16 @@ class Lifted(ClipMap):
     def _packed(self, limbs: Sequence[Limb]) -> Array:
         drifts, rotations = self._drifts, (self._placed[0].poses.shape[1] - 3) // 4
         lags = self._common_lags(rotations, limbs)
-        channels: list[Array] = []
+        channels, lowest = list[Array](), list[Array]()
         for clip, drift in zip(self._placed, drifts, strict=True):
-            result, ends = clip.remainder[:, None], list[Array]()
+            result, ends, soles = clip.remainder[:, None], list[Array](), list[Array]()
             rest, lag = result.copy(), round_lap(lags, clip.angles)
             for n, limb in enumerate(limbs):
                 quaternions, end = end_channels(rest, drift[None], limb, lag[:, n])
                 result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
                 ends.append(end)
+                soles.append(end[:, 0, 2] + [lowest_point(quaternions[:, 0], limb, soft) for soft in (_HARD, SOFTNESS)])
+            lowest.append(np.min(soles, axis=0) if limbs else np.zeros((2, 1)))
             channels.append(np.concatenate([result, *ends], axis=2)[:, 0])
         first = 3 + 4 * rotations
         ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if limbs), default=0.0)
@@ -281,9 +301,20 @@ class Lifted(ClipMap):
             packed_frames(splines),
             packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
             self._packed_pairs(packed_frames(splines), channels[0].shape[1], lags, limbs),
+            self._packed_soles(lowest, limbs),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
         return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self._placed), *at], *blocks])
+
+    def _packed_soles(self, lowest: list[Array], limbs: Sequence[Limb]) -> Array:
+        if len({len(limb.points) for limb in limbs}) > 1:
+            raise ParameterError(
+                f"limbs of a lifted map must have equally many points, got {[len(limb.points) for limb in limbs]}"
+            )
+        grounds, floor = [float(np.quantile(hard, _RARE)) for hard, _ in lowest], min(soft.min() for _, soft in lowest)
+        return np.concatenate([
+            [float(floor)], grounds, *((limb.points - limb.points.mean(axis=0)).ravel() for limb in limbs),
+        ])  # fmt: skip
 
     def _packed_pairs(self, frames: Array, size: int, lags: Array, limbs: Sequence[Limb]) -> Array:
         rows = int(np.clip(max(len(clip.poses) for clip in self._placed), 64, _ROWS)) if limbs else 1

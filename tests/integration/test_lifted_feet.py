@@ -1,0 +1,58 @@
+"""Feet of in-betweens of lifted clips stand where they stand, although the mixture changes on the way."""
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lap import MEMORY
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.room import Room
+from experiments.figure_maps import figure_legs
+from experiments.in_betweens import measure_motion
+from experiments.lift import lift_clips
+from experiments.map_quality import in_between, neighbours
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+from models.mocap.library import embedded, embedded_names
+
+TURN = 2.0 * np.pi
+NAMES = ("walk", "run", "jump", "angry")
+
+
+def changing():
+    """Four clips at the corners of a square, and a hand that goes round among them in a lap: poses (n, 75), with
+    footing and without."""
+    clips = [embedded(name) for name in NAMES]
+    angles = [TURN * np.linspace(0.0, 1.0, clip.n_frames) for clip in clips]
+    corners = np.array([[0.04, -0.01], [0.06, -0.01], [0.04, 0.01], [0.06, 0.01]])
+    h_map = Lifted(
+        [(clip.poses, clip.fps) for clip in clips], [True] * 4, angles, np.tile(corners, (16, 1, 1)),
+        figure_legs(figure_model()),
+    )  # fmt: skip
+    shown = []
+    for stands in (True, False):
+        memory, poses = h_map.compiled().memory, []
+        for s in np.linspace(0.0, 2.0, 480):
+            if not stands:
+                memory[MEMORY:] = h_map.compiled().memory[MEMORY:]
+            angle, r, z = TURN * s, 0.05 + 0.006 * np.cos(TURN * s), 0.006 * np.sin(TURN * s)
+            x = np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
+            poses.append(h_map.pose(x, memory))
+        shown.append(np.array(poses))
+    return shown
+
+
+def test_feet_stand_though_the_mixture_changes():
+    stands, dragged = (measure_motion(Clip(poses, 120.0, "changing")) for poses in changing())
+    assert dragged.slide > 0.05
+    assert stands.slide < 0.03
+    assert stands.limits <= dragged.limits + np.deg2rad(1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("names", [("walk", "run", "jump", "backflip"), tuple(embedded_names())], ids=["four", "all"])
+def test_in_betweens_of_lifted_neighbours_do_not_slide_nor_sink(names):
+    layout = lift_clips(names, Room()).layout()
+    for i, j in neighbours(layout.sites):
+        found = measure_motion(in_between(layout, i, j))
+        assert found.slide < 0.03, (names[i], names[j])
+        assert found.penetration < 0.01, (names[i], names[j])
