@@ -159,11 +159,12 @@ class RunSummary:
         bent = [] if self.stretch is None else [self.stretch.line()]
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
+        pushed, elsewhere = f"{self.animation.pushed_deg:.1f}° a joint", f"{self.animation.unpushed_deg:.2f}°"
+        changed_by = f"{pushed} where it was pushed, {elsewhere} elsewhere" if pushes else f"{elsewhere} a joint"
         on_curve = [
             f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
-            f"The animation changed by up to {self.animation.pushed_deg:.1f}° a joint where it was pushed, "
-            f"{self.animation.unpushed_deg:.2f}° elsewhere.",
+            f"The animation changed by up to {changed_by}.",
         ]
         return [
             *bent,
