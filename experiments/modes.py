@@ -31,6 +31,8 @@ ADMISSION, HYSTERESIS = 1.2, 0.15
 # Smooth, σ says up to which angle rivers are blended, and a blend of tubes that part throws the hand out of both: with
 # 0.05 it ends at 20°, before the middle leaves the tubes.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
+# Encoders make 10 mm/s of noise, which is more than the smooth form's σ; the discrete one has its hysteresis.
+LOOK = {"discrete": 0.0, "smooth": 8e-3}
 GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
 WAVE = 0.6  # height of the wave, of the map's half width
 
@@ -118,7 +120,8 @@ def _rivers(
         gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))
         bundle, admission = replace(bundle, rivers=gated), GATE
     return HigherOrder(
-        bundle, admission * pace, SIGMA[config.crossing] * pace, HYSTERESIS * pace, config.crossing
+        bundle, admission * pace, SIGMA[config.crossing] * pace, HYSTERESIS * pace, config.crossing,
+        LOOK[config.crossing],
     )  # fmt: skip
 
 

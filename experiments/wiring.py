@@ -18,6 +18,7 @@ from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.led import Led
 from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety import ForceLimiter
 from experiments.balance import balanced
 from experiments.budget import energy_tank
@@ -34,6 +35,7 @@ from experiments.led_balance import balanced_on_ground
 from experiments.lifted_runs import lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
+from experiments.rests import with_rests
 from experiments.session import Session
 from experiments.stretch import law as stretch_law
 from experiments.stretch import stretch_grabs
@@ -118,6 +120,9 @@ def wire(
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
         blended = balanced(blended, world.figure, config.lap)
+        parts = _assemble(config, (curve, course), blended, rivers, led, world)
+    if isinstance(blended, RiverClips):
+        blended = with_rests(blended, world.figure)
         parts = _assemble(config, (curve, course), blended, rivers, led, world)
     if isinstance(blended, Led):
         blended = balanced_on_ground(blended, world.figure)

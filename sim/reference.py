@@ -15,14 +15,16 @@ from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
+from controllers.haptic_map.footsteps import limb_end
 from controllers.haptic_map.inertialization import stopping_way
 from controllers.haptic_map.limbs import LIMB
 from controllers.haptic_map.river_clips import (
-    PHASE,
     RIVER_CLIPS,
+    ahead_in_clip,
     change_clip,
     heading_between,
     lets_go,
+    phase_rate,
     place_clip,
     stop_clip,
     takes_over,
@@ -33,7 +35,7 @@ from sim.errors import SimError
 from sim.kernel_units import map_units
 from sim.native import mj_differentiate_pos
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
-from sim.transition import Transition, carry_on, make_transition, note_change
+from sim.transition import Transition, carry_on, dwells, make_transition, note_change, pivot_of, set_duration
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -112,48 +114,86 @@ def _carry(reference: CompiledReference) -> None:
 
 
 @njit
-def _change_river(reference: CompiledReference, river: float, phase: float) -> None:
-    """Let another river's clip go on from what is shown: where the figure stands, with an offset that decays.
+def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pose: Array) -> None:
+    """Pose of the clip that plays, some time from now, if it goes on at the pace of its river."""
+    memory = reference.scratch_memory
+    memory[:] = reference.memory
+    ahead_in_clip(params, memory, seconds)
+    evaluate_map(reference.units, reference.kind, reference.params, reference.scratch_x, memory, pose)
 
-    The clip begins ahead of the figure by the way on which its speed over the ground, and about the vertical, comes to
-    that of the clip; so it neither turns back nor is pulled there.
-    """
-    transition, memory, period = reference.transition, reference.memory, reference.period
-    shown, change, seconds = transition.shown, transition.change, transition.seconds
+
+@njit
+def _show_on(reference: CompiledReference) -> None:
+    """Note what is shown: now, a period before and a period after."""
     _look_around(reference)
     _carry(reference)
+    shown = reference.transition.shown
     shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
-    change_clip(memory, river, phase)
+
+
+@njit
+def _stand_on_pivot(reference: CompiledReference, params: Array) -> int:
+    """Place the motion where it has the foot that stands before and after; returns which it is, −1 if there is none.
+
+    A figure that stands on it alone turns with it.
+    """
+    transition, old, new = reference.transition, np.empty(7), np.empty(7)
+    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    _look_ahead(reference, params, transition.lasts[0], transition.ahead[1])
+    foot = pivot_of(transition)
+    if foot >= 0:
+        limb_end(transition.limbs[foot], transition.shown[0], old)
+        limb_end(transition.limbs[foot], transition.ahead[1], new)
+        turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
+        place_clip(reference.memory, new, old[0], old[1], turn)
+    return foot
+
+
+@njit
+def _go_over(reference: CompiledReference, params: Array) -> None:
+    """Let the motion that the memory now has go on from what was shown, with an offset that decays.
+
+    It begins ahead of the figure by the way on which its speed over the ground, and about the vertical, comes to
+    that of the new motion, so it neither turns back nor is pulled there; or where a foot of it stands already.
+    """
+    transition, memory, period = reference.transition, reference.memory, reference.period
+    shown, change = transition.shown, transition.change
     _look_around(reference)
     pose = reference.pose
     place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
     _look_around(reference)
-    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after)
-    way = np.zeros(3)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
+    set_duration(transition)
+    way, seconds = np.zeros(3), transition.lasts[0]
     for i in range(2):
         way[i] = stopping_way(change[1, i], change[2, i], seconds)
     _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
     _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
     way[2] = stopping_way(spin, twist, seconds)
     place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
+    foot = _stand_on_pivot(reference, params)
     _look_around(reference)
-    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
     transition.since[0] = 0.0
 
 
 @njit
+def _change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
+    """Let another river's clip go on from what is shown."""
+    _show_on(reference)
+    change_clip(reference.memory, river, phase)
+    _go_over(reference, params)
+
+
+@njit
 def _stop(reference: CompiledReference, params: Array) -> None:
-    """Let the clip that plays come to rest: at the phase at which it would, with an offset that decays."""
-    transition, memory, period = reference.transition, reference.memory, reference.period
-    _look_around(reference)
+    """Let the clip that plays come to rest: at the phase of rest nearest to where it would."""
+    memory, period = reference.memory, reference.period
+    _show_on(reference)
     # Of the clip's own pace, not of a hand that is thrown along the curve or against it.
-    pace = min(max((reference.scratch_memory[PHASE] - memory[PHASE]) / period, -1.0), 1.0)
-    _carry(reference)
-    transition.shown[0], transition.shown[1], transition.shown[2] = reference.pose, reference.before, reference.after
-    stop_clip(params, memory, stopping_way(pace, 0.0, transition.seconds))
-    _look_around(reference)
-    note_change(transition, reference.figure_model, period, reference.pose, reference.before, reference.after)
-    transition.since[0] = 0.0
+    pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
+    stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))
+    _go_over(reference, params)
 
 
 @njit
@@ -184,11 +224,14 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
     reference.transition.since[0] += period
     kind, params = base_of(reference.kind, reference.params)
     # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
-    settled = reference.transition.since[0] >= reference.transition.seconds
-    if kind == RIVER_CLIPS and settled and takes_over(params, reference.memory, trace[TRACE_RIVER]):
-        _change_river(reference, trace[TRACE_RIVER], trace[TRACE_PHASE])
-    elif kind == RIVER_CLIPS and lets_go(params, reference.memory, trace[TRACE_RIVER], hand[0]):
-        _stop(reference, params)
+    settled = reference.transition.since[0] >= reference.transition.lasts[0]
+    taken = kind == RIVER_CLIPS and takes_over(params, reference.memory, trace[TRACE_RIVER])
+    if dwells(reference.transition, trace[TRACE_RIVER] if taken else -1.0, period) and settled:
+        _change_river(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE])
+    elif kind == RIVER_CLIPS:
+        rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
+        if lets_go(params, reference.memory, trace[TRACE_RIVER], hand[0], rate):
+            _stop(reference, params)
     _look_around(reference)
     _carry(reference)
     for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):

@@ -6,11 +6,17 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.haptic_map.footsteps import STEP, limb_end, plan_steps, put_limb, step_end
+from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, put_limb, step_end
 from controllers.haptic_map.inertialization import add_offset, offset_left
 from sim.native import mj_differentiate_pos
 
 Array = npt.NDArray[np.float64]
+
+DWELL = 0.04  # [s] for which a river must have the hand before its clip plays: noise gives a hand away for less
+_ROOT = 6  # components of a tangent that are the root's
+_PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that stand on one foot bear little more
+_BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
+_SWING = 0.3  # [rad] by which a joint swings on at most
 
 
 class Transition(NamedTuple):
@@ -19,28 +25,40 @@ class Transition(NamedTuple):
     Attributes
     ----------
     seconds : float
-        Blend time T [s]; 0: the figure jumps.
+        Least blend time [s]; 0: the figure jumps.
+    lasts : Array
+        T of the last change [s], longer where the root has far up or down to go, shape (1,).
     since : Array
         Time since the last change [s], infinite before the first, shape (1,).
     change : Array
         Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
     limbs, steps : Array
-        Legs, shape (n, 36), and how they step, shape (n, 27).
+        Legs, shape (n, 36), and how they step, shape (n, 28).
     ends : Array
         Scratch: where the feet of the new motion are, shape (n, 7).
+    rival : Array
+        The river that would take over, and for how long it has had the hand [s], shape (2,).
     shown : Array
         Scratch: what was shown, and one period before and after, shape (3, 75).
+    ahead : Array
+        Scratch: poses of the new motion when the first step ends, and when the second does, shape (2, 75).
+    stands : Array
+        Scratch: on which legs the new motion stands, shape (n,).
     offset, before, after : Array
         Scratch, shape (57,).
     """
 
     seconds: float
+    lasts: Array
     since: Array
     change: Array
     limbs: Array
     steps: Array
     ends: Array
+    rival: Array
     shown: Array
+    ahead: Array
+    stands: Array
     offset: Array
     before: Array
     after: Array
@@ -50,22 +68,48 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
     """A transition before the first change, of poses of nq and tangents of nv numbers, with legs (n, 36) that step."""
     n = len(limbs)
     return Transition(
-        seconds=seconds, since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)),
-        ends=np.zeros((n, 7)), shown=np.zeros((3, nq)), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
+        seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs,
+        steps=np.zeros((n, STEP)), ends=np.zeros((n, 7)), rival=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
+        ahead=np.zeros((2, nq)), stands=np.zeros(n), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
     )  # fmt: skip
+
+
+@njit
+def dwells(transition: Transition, river: float, period: float) -> bool:
+    """Whether a river that would take over, −1 for none, has had the hand for long enough; called every period."""
+    rival = transition.rival
+    rival[1] = rival[1] + period if river == rival[0] else 0.0
+    rival[0] = river
+    return river >= 0.0 and rival[1] >= DWELL
+
+
+@njit
+def pivot_of(transition: Transition) -> int:
+    """The leg on which the figure stands before and after a change, −1 for none; see `footsteps.pivot`."""
+    return pivot(transition.limbs, transition.shown[0], transition.ahead, transition.stands)
+
+
+@njit
+def set_duration(transition: Transition) -> None:
+    """Let a change last long enough for the height by which the root is off, as `note_change` found it."""
+    height = abs(transition.change[0, 2])
+    transition.lasts[0] = transition.seconds
+    if transition.seconds > 0.0:
+        transition.lasts[0] = max(transition.seconds, np.sqrt(_BEND * height / _PULL))
 
 
 @njit
 def carry_on(transition: Transition, s: float, pose: Array) -> None:
     """Move a pose of the new motion, s seconds from now, to what is shown: the offset that is left, and the steps."""
-    since, limbs, ends = transition.since[0], transition.limbs, transition.ends
-    if since >= transition.seconds:
+    since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends
+    if since >= lasts:
         return
-    at = min(since + s, transition.seconds)
+    at = min(since + s, lasts)
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
-        step_end(transition.steps[n], at, transition.seconds, ends[n])
-    offset_left(transition.change, transition.seconds, at, transition.offset)
+        step_end(transition.steps[n], at, lasts, ends[n])
+    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
+    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
     add_offset(pose, transition.offset)
     for n in range(limbs.shape[0]):
         put_limb(limbs[n], pose, ends[n])
@@ -73,12 +117,12 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
 
 @njit
 def note_change(
-    transition: Transition, figure_model: int, period: float, pose: Array, before: Array, after: Array
+    transition: Transition, figure_model: int, period: float, pose: Array, before: Array, after: Array, second: int
 ) -> None:
     """Offset of what was shown over poses that are asked for now, a period earlier and a period later; its rates too.
 
     `transition.shown` holds the first, in that order; `transition.change` is set: o, ȯ, ö by central differences; and
-    the steps are planned.
+    the steps are planned, with the leg that steps second (−1 for any).
     """
     now, then, next_ = transition.offset, transition.before, transition.after
     mj_differentiate_pos(figure_model, now.ctypes, 1.0, pose.ctypes, transition.shown[0].ctypes)
@@ -89,4 +133,7 @@ def note_change(
         transition.change[1, i] = 0.5 * (next_[i] - then[i]) / period
         transition.change[2, i] = (next_[i] - 2.0 * now[i] + then[i]) / period**2
     if transition.seconds > 0.0:
-        plan_steps(transition.limbs, transition.steps, transition.shown, pose, period, transition.seconds)
+        plan_steps(
+            transition.limbs, transition.steps, transition.shown, pose, period, transition.lasts[0], second,
+            transition.stands,
+        )  # fmt: skip

@@ -24,14 +24,17 @@ from controllers.fields.instructions import (
     wrench_of,
 )
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 
 # Parameters: a header, offsets of the rivers' blocks, and the blocks; offsets count from the header.
-_DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _HEADER = range(6)
+_DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _LOOK, _HEADER = range(7)
 # A block: gains, tube, number of admissible speeds, then the speeds and the packed curve.
 _K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _TAU, _SPEEDS, _BLOCK = range(7)
 # What is known of a branch.
 _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
+
+# Memory: the river that has the hand and its phase, when the law was last asked, and the velocity by which it decides.
+_WHEN, _SEEN, _MEMORY = 2, 3, 6
 
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
@@ -94,6 +97,19 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
 
 
 @njit
+def _look(params: Array, at: int, memory: Array, slot: int, t: float, v: Array) -> Array:
+    """The velocity by which rivers are told apart: smoothed, unless no time has passed."""
+    seen, look = memory[slot + _SEEN : slot + _MEMORY], params[at + _LOOK]
+    passed = t - memory[slot + _WHEN]
+    # False for NaN, the first time.
+    share = 1.0 - math.exp(-passed / look) if look > 0.0 and passed > 0.0 else 1.0
+    memory[slot + _WHEN] = t
+    for i in range(3):
+        seen[i] += share * (v[i] - seen[i])
+    return seen
+
+
+@njit
 def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Array, wrench: Array) -> None:
     block = at + int(params[at + _HEADER + int(row[_RIVER])])
     curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
@@ -153,7 +169,7 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
 def higher_order_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
-    """Instruction HIGHER_ORDER: parameters see `HigherOrder`, memory [river, phase]; `curve` is not used."""
+    """Instruction HIGHER_ORDER: parameters see `HigherOrder`, memory see the module; `curve` is not used."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     if not np.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2]):
         wrench[:] = np.nan
@@ -161,7 +177,7 @@ def higher_order_wrench(
     wrench[:] = 0.0
     rivers = int(params[at + _RIVERS])
     table = np.empty((rivers * BRANCHES + 1, _CANDIDATE))
-    count = _candidates(params, at, p, v, table)
+    count = _candidates(params, at, p, _look(params, at, memory, slot, hand[HAND_TIME], v), table)
     if params[at + _DISCRETE] > 0.0:
         winner = _discrete(params, at, table, count, memory, slot)
         if winner >= 0:
@@ -224,11 +240,14 @@ class HigherOrder:
         h [m/s], of the discrete field.
     form : {"smooth", "discrete"}
         How rivers share the hand.
+    look : float
+        Time constant of a low-pass of the velocity by which rivers are told apart [s], so that the noise of a device
+        does not; 0: none. The forces take the velocity as it is.
 
     Raises
     ------
     ParameterError
-        If r or σ is below 1e-6 m/s, h negative, one of them not finite, or the form unknown.
+        If r or σ is below 1e-6 m/s, h or the time negative, one of them not finite, or the form unknown.
     """
 
     bundle: RiverBundle
@@ -236,8 +255,10 @@ class HigherOrder:
     sigma: float
     hysteresis: float = 0.0
     form: Literal["smooth", "discrete"] = "smooth"
+    look: float = 0.0
 
     def __post_init__(self) -> None:
+        checked("look", self.look, "s")
         checked("admission", self.admission, "m/s", least=1e-6)
         checked("sigma", self.sigma, "m/s", least=1e-6)
         checked("hysteresis", self.hysteresis, "m/s")
@@ -251,9 +272,9 @@ class HigherOrder:
             gains = [river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, river.tau, len(speeds) / 2]
             blocks.append(np.concatenate([gains, speeds, river.curve.packed()]))
         release = self.admission + self.hysteresis
-        header = [float(self.form == "discrete"), 0.5 * self.sigma**-2, self.admission, release, len(blocks)]
+        header = [float(self.form == "discrete"), 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look]
         offsets = np.cumsum([_HEADER + len(blocks), *(len(block) for block in blocks[:-1])])
-        return Program.law(HIGHER_ORDER, np.concatenate([header, offsets, *blocks]), [-1.0, 0.0])
+        return Program.law(HIGHER_ORDER, np.concatenate([header, offsets, *blocks]), [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0])
 
     def program(self) -> Program:
         """Compiled form of the field."""

@@ -3,12 +3,14 @@ r"""Steps in a transition: feet do not slide to where the new motion has them, o
 With E_n(s) where the end of a limb is in the new motion, and E_o(s) where it was, coming to rest within half of the
 blend time, the end goes
 
-.. math:: E(s) = E_o + \beta(x)\,(E_n - E_o) + b(x)\,\lambda\,|E_n - E_o|_{xy}\,e_z
+.. math:: E(s) = E_o + \beta(x)\,(E_n - E_o) + b(x)\,\lambda\,|E_n - E_o|\,e_z
 
 with the smooth step β = 10 x³ − 15 x⁴ + 6 x⁵ and the arc b = 64 x³ (1 − x)³; orientations likewise on SO(3). x runs
-from 0 to 1 in the limb's own half of the blend time: in the first half for the foot that is higher, or has the longer
-way to go, in the second for the other one, which stands until then. So position, velocity and acceleration of the feet
-are continuous, and a foot that moves does so above the ground. The limb's joints follow (`limbs`).
+from 0 to 1 in the limb's own half of the blend time, and the other foot stands meanwhile. A foot that stands before the
+change and after it is the pivot (`pivot`): the new motion is placed where it has that foot, which steps second, and
+then hardly. Where there is none, the foot that the new motion stands on steps first; else the one that is higher, or
+has the longer way to go. So position, velocity and acceleration of the feet are continuous, a foot that moves does so
+above the ground, and one foot stands. The limb's joints follow (`limbs`).
 """
 
 import numpy as np
@@ -20,11 +22,14 @@ from controllers.rotations import exponential, logarithm, multiply, relative, ro
 from controllers.state import Array, Pose
 
 _LIFT = 0.2  # λ: height of a step over its length
+_TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
 _LEVEL = 0.01  # [m] feet that differ by less in height are equally high
+_FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
+_CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
 _SOONEST = 0.05  # [s] in which a foot that falls comes to rest at least
 # A row of `steps`: when the step begins, place and orientation where the old motion comes to rest, and the offsets
-# from there with their rates, (3, 3) each; and the time to get there.
-_BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, STEP = 0, 1, 4, 8, 17, 26, 27
+# from there with their rates, (3, 3) each; the time to get there; and the height of the floor.
+_BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, _FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28
 
 
 @njit
@@ -61,7 +66,48 @@ def _come_to_rest(values: Array, period: float, seconds: float, rest: Array, cha
 
 
 @njit
-def plan_steps(limbs: Array, steps: Array, shown: Array, asked: Pose, period: float, seconds: float) -> None:
+def standing(limbs: Array, pose: Pose, stands: Array) -> None:
+    """Which ends of limbs are about as low as the lowest: 1 in `stands` (n,), else 0."""
+    end, ground = np.empty(7), np.inf
+    for n in range(limbs.shape[0]):
+        limb_end(limbs[n], pose, end)
+        stands[n], ground = end[2], min(ground, end[2])
+    for n in range(limbs.shape[0]):
+        stands[n] = 1.0 if stands[n] < ground + _LEVEL else 0.0
+
+
+@njit
+def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> int:
+    """The limb on which a figure stands both before and after a change, −1 if it is none or both.
+
+    Parameters
+    ----------
+    limbs : Array, shape (n, 36)
+        `Limb.packed`.
+    shown : Pose
+        Of the old motion at the change.
+    ahead : Array, shape (2, nq)
+        Poses of the new motion when the first step ends, and when the second does.
+    stands : Array, shape (n,)
+        Written: 1 where the new motion stands on the limb in both poses, else 0.
+    """
+    also, found = np.empty(limbs.shape[0]), -1
+    standing(limbs, ahead[0], stands)
+    standing(limbs, ahead[1], also)
+    stands *= also
+    standing(limbs, shown, also)
+    for n in range(limbs.shape[0]):
+        if stands[n] * also[n] > 0.0:
+            if found >= 0:
+                return -1
+            found = n
+    return found
+
+
+@njit
+def plan_steps(
+    limbs: Array, steps: Array, shown: Array, asked: Pose, period: float, seconds: float, second: int, stands: Array
+) -> None:
     """Note how the ends of limbs move at a change, and which of two steps first.
 
     Parameters
@@ -76,6 +122,8 @@ def plan_steps(limbs: Array, steps: Array, shown: Array, asked: Pose, period: fl
         Of the new motion now.
     period, seconds : float
         Between the samples, and the blend time T [s].
+    second, stands
+        The limb that steps second, −1 for any, and those that the new motion stands on, as `pivot` tells.
     """
     half = 0.5 * seconds
     ends, turns, way = np.empty((3, 7)), np.empty((3, 3)), np.empty(3)
@@ -90,7 +138,10 @@ def plan_steps(limbs: Array, steps: Array, shown: Array, asked: Pose, period: fl
         # Not deeper than the foot that stands.
         fall, height = 0.5 * (ends[1, 2] - ends[2, 2]) / period, ends[0, 2] - ground
         stop = half if fall <= 0.0 else min(half, max(2.0 * height / fall, _SOONEST))
-        step[_STOP] = stop
+        # Nor farther than a leg in full swing can be caught.
+        speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
+        stop = min(stop, max(2.0 * _CAUGHT / max(speed, 1e-9), _SOONEST))
+        step[_STOP], step[_FLOOR] = stop, ground
         _come_to_rest(ends[:, :3], period, stop, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
         w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
         for j in range(3):
@@ -106,6 +157,9 @@ def plan_steps(limbs: Array, steps: Array, shown: Array, asked: Pose, period: fl
         change[0] = turns[0]
         limb_end(limbs[n], asked, ends[1])
         urgency[n] = np.floor(height / _LEVEL) + np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])
+        urgency[n] += _FIRST * stands[n]
+        if n == second:
+            urgency[n] = -np.inf
     for n in range(limbs.shape[0]):
         steps[n, _BEGIN] = 0.0 if n == np.argmax(urgency) else half
 
@@ -118,16 +172,13 @@ def step_end(step: Array, s: float, seconds: float, end: Array) -> None:
     if x >= 1.0:
         return
     share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    left = np.empty(3)
+    left, way, floor, new = np.empty(3), 0.0, step[_FLOOR], end[2]
     offset_left(step[_AWAY:_TURNED].reshape(3, 3), stop, min(s, stop), left)
-    way = 0.0
     for i in range(3):
         old = step[_PLACE + i] + left[i]
         ahead = end[i] - old
         way += ahead * ahead if i < 2 else 0.0
         end[i] = old + share * ahead
-    # Rounded at zero, where a root has no derivative.
-    end[2] += 64.0 * (x * (1.0 - x)) ** 3 * _LIFT * (np.sqrt(way + 1e-4) - 1e-2)
     offset_left(step[_TURNED:_STOP].reshape(3, 3), stop, min(s, stop), left)
     w, a, b, c = multiply(
         step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3], *exponential(left[0], left[1], left[2])
@@ -136,3 +187,8 @@ def step_end(step: Array, s: float, seconds: float, end: Array) -> None:
     end[3], end[4], end[5], end[6] = multiply(
         w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2])
     )
+    way += _TURN_ARM**2 * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    # Rounded at zero, where a root has no derivative.
+    lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT * (np.sqrt(way + 1e-4) - 1e-2)
+    # A foot that comes down fast would swing through the floor.
+    end[2] = max(end[2], min(floor, new)) + lift

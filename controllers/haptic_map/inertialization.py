@@ -8,19 +8,25 @@ tangent space of the new pose; the offset is added to the new motion and decays 
 
 the quintic with o, ȯ, ö at s = 0 and zero, at rest and without acceleration, at s = T. So pose, velocity and
 acceleration are continuous there and here. We keep every component's own rate, also where it points away from the new
-motion, which Bollo clips: a joint may then swing on by up to 0.16 T ȯ, as an inert one does.
+motion, which Bollo clips: a joint may then swing on by up to 0.16 T ȯ, as an inert one does. A leg in full kick would
+be thrown out of its joints by that; so where it exceeds a greatest swing, what ȯ and ö add decays within a T of their
+own, in which it is just that.
 
 Where the figure stands does not come back: see `stopping_way`.
 """
+
+import math
 
 from numba import njit
 
 from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose, Tangent
 
+_SWING = 0.16  # of T ȯ: how far the rate alone carries an offset
+
 
 @njit
-def offset_left(change: Array, seconds: float, s: float, offset: Tangent) -> None:
+def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing: float = math.inf) -> None:
     """What is left of an offset s seconds after the change.
 
     Parameters
@@ -33,13 +39,20 @@ def offset_left(change: Array, seconds: float, s: float, offset: Tangent) -> Non
         Time since the change [s], below T; before the change the polynomial goes on.
     offset : Tangent, shape (n,)
         Written.
+    swing : float
+        How far a component may swing on by its rate, by default without limit.
     """
     x = s / seconds
-    rest = (1.0 - x) ** 3
-    value, slope = rest * (1.0 + x * (3.0 + 6.0 * x)), seconds * rest * x * (1.0 + 3.0 * x)
-    bend = 0.5 * seconds**2 * rest * x * x
+    value = (1.0 - x) ** 3 * (1.0 + x * (3.0 + 6.0 * x))
     for i in range(offset.shape[0]):
-        offset[i] = value * change[0, i] + slope * change[1, i] + bend * change[2, i]
+        own = seconds
+        if _SWING * seconds * abs(change[1, i]) > swing:
+            own = swing / (_SWING * abs(change[1, i]))
+        offset[i] = value * change[0, i]
+        y = s / own
+        if y < 1.0:
+            moving = own * (1.0 - y) ** 3 * y
+            offset[i] += moving * (1.0 + 3.0 * y) * change[1, i] + 0.5 * moving * own * y * change[2, i]
 
 
 @njit

@@ -1,6 +1,8 @@
 """Every river plays a clip of its own: which one has the hand is the motion, where on it the hand is the frame."""
 
+import math
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numba import njit
@@ -29,8 +31,9 @@ from controllers.state import Array, Pose
 RIVER_CLIPS = 5
 # The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
 RIVER, PHASE, STILL, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3
-# Parameters: a header, offsets of the packed curves, the curves, and the blend.
+# Parameters: a header, offsets of the packed curves and of the phases of rest, both, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
+_RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
 
@@ -83,11 +86,20 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
 
 
 @njit
-def lets_go(params: Array, memory: Array, river: float, x: Array) -> bool:
-    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays."""
+def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
+    """Pace at which the hand plays the clip, 1 for the river's own, by the memory a period later."""
+    curve = int(params[_CURVES + int(memory[RIVER])])
+    lap, way = params[curve + END] - params[curve + START], later[PHASE] - memory[PHASE]
+    return (way - lap * np.round(way / lap)) / period
+
+
+@njit
+def lets_go(params: Array, memory: Array, river: float, x: Array, rate: float) -> bool:
+    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays, or races it."""
     curve, found = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2))
-    free = river < 0.0 and memory[STILL] == 0.0
-    return free and branches(params, curve, x[0], x[1], x[2], params[_TUBE], found) == 0
+    if river >= 0.0 or memory[STILL] > 0.0:
+        return False
+    return abs(rate) > _RACES or branches(params, curve, x[0], x[1], x[2], params[_TUBE], found) == 0
 
 
 @njit
@@ -98,9 +110,27 @@ def change_clip(memory: Array, river: float, phase: float) -> None:
 
 @njit
 def stop_clip(params: Array, memory: Array, way: float) -> None:
-    """Let the clip that plays stand still, at a phase that is `way` farther on, wherever the stylus is."""
-    curve = int(params[_CURVES + int(memory[RIVER])])
-    memory[PHASE], memory[STILL] = wrap_phase(params, curve, memory[PHASE] + way), 1.0
+    """Let the clip that plays stand still wherever the stylus is: at the phase of rest nearest to one `way` ahead."""
+    river, rivers = int(memory[RIVER]), int(params[_RIVERS])
+    curve = int(params[_CURVES + river])
+    lap = params[curve + END] - params[curve + START]
+    first, last = int(params[_CURVES + rivers + river]), int(params[_CURVES + rivers + river + 1])
+    wanted = wrap_phase(params, curve, memory[PHASE] + way)
+    best, nearest = wanted, math.inf
+    for k in range(first, last):
+        away = abs(params[k] - wanted)
+        away = min(away, lap - away)
+        if away < nearest:
+            best, nearest = params[k], away
+    memory[PHASE], memory[STILL], memory[LAST_ANGLE] = best, 1.0, np.nan
+
+
+@njit
+def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
+    """Go on in the clip that plays at the pace of its river, without the hand; one that stands still stands."""
+    if memory[STILL] == 0.0:
+        curve = int(params[_CURVES + int(memory[RIVER])])
+        memory[PHASE], memory[STILL] = wrap_phase(params, curve, memory[PHASE] + seconds), 1.0
 
 
 @njit
@@ -127,7 +157,8 @@ class RiverClips(AnimationMap):
 
     i is the river that has the hand, a number that the field leaves in its trace; t*_i the phase of its curve nearest
     to the stylus (of the branch that goes on, where the curve passes twice); a lap of the river is a lap of its clip.
-    A hand that no river has, outside the tube of the last, has no frame: who shows h stops there (`stop_clip`).
+    A hand that no river has, outside the tube of the last or too fast in it, has no frame: who shows h stops, at a
+    phase at which the clip can stand (`stop_clip`).
     Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
     as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
     jumps: who shows it goes on from where the figure stands (`place_clip`), with the offset decaying
@@ -167,10 +198,29 @@ class RiverClips(AnimationMap):
             raise ParameterError(f"a river that plays a clip must be a closed curve; river {opened[0]} is open")
         if not tube > 0.0:
             raise ParameterError(f"the tube of a map of rivers must be positive, got {tube} m")
-        packed = [curve.packed() for curve in curves]
-        offsets = np.cumsum([_CURVES + len(curves), *(len(blob) for blob in packed)])
-        header = np.concatenate(([len(curves), tube, offsets[-1]], offsets[:-1], *packed))
-        super().__init__(RIVER_CLIPS, river_clips_map, clips, header, (), limbs)
+        self.curves, self._tube = tuple(curves), tube
+        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs)
+
+    def _header(self, rests: Sequence[Array]) -> Array:
+        """What the kernel reads before the blend."""
+        blocks = [*(curve.packed() for curve in self.curves), *rests]
+        offsets = np.cumsum([_CURVES + len(blocks) + 1, *(len(block) for block in blocks)])
+        return np.concatenate([[len(self.curves), self._tube, offsets[-1]], offsets, *blocks])
+
+    def with_rests(self, rests: Sequence[Array]) -> "RiverClips":
+        """The same map, whose clips stop only where they can stand: phases of each curve, shape (n,); none: anywhere.
+
+        Raises
+        ------
+        ParameterError
+            If there are not phases for as many curves, or they are not finite.
+        """
+        phases = [np.asarray(still, dtype=np.float64).ravel() for still in rests]
+        if len(phases) != len(self.curves) or not all(np.all(np.isfinite(still)) for still in phases):
+            raise ParameterError(f"expected finite phases of rest for each of {len(self.curves)} rivers, got {rests}")
+        other = copy(self)
+        other._params = np.concatenate([self._header(phases), self._params[int(self._params[_BLEND]) :]])
+        return other
 
     def compiled(self) -> CompiledMap:
         """The map as its kernel takes it, with the memory of a new run: the first river has the hand."""

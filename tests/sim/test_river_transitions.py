@@ -9,13 +9,16 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
+from experiments.balance import nearest_supported
 from experiments.clips import load_clips
 from experiments.figure_maps import figure_legs, packed_legs
 from experiments.hands import stylus_path
 from experiments.modes import river_bundle
+from experiments.rests import with_rests
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
 from sim.reference import make_reference, reference_along
+from sim.transition import DWELL
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "river_clips.csv"
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4
@@ -54,7 +57,7 @@ def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.n
 
 def _at_changes(values: np.ndarray) -> np.ndarray:
     """Largest of rows from three before to three behind each change."""
-    rows = [round(moment / PERIOD) for moment, _ in CHANGES]
+    rows = [round((moment + DWELL) / PERIOD) for moment, _ in CHANGES]
     return np.array([values[k - 3 : k + 3].max() for k in rows])
 
 
@@ -100,7 +103,7 @@ def test_feet_that_touch_the_floor_step_instead_of_sliding(clips_of_rivers) -> N
     height = points[..., 2] - FIGURE.geom_size[ids, 0]
     step = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
     for moment, _ in CHANGES:
-        first, last = round(moment / PERIOD), round((moment + BLEND) / PERIOD)
+        first, last = round((moment + DWELL) / PERIOD), round((moment + DWELL + BLEND) / PERIOD)
         assert height[first:last].min() > -0.003
         for side in ("left", "right"):
             of_side = [k for k, name in enumerate(FOOT_CONTACTS) if name.startswith(side)]
@@ -145,20 +148,88 @@ def test_a_hand_that_leaves_all_rivers_leaves_the_figure_standing(clips_of_river
     assert _rates(_thrown(clips_of_rivers, False))[0][still].max() > 20.0
 
 
-def test_rivers_that_have_the_hand_in_turns_change_the_clip_once_in_a_blend_time(clips_of_rivers) -> None:
+def _in_turns(clips: RiverClips, seconds: float, blend: float) -> np.ndarray:
+    """Poses while rivers have the hand in turns, for so long each, from 0.5 s on."""
     t = np.arange(300) * PERIOD
     traces = np.zeros((len(t), TRACE_SIZE))
     traces[:, TRACE_PHASE] = t % LAP
-    traces[:, TRACE_RIVER] = np.where(t > 0.5, np.floor(t / 0.03) % 3, 0.0)
-    poses, shown = np.empty((len(t), 75)), stylus_path(CURVES[0].point(t))
-    reference = make_reference(FIGURE, clips_of_rivers.compiled(), PERIOD, 6.0, BLEND, packed_legs(FIGURE))
-    reference_along(reference, shown, traces, poses)
+    traces[:, TRACE_RIVER] = np.where(t > 0.5, np.floor(t / seconds) % 3, 0.0)
+    reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, blend, packed_legs(FIGURE))
+    poses = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(CURVES[0].point(t)), traces, poses)
+    return poses
+
+
+def _jerk(poses: np.ndarray) -> float:
     velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
-    assert np.abs(np.diff(velocity, axis=0)).max() < 10.0
-    hasty = make_reference(FIGURE, clips_of_rivers.compiled(), PERIOD, 6.0, 0.0, packed_legs(FIGURE))
-    reference_along(hasty, shown, traces, poses)
-    velocity = pose_difference(poses[:-1], poses[1:]) / PERIOD
-    assert np.abs(np.diff(velocity, axis=0)).max() > 60.0
+    return float(np.abs(np.diff(velocity, axis=0)).max())
+
+
+def test_rivers_that_have_the_hand_in_turns_change_the_clip_once_in_a_blend_time(clips_of_rivers) -> None:
+    assert _jerk(_in_turns(clips_of_rivers, 0.06, BLEND)) < 10.0
+    assert _jerk(_in_turns(clips_of_rivers, 0.06, 0.0)) > 60.0
+
+
+def test_a_river_that_has_the_hand_for_a_moment_changes_no_clip(clips_of_rivers) -> None:
+    alone = _in_turns(clips_of_rivers, 1e3, BLEND)
+    np.testing.assert_array_equal(_in_turns(clips_of_rivers, 0.03, BLEND), alone)
+    assert np.abs(_in_turns(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
+
+
+def _soles(poses: np.ndarray) -> np.ndarray:
+    """Lowest points of the feet's contact spheres, shape (n, 8, 3)."""
+    data, ids = mujoco.MjData(FIGURE), [FIGURE.geom(name).id for name in FOOT_CONTACTS]
+    points = np.empty((len(poses), len(ids), 3))
+    for pose, row in zip(poses, points, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(FIGURE, data)
+        row[:] = data.geom_xpos[ids]
+    points[..., 2] -= FIGURE.geom_size[ids, 0]
+    return points
+
+
+def _two(clips: RiverClips, first: int, second: int, moment: float, away: bool) -> np.ndarray:
+    """Poses of a hand that goes from one river to another, or is thrown away, at a moment; until 0.8 s later."""
+    t = np.arange(round((moment + 0.8) / PERIOD)) * PERIOD
+    s = np.clip((t - moment) / 0.3 + (0.0 if away else 0.5), 0.0, 1.0)[:, None]
+    s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    there = CURVES[first].point(t % LAP)
+    points = there + s * ([0.1, 0.0, 0.1] if away else CURVES[second].point(t % LAP) - there)
+    traces = np.zeros((len(t), TRACE_SIZE))
+    traces[:, TRACE_PHASE] = t % LAP
+    traces[:, TRACE_RIVER] = np.where(t < moment, first, -1.0 if away else second)
+    # A run that begins on another river than the first goes over at once, long before the moment.
+    reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, BLEND, packed_legs(FIGURE))
+    poses = np.empty((len(t), 75))
+    reference_along(reference, stylus_path(points), traces, poses)
+    return poses[round(moment / PERIOD) :]
+
+
+@pytest.mark.parametrize("away", [False, True])
+def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(away: bool) -> None:
+    made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "cheer", "angry"))[0]]
+    clips = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
+    draw = np.random.default_rng(3)
+    for _ in range(12):
+        first, second = draw.permutation(3)[:2]
+        soles = _soles(_two(clips, int(first), int(second), 1.2 + 3.0 * draw.random(), away))
+        assert soles[..., 2].min(axis=1).max() < 0.008
+        assert soles[..., 2].min() > -0.003
+        assert slide(soles) < 0.03
+
+
+def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
+    data = mujoco.MjData(FIGURE)
+    for clips, balanced in ((with_rests(clips_of_rivers, FIGURE), True), (clips_of_rivers, False)):
+        missing = []
+        for moment in (1.3, 1.45, 1.6, 1.75):
+            pose = _two(clips, 0, 0, moment, True)[-1:]
+            data.qpos[:] = pose[0]
+            mujoco.mj_kinematics(FIGURE, data)
+            mujoco.mj_comPos(FIGURE, data)
+            centre = data.subtree_com[1, :2]
+            missing.append(np.linalg.norm(nearest_supported(centre, _soles(pose)[0], 0.9) - centre))
+        assert (max(missing) < 1e-3) == balanced
 
 
 def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
