@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.recording import Recording
+from sim.transition import DWELL
 
 Array = npt.NDArray[np.float64]
 
@@ -35,20 +36,27 @@ class RiverChange(NamedTuple):
 def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
     """All changes of a run, in memory that does not grow with it; none where the field has no rivers to tell apart.
 
-    A river that has the hand again after none had it is no change; the first to have it is none either.
+    A river that has the hand again after none had it is no change; the first to have it is none either; nor one that
+    has it for less than its clip would need to play (`sim.transition.DWELL`).
     """
     if "river_names" not in recording.texts:
         return ()
     names = recording.texts["river_names"].split("\n")
     t, river = recording.channel("ticks", "t"), recording.channel("ticks", "river")
     changes: list[RiverChange] = []
-    last = -1.0
+    last = current = -1.0
+    since = 0.0
     for first in range(0, len(t), ROWS):
-        rows = river[first : first + ROWS]
-        held = np.flatnonzero(rows >= 0.0)
-        before = np.concatenate(([last], rows[held][:-1])) if len(held) else np.zeros(0)
-        for k in np.flatnonzero((rows[held] != before) & (before >= 0.0)):
-            moment = float(t[first + int(held[k])])
-            changes.append(RiverChange(moment, names[int(before[k])], names[int(rows[held[k]])]))
-        last = float(rows[held[-1]]) if len(held) else last
+        times, rows = t[first : first + ROWS], river[first : first + ROWS]
+        edges = np.flatnonzero(np.diff(rows, prepend=current))
+        for k, end in zip([-1, *edges], [*edges, len(rows)], strict=True):
+            # Row −1: what the rows before have ended with goes on.
+            if k >= 0:
+                current, since = float(rows[k]), float(times[k])
+            lasted = float(times[end] if end < len(rows) else times[-1]) - since
+            if current < 0.0 or current == last or lasted < DWELL:
+                continue
+            if last >= 0.0:
+                changes.append(RiverChange(since, names[int(last)], names[int(current)]))
+            last = current
     return tuple(changes)

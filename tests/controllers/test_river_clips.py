@@ -9,11 +9,13 @@ from clips_for_maps import LEG, difference, matrices, swinging
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.river_clips import (
+    PHASE,
     RIVER,
     RiverClips,
     change_clip,
     heading_between,
     lets_go,
+    phase_rate,
     place_clip,
     stop_clip,
     takes_over,
@@ -105,18 +107,51 @@ def test_no_river_and_none_that_there_is_not_take_over() -> None:
 def test_a_hand_outside_the_tube_is_let_go_once_and_has_no_frame_then() -> None:
     params, memory = MAP.compiled().params, _memory(0, 1.0)
     inside, outside = CURVES[0].point(1.0) * 1.3, CURVES[0].point(1.0) * 1.5
-    assert [lets_go(params, memory, river, p) for river in (-1.0, 0.0) for p in (inside, outside)] == [0, 1, 0, 0]
+    assert [lets_go(params, memory, river, p, 1.0) for river in (-1.0, 0.0) for p in (inside, outside)] == [0, 1, 0, 0]
+    # One that races along in the tube plays no clip either, whichever way.
+    assert [lets_go(params, memory, river, inside, rate) for river in (-1.0, 0.0) for rate in (3.0, -3.0)] == [
+        1,
+        1,
+        0,
+        0,
+    ]
     stop_clip(params, memory, 0.25)
     stopped = MAP.pose(_stylus(outside), memory)
     np.testing.assert_array_equal(MAP.pose(_stylus(CURVES[0].point(3.0)), memory), stopped)
     np.testing.assert_array_equal(MAP.jacobian(_stylus(outside), memory), 0.0)
     expected = MAP.pose(_stylus(CURVES[0].point(1.25)), _memory(0, 1.25))
     np.testing.assert_allclose(stopped, expected, atol=1e-9)
-    assert not lets_go(params, memory, -1.0, outside)
+    assert not lets_go(params, memory, -1.0, outside, 1.0)
     # Its own river takes it from none.
     assert takes_over(params, memory, 0.0)
     change_clip(memory, 0.0, 3.0)
     assert not takes_over(params, memory, 0.0)
+
+
+def test_a_clip_stops_at_the_phase_of_rest_nearest_to_where_it_would_over_the_seam_too() -> None:
+    lap = CURVES[0].duration
+    resting = MAP.with_rests([np.array([0.2, 0.55 * lap]), np.zeros(0)])
+    params = resting.compiled().params
+    for river, phase, way, expected in (
+        (0, 0.5 * lap, 0.1, 0.55 * lap), (0, 0.97 * lap, 0.0, 0.2), (0, 0.97 * lap, 0.03 * lap, 0.2),
+        (1, 1.0, 0.25, 1.25),
+    ):  # fmt: skip
+        memory = _memory(river, phase)
+        stop_clip(params, memory, way)
+        assert memory[PHASE] == pytest.approx(expected, abs=1e-12)
+    # Nothing else of the map changes.
+    x = _stylus(CURVES[0].point(1.0))
+    np.testing.assert_array_equal(resting.pose(x), MAP.pose(x))
+    for rests in ([np.zeros(1)], [np.array([np.nan]), np.zeros(0)]):
+        with pytest.raises(ParameterError, match="phases of rest"):
+            MAP.with_rests(rests)
+
+
+def test_the_pace_of_a_hand_is_told_over_the_seam() -> None:
+    params, lap = MAP.compiled().params, CURVES[0].duration
+    for here, there in ((1.0, 1.02), (lap - 0.01, 0.01)):
+        assert phase_rate(params, _memory(0, here), _memory(0, there), 0.01) == pytest.approx(2.0)
+        assert phase_rate(params, _memory(0, there), _memory(0, here), 0.01) == pytest.approx(-2.0)
 
 
 @pytest.mark.parametrize(
