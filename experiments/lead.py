@@ -6,11 +6,14 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait, Leading
+from controllers.haptic_map.grounded import runs
 from controllers.haptic_map.led import Led
 from controllers.haptic_map.limbs import Limb
 from experiments.config import RunConfig
+from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.contacts import contacts
+from models.mocap.laps import lap_of
 from sim.users.arm import Arm
 
 Array = npt.NDArray[np.float64]
@@ -22,6 +25,9 @@ STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
+_UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
+_CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
+_BLINK = 0.05  # [s] a flight lasts longer
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
 _FLYING_FORWARD = 1.05  # and its largest pace: who is faster than that lands late, for he falls no faster
@@ -35,14 +41,42 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    phases = np.linspace(0.0, 1.0, _PHASES, endpoint=False)
-    standing = contacts(clip).planted[np.round(phases * (clip.n_frames - 1)).astype(int)]
-    support = standing.sum(axis=1).astype(np.int64)
+    clip, made = lap_of(clip).clip, clip.closes(_CLOSES)
+    marks = contacts(clip)
+    phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
+    frames = np.round(phases * steps).astype(int) % steps
+    # What closes was made for the floor and is led as it is; a capture's feet have to be held.
+    standing = marks.planted[frames] if made else _without_blinks(marks.settled[:-1], _BLINK * clip.fps)
+    support = (standing if made else standing[frames]).sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing)
+    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else CONTACT_RADIUS)
     return led, Gait(led.stride, led.stride / led.duration, np.roll(support, -first), led.reach)
+
+
+def lap_remark(clip: Clip) -> tuple[str, ...]:
+    """What is said of a capture of which a part is led, or that does not repeat itself."""
+    lap, remarks = lap_of(clip), list[str]()
+    if lap.clip.n_frames < clip.n_frames:
+        remarks.append(
+            f"of the clip {clip.name!r} the lap that repeats itself best is led, {lap.start:.2f} to {lap.end:.2f} s"
+        )
+    if lap.gap > _UNLIKE:
+        remarks.append(
+            f"the clip {clip.name!r} does not repeat itself (its ends are {np.degrees(lap.gap):.0f}° apart): it is "
+            "closed over its ends, and the physical figure may fall there"
+        )
+    return tuple(remarks)
+
+
+def _without_blinks(standing: npt.NDArray[np.bool_], shortest: float) -> npt.NDArray[np.bool_]:
+    """Which feet stand (n, 2), without moments of fewer samples than that in which none does: nobody flies them."""
+    filled = standing.copy()
+    for start, end in runs(~np.any(standing, axis=1)):
+        if end - start < shortest:
+            filled[np.arange(start, end) % len(standing)] |= standing[start - 1]
+    return filled
 
 
 def gait_remark(name: str, gait: Gait, grounds: bool) -> tuple[str, ...]:

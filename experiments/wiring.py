@@ -29,7 +29,7 @@ from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
 from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
-from experiments.lead import gait_remark, leading_hand, led_map, s_curve
+from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
 from experiments.led_balance import balanced_on_ground
 from experiments.lifted_runs import lifted_course, lifted_curve, lifted_rivers
@@ -103,7 +103,7 @@ def wire(
     if leading:
         blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
         led = lead_law(config, gait)
-        remarks += gait_remark(only(clips).name, gait, blended.grounds)
+        remarks += lap_remark(only(clips)) + gait_remark(only(clips).name, gait, blended.grounds)
     elif config.map.endswith(MAP_SUFFIX):
         blended, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)

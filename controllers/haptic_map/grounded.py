@@ -16,16 +16,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
-from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.limbs import END, Limb
+from controllers.haptic_map.reaching import shortfall
 from controllers.haptic_map.splines import round_lap
 from controllers.state import Array
 
 Mask = npt.NDArray[np.bool_]
 
 _AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
-_STRETCHED = 0.985  # of its length a leg may have between its ends, or as much as in the clip
+_LOWEST = 0.25  # by which the root may be lowered [m]: who leaps farther than that cannot step
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
@@ -42,7 +42,7 @@ def runs(mask: Mask) -> list[tuple[int, int]]:
 def grounded(
     rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
 ) -> Array | None:
-    """Rows of a led clip (`led`) on which no flight is left, or None: it does not fly, or hops on one foot.
+    """Rows of a led clip (`led`) on which no flight is left, or None: it does not fly, hops on one foot, or leaps far.
 
     Parameters
     ----------
@@ -77,11 +77,13 @@ def grounded(
             result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
         result[:, first + END * j + 3] += (warp - np.arange(n)) / n
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
-    excess = np.max([_excess(rows, result, stride, limb, first + END * j) for j, limb in enumerate(limbs)], axis=0)
+    short = np.max([shortfall(rows, result, stride, limb, first + END * j) for j, limb in enumerate(limbs)], axis=0)
     width = max(3, round(n / len(flights)))
     window = np.hanning(width + 2)[1:-1]
-    ceiling = minimum_filter1d(rows[:, 2] - excess, width, mode="wrap")
+    ceiling = minimum_filter1d(rows[:, 2] - short, width, mode="wrap")
     result[:, 2] = convolve1d(ceiling, window / window.sum(), mode="wrap")
+    if np.max(rows[:, 2] - result[:, 2]) > _LOWEST:
+        return None
     return result
 
 
@@ -100,19 +102,3 @@ def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | Non
         return None
     laps = np.arange(-2, 3) * n
     return PchipInterpolator(np.add.outer(laps, here).ravel(), np.add.outer(laps, there).ravel())(np.arange(n))
-
-
-def _excess(rows: Array, grounded_rows: Array, stride: float, limb: Limb, at: int) -> Array:
-    """How much lower the root must be for a limb to reach its end [m], shape (n,)."""
-    length = float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2]))
-    place = 3 + 4 * limb.joints[2]
-    lines = list[Array]()
-    for channels in (rows, grounded_rows):
-        foot = Rotation.from_quat(channels[:, place : place + 4], scalar_first=True)
-        root = Rotation.from_quat(channels[:, 3:7], scalar_first=True)
-        line = channels[:, at : at + 3] - foot.apply(limb.points.mean(axis=0))
-        line[:, 0] += stride * channels[:, at + 3]
-        lines.append(line - channels[:, :3] - root.apply(limb.offsets[0]))
-    longest = max(_STRETCHED * length, float(np.linalg.norm(lines[0], axis=1).max()))
-    away = np.linalg.norm(lines[1][:, :2], axis=1)
-    return np.maximum(0.0, -lines[1][:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))

@@ -32,6 +32,8 @@ from controllers.haptic_map.grounded import Mask, grounded
 from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
 from controllers.haptic_map.loops import checked_clip, closed_loop, turned, yawed
+from controllers.haptic_map.planted import with_planted_ends
+from controllers.haptic_map.reaching import reached
 from controllers.haptic_map.splines import basis, basis_slope, control_points
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
@@ -194,6 +196,9 @@ class Led(HapticMap):
         Where the packed path begins in the memory.
     standing : array of bool, shape (m, limbs), optional
         Which limbs stand, at m equal steps of the lap: between its flights. Without it u changes nothing.
+    radius : float, optional
+        How high over the floor the points of a limb are that stand on it [m]: there the limbs that stand are held
+        (`planted`). Without it they move as they do in the clip.
     sway : Array, shape (k, 2), optional
         By which the root moves over the floor where no flight is left [m], at k equal steps of the lap.
 
@@ -210,9 +215,10 @@ class Led(HapticMap):
         phase: float = 0.0,
         at: int = 0,
         standing: Mask | None = None,
+        radius: float | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._made_of = (clip, tuple(limbs), phase, at, standing)
+        self._made_of = (clip, tuple(limbs), phase, at, standing, radius)
         poses, fps = clip
         loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
         self.phase = phase
@@ -224,7 +230,7 @@ class Led(HapticMap):
                 f"{np.degrees(_LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
                 f"{np.degrees(loop.drift[2]):.0f}°. Walk and run do"
             )
-        samples = int(np.clip(len(poses) - 1, 64, 2048))
+        samples = int(np.clip(len(poses) - 1, 64 if radius is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
         # The path is along x, whichever way the figure faces while it goes.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
@@ -244,11 +250,11 @@ class Led(HapticMap):
             signs[first : first + 4] = 1.0 if rows[-1, first : first + 4] @ rows[0, first : first + 4] >= 0.0 else -1.0
         forms = [rows]
         if standing is not None:
-            nearest = np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)
-            low = grounded(
-                rows, signs, self.stride, limbs, standing[nearest], np.zeros((2, 2)) if sway is None else sway
-            )
-            forms += [] if low is None else [low]
+            stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
+            if radius is not None:
+                rows = with_planted_ends(rows, channels, drift[0], limbs, stands, radius)
+            low = grounded(rows, signs, self.stride, limbs, stands, np.zeros((2, 2)) if sway is None else sway)
+            forms = [rows] if low is None else [rows, low if radius is None else reached(low, self.stride, limbs)]
         self.grounds = len(forms) > 1
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))

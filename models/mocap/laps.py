@@ -1,0 +1,89 @@
+r"""One lap of a captured walk: the part of a clip that repeats itself best.
+
+A capture begins and ends anywhere, and one that is closed over its ends drags its feet there. Two frames i < j are as
+alike as
+
+.. math:: d_{ij}^2 = \tfrac1{18}\,\bigl(\textstyle\sum_k \angle(q_{ik}, q_{jk})^2 + (z_i - z_j)^2/r^2
+          + \tau^2 \|\omega_i - \omega_j\|^2 + \tau^2 \|v_i - v_j\|^2/r^2\bigr)
+
+with the rotations of root (but its heading) and joints, the root's height, and their velocities, seen from the heading
+(Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair that is most alike, of those between which the
+figure travels and both feet step.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from models.mocap.contacts import contacts
+
+Array = npt.NDArray[np.float64]
+
+_TIME, _LENGTH = 0.1, 0.5  # τ [s], r [m]
+_CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
+_SHORTEST = 0.4  # [s] of a lap
+_TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest turn of a lap
+_MOST_FRAMES = 1200  # that are compared with each other
+
+
+class Lap(NamedTuple):
+    """A lap, and where it was in the clip.
+
+    Attributes
+    ----------
+    clip : Clip
+        Of its frames.
+    start, end : float
+        In the clip [s].
+    gap : float
+        d of its ends [rad].
+    """
+
+    clip: Clip
+    start: float
+    end: float
+    gap: float
+
+
+def lap_of(clip: Clip) -> Lap:
+    """The part of a clip that repeats itself best; the clip itself if it closes, or if no part of it is a lap."""
+    whole = Lap(clip, 0.0, clip.duration, 0.0)
+    if clip.closes(_CLOSES) or clip.n_frames < 3:
+        return whole
+    every = -(-clip.n_frames // _MOST_FRAMES)
+    frames = np.arange(0, clip.n_frames, every)
+    likeness, headings = _likeness(clip, frames)
+    travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
+    turn = np.abs(headings[:, None] - headings)
+    later = frames[None, :] - frames[:, None]
+    lap = (later >= _SHORTEST * clip.fps) & (travel >= _TRAVEL) & (turn <= _TURN)
+    planted = contacts(clip).planted
+    for foot in range(planted.shape[1]):
+        stood = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]
+        between = stood[None, :] - stood[:, None]
+        lap &= (between > 0) & (between < later)
+    if not lap.any():
+        return whole
+    i, j = np.unravel_index(int(np.argmin(np.where(lap, likeness, np.inf))), lap.shape)
+    first, last = int(frames[i]), int(frames[j])
+    part = Clip(clip.poses[first : last + 1], clip.fps, clip.name)
+    return Lap(part, first / clip.fps, last / clip.fps, float(likeness[i, j]))
+
+
+def _likeness(clip: Clip, frames: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """D of frames to each other [rad], shape (n, n), and headings, unwrapped, shape (n,)."""
+    poses, velocities = clip.poses[frames], clip.velocities()[frames]
+    heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])
+    back = quaternions.about_axis(2, -heading)
+    turns = poses[:, 3:].reshape(len(poses), -1, 4).copy()
+    turns[:, 0] = quaternions.product(back, turns[:, 0])
+    turns = quaternions.sign_continuous(turns).reshape(len(poses), -1)
+    # Small rotations are twice as long as their quaternions.
+    parts = [2.0 * turns, poses[:, 2:3] / _LENGTH, _TIME * velocities[:, 3:]]
+    features = np.concatenate([*parts, _TIME / _LENGTH * quaternions.rotated(back, velocities[:, :3])], axis=1)
+    squares = (features**2).sum(axis=1)
+    distance = np.maximum(squares[:, None] + squares - 2.0 * features @ features.T, 0.0)
+    return np.sqrt(distance / turns.shape[1] * 4.0), np.unwrap(heading)

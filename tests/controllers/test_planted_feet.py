@@ -1,0 +1,114 @@
+"""Feet of a led capture stand where they stand, on any path: what the capture slides and hovers is taken from it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from clips_for_maps import difference
+from figure_soles import slide, soles
+
+from controllers.curves.walked_path import STEP, lay_row, path_front, straight_path
+from controllers.haptic_map.led import Led
+from controllers.haptic_map.planted import levels, window
+from experiments.figure_maps import figure_legs
+from experiments.lead import led_map
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+from models.mocap.library import embedded, load_clip
+
+MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
+CAPTURES = (
+    "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "cmu_amc/16_09.amc", "deepmimic/humanoid3d_walk.txt",
+    "deepmimic/humanoid3d_run.txt", "snu/walk.bvh", "snu/run.bvh", "xia/strutting_01_000.bvh", "xia/angry_13_000.bvh",
+)  # fmt: skip
+
+
+def walker(s: float, held: float = 0.0) -> np.ndarray:
+    return np.array([s, held, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def bent_path(gait, bend: float, length: float) -> np.ndarray:
+    """A path that turns left and right while a foot stands."""
+    path = straight_path(0.0, 0.0, 0.2, gait.reach)
+    while path_front(path, 0) < length:
+        lap = (path[0] + 0.5) * STEP / gait.stride
+        feet = gait.support[int(len(gait.support) * (lap - np.floor(lap))) % len(gait.support)]
+        turn = min(feet, 1) * bend * np.sin(1.5 * path[0] * STEP)
+        lay_row(path, 0, turn * STEP, bend, 0.0)
+    return path
+
+
+@pytest.fixture(scope="module")
+def figure():
+    return figure_model()
+
+
+def skating(name: str) -> Clip:
+    """A clip of the package whose feet slide by a sixth of their way, turn, and hover."""
+    clip = embedded(name)
+    poses, share = clip.poses.copy(), np.linspace(0.0, 1.0, clip.n_frames)
+    poses[:, 0] *= 1.15
+    poses[:, 1] += 0.03 * np.sin(2.0 * np.pi * share)
+    poses[:, 2] += 0.012 + 0.006 * np.cos(2.0 * np.pi * share)
+    # It does not quite close either.
+    poses[-20:, 7:11] = poses[-21, 7:11]
+    return Clip(poses, clip.fps, name)
+
+
+def test_windows_are_one_within_the_runs_of_a_mask() -> None:
+    stands = np.zeros(100, dtype=bool)
+    stands[80:], stands[:30] = True, True
+    stays = window(stands, 0.1)
+    np.testing.assert_array_equal(stays[~stands], 0.0)
+    np.testing.assert_array_equal(stays[[*range(86, 100), *range(24)]], 1.0)
+    assert 0.0 < stays[80] < stays[82] < 1.0
+    assert stays[29] == stays[80]
+    np.testing.assert_array_equal(window(np.ones(5, dtype=bool), 0.1), 1.0)
+    heights = np.where(stands, 0.02, 0.3)
+    np.testing.assert_allclose(levels(heights, stands), 0.02, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_a_clip_that_skates_stands_on_a_bent_path(figure, name: str) -> None:
+    clip = skating(name)
+    led, gait = led_map(clip, figure_legs(figure), 0)
+    path = bent_path(gait, 0.5, 7.0)
+    places = np.arange(gait.reach, path_front(path, 0) - gait.reach - 0.2, 0.01)
+    shown = soles(figure, [led.pose(walker(s), path) for s in places])
+    # Standing feet touch, and none goes through the floor.
+    assert (shown[..., 2].min(axis=1) < 0.003).mean() > (0.95 if name == "walk" else 0.6)
+    assert shown[..., 2].min() > -0.008
+    assert slide(shown) < 0.01
+    skates = Led((clip.poses, clip.fps), figure_legs(figure), led.phase)
+    assert slide(soles(figure, [skates.pose(walker(s), path) for s in places]), 0.02) > 0.05
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_a_clip_that_closes_is_led_as_it_is(figure, name: str) -> None:
+    clip = embedded(name)
+    led, _ = led_map(clip, figure_legs(figure), 0)
+    plain = Led((clip.poses, clip.fps), figure_legs(figure), led.phase)
+    for s in np.linspace(0.0, led.stride, 30):
+        np.testing.assert_array_equal(led.pose(walker(s)), plain.pose(walker(s)))
+
+
+@pytest.mark.parametrize("file", CAPTURES)
+def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
+    if not MOCAP.is_dir():
+        pytest.skip("the motion capture data is not beside the project")
+    led, gait = led_map(load_clip(MOCAP / file), figure_legs(figure), 0)
+    path = bent_path(gait, 0.35, gait.reach + 2.0 * led.stride + 1.0)
+    places = np.arange(gait.reach, gait.reach + 2.0 * led.stride, 0.01)
+    for held in (0.0, 1.0):
+        shown = soles(figure, [led.pose(walker(s, held), path) for s in places])
+        assert slide(shown) < 0.03
+        assert shown[..., 2].min() > -0.01
+
+
+def test_the_derivative_of_a_planted_capture_is_that_of_the_pose(figure) -> None:
+    led, gait = led_map(skating("walk"), figure_legs(figure), 0)
+    path, h = bent_path(gait, 0.5, 7.0), 1e-6
+    for s in np.random.default_rng(4).uniform(1.0, 5.0, 60):
+        jacobian = led.jacobian(walker(s), path)
+        step = difference(led.pose(walker(s + h), path), led.pose(walker(s - h), path)) / (2.0 * h)
+        np.testing.assert_allclose(jacobian[:, 0], step, atol=1e-5)
