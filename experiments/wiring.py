@@ -31,7 +31,7 @@ from experiments.governor import governed_law
 from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
-from experiments.led_balance import balanced_on_ground
+from experiments.led_balance import LED_GAINS, balanced_on_ground
 from experiments.lifted_runs import lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
@@ -43,7 +43,7 @@ from experiments.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.devices.phantom_port import PhantomPort, phantom_port, sense_in_motion
-from sim.figure import Figure
+from sim.figure import Figure, FigureGains
 from sim.kernel_units import law_units
 from sim.plant import make_hand, make_plant
 from sim.reference import begin_in_motion, check_reference, make_reference, poses_along
@@ -151,7 +151,7 @@ def wire(
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
         sense_in_motion(port)
-    figure = Figure(world.model, world.data, world.figure, FIGURE)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, LED_GAINS if leading else FigureGains())
     servo = Servo(
         plant=make_plant(world),
         port=port,
