@@ -21,11 +21,10 @@ from controllers.certificates.switching_search import counterexample
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.river import River as FieldRiver
 from controllers.safety import ForceLimiter
 from experiments.config import RunConfig
 from experiments.crossing_simulation import simulated_course
-from experiments.modes import default_rivers, law, river_time
+from experiments.modes import default_rivers, law
 
 Array = npt.NDArray[np.float64]
 
@@ -121,8 +120,9 @@ def certify_rivers(
 
 def _lifted_bundle(config: RunConfig, curves: Mapping[str, Trajectory]) -> RiverBundle:
     """The rivers of a lifted map, as `lifted_runs.lifted_rivers` has them, the one that the run begins on first."""
-    tau = river_time(config)
-    rivers = tuple(FieldRiver(curve, config.river_tube, tau, config.damping) for curve in curves.values())
+    from experiments.lifted_runs import lifted_river
+
+    rivers = tuple(lifted_river(curve, config) for curve in curves.values())
     return RiverBundle(rivers, tuple(name.removeprefix("_") or "first" for name in curves))
 
 

@@ -41,9 +41,11 @@ class RunConfig:
     seed : int
         Of where exactly the hand lets go of the stylus at the start.
     stiffness : float
-        k_r of the field [N/m].
+        k_r of the field [N/m]; 0: 300, but 50 in the rivers of a map from a file. These lie side by side: a hand that
+        goes over from one to the other is drawn within τ = b_d/k_r = 0.4 s, or the figure would have to be at the
+        other clip's speed at once.
     damping : float
-        b_d of the field [N s/m].
+        b_d of the field [N s/m]; 0: 8, but 20 in the rivers of a map from a file.
     tube : float
         Radius ε in which the field is felt [m].
     orientation_stiffness : float
@@ -104,7 +106,8 @@ class RunConfig:
     scene : SceneConfig
         Figure's size, servo period and physics step.
     pushes : tuple of Push
-        What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on.
+        What the hand does; for the user "push" without any, outwards and inwards once a lap from the second lap on; on
+        the rivers of a lifted map over to another clip at the best transition, and three laps later back.
     turns : tuple of Turn
         How it turns the stylus; with any it also holds it upright in between.
     grabs : tuple of Grab
@@ -119,8 +122,8 @@ class RunConfig:
     user: Literal["relaxed", "trace", "push", "turn"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1
-    stiffness: float = 300.0
-    damping: float = 8.0
+    stiffness: float = 0.0
+    damping: float = 0.0
     tube: float = 0.25
     orientation_stiffness: float = 0.0
     orientation_damping: float = 0.0
@@ -157,8 +160,13 @@ class RunConfig:
         if not self.clips:
             clips = ("walk",) if self.mode == "lead" else MAP_CLIPS.get(self.map, FIGURE_CLIPS)
             object.__setattr__(self, "clips", clips)
+        from_file = self.map.endswith(MAP_SUFFIX)
         if self.figure_ticks == 0:
-            object.__setattr__(self, "figure_ticks", 2 if self.map.endswith(MAP_SUFFIX) else 8)
+            object.__setattr__(self, "figure_ticks", 2 if from_file else 8)
+        side_by_side = from_file and self.mode == "rivers"
+        for name, own, usual in (("stiffness", 50.0, 300.0), ("damping", 20.0, 8.0)):
+            if getattr(self, name) == 0.0:
+                object.__setattr__(self, name, own if side_by_side else usual)
 
 
 @dataclass(frozen=True)

@@ -76,9 +76,10 @@ class LiftReport(NamedTuple):
             at = meeting.transition
             lines.append(
                 f"  transition {names[at.first]} – {names[at.second]} at {np.degrees(at.angle):.0f}°: poses "
-                f"{at.pose:.2f}, velocities {at.velocity:.2f} apart (relative); the curves pass "
-                f"{1e3 * meeting.distance:.1f} mm apart "
-                f"at {np.degrees(meeting.slant):.0f}°, {meeting.speeds[0]:.2f} and {meeting.speeds[1]:.2f} m/s"
+                f"{at.pose:.2f}, velocities {at.velocity:.2f}, standing feet {at.support:.2f} apart (relative), the "
+                f"figures at {at.speeds[0]:.1f} and {at.speeds[1]:.1f} m/s; the curves pass "
+                f"{1e3 * meeting.distance:.1f} mm apart at {np.degrees(meeting.slant):.0f}°, "
+                f"{meeting.speeds[0]:.2f} and {meeting.speeds[1]:.2f} m/s"
             )
         if not after.meetings and len(names) > 1:
             lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
@@ -188,9 +189,10 @@ def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), see
     labels = _labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
+    transitions = np.array([transition[:5] for transition in lifting.transitions]).reshape(-1, 5)
     haptic_map = Lifted(
         [(clip.poses, clip.fps) for clip in clips], [motion.closed for motion in motions], lifting.angles,
-        lifting.sites, figure_legs(figure_model()), labels, transitions=np.array(lifting.transitions).reshape(-1, 5),
+        lifting.sites, figure_legs(figure_model()), labels, transitions=transitions,
     )  # fmt: skip
     return LiftedClips(clips, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
 

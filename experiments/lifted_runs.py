@@ -11,11 +11,15 @@ from controllers.state import Array
 from experiments.config import RunConfig
 from experiments.modes import river_time
 from experiments.pace import paced
-from sim.users.intent import Grab
+from sim.users.intent import Push
 from sim.world import phantom_angles
 
-_LEAD = 0.41  # [rad] before and behind a transition, between which a hand changes over
-_OVERSHOOT = 0.9  # of the distance of the curves
+_SPEEDS = (0.5, 2.0)  # least and greatest that a river takes, of its own: a hand that comes over has its neighbour's
+_SECONDS = 0.6  # of a push from one curve to another
+_LEAD = 0.42  # [s] before the transition, when it begins
+_CROSSING = 3.6  # [1/s] a push of this much drag times the distance of the curves takes a hand just over
+_NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
+_STAY = 3  # laps on the other curve
 
 
 def curve_number(haptic_map: Lifted, curve: str) -> int:
@@ -63,11 +67,20 @@ def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
     SimError
         If the Phantom does not reach a curve.
     """
-    tau = river_time(config)
     curves = [paced(haptic_map.curve(i), config.damping) for i in range(len(haptic_map.names))]
-    return RiverBundle(
-        tuple(River(curve, config.river_tube, tau, config.damping) for curve in curves), haptic_map.names
-    )
+    return RiverBundle(tuple(lifted_river(curve, config) for curve in curves), haptic_map.names)
+
+
+def lifted_river(course: Trajectory, config: RunConfig) -> River:
+    """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is out of its interval.
+    """
+    speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
+    return River(course, config.river_tube, river_time(config), config.damping, np.outer(speeds, _SPEEDS))
 
 
 def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
@@ -82,12 +95,36 @@ def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
     return paced(curve, config.damping) if led else curve
 
 
-def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float) -> Grab:
-    """A hand that carries the stylus from one curve to another past the transition between them.
+def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
+    """What a hand on rivers does that pushes: over at its curve's best transition in the second lap, and back.
 
-    From `_LEAD` before the transition on the first curve to `_LEAD` behind it on the second, and beyond it, because an
-    arm yields: it stays behind where it means to be. It moves at about the pace of the curves: one that carried the
-    stylus from rest to rest would stop the figure.
+    Raises
+    ------
+    ParameterError
+        If the curve has no transition.
+    """
+    first = curve_number(haptic_map, config.curve)
+    rows = [row for row in haptic_map.transitions if first in (row[0], row[1])]
+    if not rows:
+        pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]
+        raise ParameterError(
+            f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
+            f"{', '.join(pairs) or 'none'}; leave out --user push, or give --pushes"
+        )
+    second = int(rows[0][1] if int(rows[0][0]) == first else rows[0][0])
+    laps = [haptic_map.curve(i).duration for i in (first, second)]
+    begin = laps[0]
+    return (
+        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, config.damping),
+        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], config.damping),
+    )
+
+
+def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float, drag: float) -> Push:
+    """A push by which a hand on one curve's river gets over to another's, about the transition between them.
+
+    It is towards the other curve, in the river's drag b as hard as takes the hand there within about a quarter of a
+    second: a figure cannot break into a run faster.
 
     Parameters
     ----------
@@ -97,13 +134,20 @@ def carried_over(haptic_map: Lifted, first: int, second: int, angle: float, star
     angle : float
         θ of the transition [rad].
     start : float
-        When the stylus is at the first place [s].
+        Earliest time [s]; the push begins when the hand next comes to its place.
+    drag : float
+        b of the rivers [N s/m].
     """
-    before, behind = angle - _LEAD, angle + _LEAD
-    here, there = _point(haptic_map, first, before), _point(haptic_map, second, behind)
-    beyond = _OVERSHOOT * (there - _point(haptic_map, first, behind))
-    x, y, z = (float(value) for value in there + beyond - here)
-    return Grab(start, (x, y, z), duration=0.3, hold=0.0, steady=True)
+    curve, angles = haptic_map.curve(first), haptic_map.angles[first]
+    # Frames of a closed clip may begin anywhere in the lap.
+    frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
+    at = frame / haptic_map.clips[first][1] - _LEAD
+    place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))
+    way = _point(haptic_map, second, angle) - _point(haptic_map, first, angle)
+    distance = float(np.linalg.norm(way))
+    x, y, z = (float(value) for value in way)
+    p, q, r = (float(value) for value in place)
+    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), _NEAR)
 
 
 def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:

@@ -28,6 +28,7 @@ IntArray = npt.NDArray[np.int64]
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
 # at a right angle is not: it is √2 from it.
 ADMISSION, HYSTERESIS = 1.2, 0.15
+BESIDE = 0.05  # the hysteresis of rivers side by side, as a map's own are: places tell them apart, not directions
 # Smooth, σ says up to which angle rivers are blended, and a blend of tubes that part throws the hand out of both: with
 # 0.05 it ends at 20°, before the middle leaves the tubes.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
@@ -71,7 +72,8 @@ def law(
             curve, config.stiffness, config.damping, config.bunny_width, config.bunny_attraction, config.bunny_pace
         )
     if config.mode == "rivers":
-        return _rivers(config, rivers or default_rivers(config, curve), _pace(curve, rivers), speeds_of)
+        bundle, hysteresis = (default_rivers(config, curve), HYSTERESIS) if rivers is None else (rivers, BESIDE)
+        return _rivers(config, bundle, _pace(curve, rivers), hysteresis, speeds_of)
     raise ParameterError(f"no field for the mode {config.mode!r}; there are follow, bunny, rivers")
 
 
@@ -111,7 +113,11 @@ def _pace(curve: Trajectory, rivers: RiverBundle | None) -> float:
 
 
 def _rivers(
-    config: RunConfig, bundle: RiverBundle, pace: float, speeds_of: Callable[[int, Trajectory], Array] | None
+    config: RunConfig,
+    bundle: RiverBundle,
+    pace: float,
+    hysteresis: float,
+    speeds_of: Callable[[int, Trajectory], Array] | None,
 ) -> Field:
     if config.crossing == "sum":
         return bundle
@@ -120,7 +126,7 @@ def _rivers(
         gated = tuple(replace(river, speeds=speeds_of(i, river.curve)) for i, river in enumerate(bundle.rivers))
         bundle, admission = replace(bundle, rivers=gated), GATE
     return HigherOrder(
-        bundle, admission * pace, SIGMA[config.crossing] * pace, HYSTERESIS * pace, config.crossing,
+        bundle, admission * pace, SIGMA[config.crossing] * pace, hysteresis * pace, config.crossing,
         LOOK[config.crossing],
     )  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Where concrete parts are put together: from a configuration to a servo that runs."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
 from experiments.led_balance import LED_GAINS, balanced_on_ground
-from experiments.lifted_runs import lifted_course, lifted_curve, lifted_rivers
+from experiments.lifted_runs import default_pushes, lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
 from experiments.rests import with_rests
@@ -111,6 +112,8 @@ def wire(
             curve = lifted_curve(blended, config.curve)
             rivers = lifted_rivers(blended, config) if config.mode == "rivers" else None
             course = lifted_course(curve, config)
+            if rivers is not None and config.user == "push" and not config.pushes:
+                config = replace(config, pushes=default_pushes(blended, config))
     else:
         blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):

@@ -84,7 +84,8 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     _check_room(len(clips), room)
     own = [features(motion, weights, STEPS) for motion in clips]
     phases = common_lap(clips, own)
-    compared = _compared(own, phases)
+    laps = np.array([clip.duration / (1.0 - phase.gap) for clip, phase in zip(clips, phases, strict=True)])
+    compared = _compared(own, phases, laps)
     transitions = find_transitions(compared, room.alike)
     rate, change = _rates(clips, phases)
     _check_speeds(clips, rate, change, room)
@@ -148,7 +149,7 @@ def _check_speeds(clips: list[Motion], rate: Array, change: Array, room: Room) -
             )
 
 
-def _compared(own: list[Features], phases: list[Phase]) -> Comparison:
+def _compared(own: list[Features], phases: list[Phase], laps: Array) -> Comparison:
     lap = np.arange(SAMPLES) / SAMPLES
     moments: list[Features] = []
     inside: list[Mask] = []
@@ -162,7 +163,7 @@ def _compared(own: list[Features], phases: list[Phase]) -> Comparison:
         back = np.clip((s - 1.0) * (1.0 - phase.gap) / phase.gap, 0.0, 1.0)
         moments.append(each.at(np.where(s <= 1.0, np.clip(s, 0.0, 1.0), 1.0 - back)))
         inside.append(s <= 1.0)
-    return compare(moments, np.stack(inside, axis=1))
+    return compare(moments, np.stack(inside, axis=1), laps)
 
 
 def _rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:

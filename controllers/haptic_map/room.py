@@ -43,7 +43,7 @@ class Room:
     approach : float
         How near they come at a transition where poses agree [m].
     alike : float
-        Relative mismatch of pose and velocity up to which two moments make a transition.
+        Relative mismatch of poses, velocities and standing feet up to which two motions have a transition.
     speed, acceleration : float
         Greatest of a hand that follows a curve at its clip's pace [m/s, m/s²].
 
@@ -57,7 +57,7 @@ class Room:
     z_range: tuple[float, float] = (-0.05, 0.05)
     separation: float = 0.01
     approach: float = 0.002
-    alike: float = 0.5
+    alike: float = 0.55
     speed: float = 1.0
     acceleration: float = 8.0
 

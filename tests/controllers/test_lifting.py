@@ -162,7 +162,7 @@ def test_the_gradient_of_the_energy_agrees_with_differences():
     # Limits low enough to be broken.
     task = Task(
         Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 0.1, 0.5, distance,
-        [Transition(0, 1, 1.0, 0.0, 0.0), Transition(1, 2, 3.0, 0.0, 0.0)],
+        [Transition(0, 1, 1.0, 0.0, 0.0, 0.0, (0.0, 0.0)), Transition(1, 2, 3.0, 0.0, 0.0, 0.0, (0.0, 0.0))],
         6.0 + rng.normal(size=(SAMPLES, n)), rng.normal(size=(SAMPLES, n)),
     )  # fmt: skip
     energy = Energy(task)
