@@ -16,7 +16,7 @@ from sim.world import phantom_angles
 
 _SPEEDS = (0.5, 2.0)  # least and greatest that a river takes, of its own: a hand that comes over has its neighbour's
 _SECONDS = 0.6  # of a push from one curve to another
-_LEAD = 0.42  # [s] before the transition, when it begins
+_LEAD = 0.36  # [s] before the transition, when it begins
 _CROSSING = 3.6  # [1/s] a push of this much drag times the distance of the curves takes a hand just over
 _NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
 _STAY = 3  # laps on the other curve
