@@ -83,7 +83,10 @@ class LiftReport(NamedTuple):
             )
         if not after.meetings and len(names) > 1:
             lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
-        lines += [f"  {names[i]} and {names[j]} are the same motion: one of them would do" for i, j in lifting.same]
+        lines += [
+            f"  {', '.join(names[i] for i in group)} are the same motion: one of them would do"
+            for group in _groups(lifting.same)
+        ]
         lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
         quality = self.quality
         lines += [
@@ -114,6 +117,15 @@ class LiftReport(NamedTuple):
                 "clips": self.quality.clips._asdict(),
             },
         }
+
+
+def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Clips that are the same motion, together, by the first of them."""
+    groups: dict[int, list[int]] = {}
+    for first, second in sorted(pairs):
+        if not any(first in others for others in groups.values()):
+            groups.setdefault(first, [first]).append(second)
+    return list(groups.values())
 
 
 def _apart(measure: ArrangementMeasure) -> str:

@@ -12,9 +12,9 @@ from controllers.haptic_map.common_lap import common_lap
 from controllers.haptic_map.layouts import lattice, scaled
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting import lift
-from controllers.haptic_map.motion_features import Motion, features
+from controllers.haptic_map.motion_features import Features, Motion, features
 from controllers.haptic_map.room import Rectangle, Room
-from controllers.haptic_map.transitions import Transition
+from controllers.haptic_map.transitions import Transition, compare, find_transitions
 
 WEIGHTS = np.array([0.4, 0.2, 0.15, 0.1])
 ROOM = Room()
@@ -136,7 +136,8 @@ def test_a_transition_is_found_where_two_motions_agree_and_the_curves_meet_there
     (at,) = found.transitions
     base = common_lap([meeting_clips()[0]], [features(meeting_clips()[0], WEIGHTS, STEPS)])[0]
     assert base.start == 0.0
-    assert at.mismatch < 0.02
+    assert np.hypot(at.pose, at.velocity) < 0.1
+    assert at.support == 0.0
     share = np.interp(at.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
@@ -145,6 +146,34 @@ def test_a_transition_is_found_where_two_motions_agree_and_the_curves_meet_there
     assert found.after.separation >= ROOM.separation
     # Before the arrangement the curves were far apart there too.
     assert found.before.meetings[0].distance > 5.0 * meeting.distance
+
+
+def moments(rng, poses, bears):
+    """Features of a motion at 200 steps of a lap: how far it is from another, and when its one foot stands."""
+    own = rng.normal(size=(200, 6))
+    own[:, 0] += poses
+    return Features(own, np.tile([1.5, 0.0, 0.0, 0.5], (200, 1)), np.asarray(bears, float)[:, None])
+
+
+def test_a_transition_is_where_motions_agree_for_a_while_and_stand_on_the_same_feet():
+    steps, feet = np.arange(200), np.arange(200) % 100 < 50
+
+    def found(apart, bears):
+        rng = np.random.default_rng(3)
+        one, other = moments(rng, 0.0 * steps, feet), moments(np.random.default_rng(3), apart, bears)
+        return find_transitions(compare([one, other], np.ones((200, 2), bool), np.full(2, 2.0)), 0.5)
+
+    # The same pose for a moment at step 40, nearly the same for 0.4 s about step 120.
+    apart = np.full(200, 6.0)
+    apart[40], apart[95:146] = 0.0, 0.5
+    (at,) = found(apart, feet)
+    assert np.degrees(at.angle) == pytest.approx(120 * 1.8, abs=10.0)
+    assert at.support == 0.0
+    assert at.speeds == pytest.approx((1.5, 1.5))
+    # On the other foot there, it is none.
+    other = feet.copy()
+    other[80:160] = ~feet[80:160]
+    assert found(apart, other) == []
 
 
 def test_motions_that_never_agree_have_no_transition():

@@ -1,4 +1,4 @@
-"""From clips to a map file to runs on it: FOLLOW on one curve, and a hand that changes over where lifting says."""
+"""From clips to a map file to runs on it: FOLLOW on one curve, and a hand that is pushed over where lifting says."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,6 @@ import pytest
 
 from experiments.cli import main
 from experiments.config import RunConfig
-from experiments.lifted_runs import carried_over
 from experiments.map_files import load_figure_map
 from experiments.run import run
 from sim.recording import Recording
@@ -49,34 +48,54 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
     assert summary["figure"]["residual_in_flight_max"] == 0.0
 
 
-def test_a_hand_changes_over_from_walk_to_run_where_lifting_found_a_transition(map_file: Path, tmp_path: Path) -> None:
-    haptic_map, _ = load_figure_map(map_file)
-    row = next(row for row in haptic_map.transitions if tuple(row[:2]) == (0.0, 1.0))  # pyright: ignore
-    angle = float(row[2])
-    alone = RunConfig(map=str(map_file), mode="rivers", curve="walk", seconds=9.0)
-    run(alone, tmp_path / "alone", True, 0.0)
+def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
+    run(RunConfig(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
-        river, p = recording.channel("ticks", "river")[:], recording.channel("ticks", "p")[:]
-        t = recording.channel("ticks", "t")[:]
-    # A hand that lets go stays with the walk, through the crossing.
-    assert (river == 0.0).all()
-    theta = np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
-    start = float(t[np.argmax(theta > 2.0 * np.pi * 2.0 + angle - 0.41)])
-    grab = carried_over(haptic_map, 0, 1, angle, start)  # pyright: ignore
-    carried = RunConfig(map=str(map_file), mode="rivers", curve="walk", seconds=9.0, grabs=(grab,))
-    summary = run(carried, tmp_path / "carried", True, 0.0)
-    assert any("walk → run" in line for line in summary.lines())
-    with Recording(tmp_path / "carried" / "run.h5") as recording:
-        river, p = recording.channel("ticks", "river")[:], recording.channel("ticks", "p")[:]
+        assert (recording.channel("ticks", "river")[:] == 0.0).all()
+        assert recording.channel("ticks", "distance")[:].max() < 1e-3
+
+
+@pytest.mark.parametrize(("first", "second"), [("walk", "run"), ("run", "walk")])
+def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_run_or_falls_into_a_walk(
+    map_file: Path, tmp_path: Path, first: str, second: str
+) -> None:
+    config = RunConfig(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
+    summary = run(config, tmp_path / "pushed", True, 0.0)
+    (change,) = summary.changes
+    assert (change.before, change.after) == (first, second)
+    haptic_map, _ = load_figure_map(map_file)
+    angle = next(row[2] for row in haptic_map.transitions if tuple(row[:2]) == (0.0, 1.0))  # pyright: ignore
+    with Recording(tmp_path / "pushed" / "run.h5") as recording:
+        t, p = recording.channel("ticks", "t")[:], recording.channel("ticks", "p")[:]
         distance = recording.channel("ticks", "distance")[:]
-    changes = np.flatnonzero(np.diff(river))
-    assert len(changes) == 1
-    at = p[changes[0] + 1]
-    away = np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi
-    assert abs(away) < 0.5
-    # And stays with the run when it is let go of.
-    assert river[-1] == 1.0
+        residual, shown = recording.channel("frames", "residual")[:], recording.channel("frames", "reference")[:]
+        frames, weight = recording.channel("frames", "t")[:], recording.array("body_weight")
+    at = p[np.searchsorted(t, change.t)]
+    assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
+    # The hand has let go and stays with the other river, and the figure with its clip: five seconds and more.
     assert distance[-2000:].max() < 1e-3
+    assert config.seconds - change.t > 5.0
+    assert summary.figure.fell_at is None
+    assert summary.figure.root_error_max_cm < 5.0
+    assert summary.figure.residual_in_flight_max == 0.0
+    assert summary.figure.residual_force_rms < 0.15
+    # The change itself takes help, walking and running hardly any.
+    force = np.linalg.norm(residual[:, :3], axis=1) / weight
+    away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
+    assert np.sqrt(np.mean(force[away] ** 2)) < 0.08
+    lap = round(2.2 / (frames[1] - frames[0]))
+    speed = np.linalg.norm(shown[-1, :2] - shown[-1 - lap, :2]) / 2.2
+    assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
+
+
+def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / "one.npz")
+    assert main(["lift", "walk", "--out", out]) == 0
+    capsys.readouterr()
+    assert main(["run", "--map", out, "--mode", "rivers", "--user", "push", "--out", str(tmp_path / "run")]) == 2
+    error = capsys.readouterr().err
+    assert "the curve 'walk' has no transition to push over at; there are: none" in error
+    assert len(error.strip().splitlines()) == 1
 
 
 @pytest.mark.parametrize(
