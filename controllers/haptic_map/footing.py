@@ -12,9 +12,13 @@ Headings likewise. A hand that goes back makes the offset grow again, until it h
 of the figure may be differences to either side. h_* is the derivative at a given offset.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 
+from controllers.errors import ParameterError
+from controllers.haptic_map.limbs import Limb
 from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
 
@@ -34,6 +38,19 @@ def fresh_footing(limbs: int) -> Array:
     memory = np.zeros(_ENDS + _END * limbs)
     memory[_WAY], memory[_ANGLE] = 1.0, np.nan
     return memory
+
+
+def packed_soles(limbs: Sequence[Limb]) -> Array:
+    """Points of limbs that may touch, from their centre [m], one after the other: what `keep_footing` is given.
+
+    Raises
+    ------
+    ParameterError
+        If one limb has more of them than another.
+    """
+    if len({len(limb.points) for limb in limbs}) > 1:
+        raise ParameterError(f"limbs must have equally many points, got {[len(limb.points) for limb in limbs]}")
+    return np.concatenate([np.zeros(0), *((limb.points - limb.points.mean(axis=0)).ravel() for limb in limbs)])
 
 
 @njit

@@ -14,7 +14,7 @@ from controllers.haptic_map.combination import combine, figure_channels, fresh_l
 from controllers.haptic_map.cores import draw_in
 from controllers.haptic_map.cylinder import cylinder
 from controllers.haptic_map.floor import SOFTNESS
-from controllers.haptic_map.footing import fresh_footing
+from controllers.haptic_map.footing import fresh_footing, packed_soles
 from controllers.haptic_map.frames import (
     CLOSES,
     PlacedClip,
@@ -25,7 +25,7 @@ from controllers.haptic_map.frames import (
     packed_frames,
 )
 from controllers.haptic_map.lap import MEMORY
-from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses, lowest_point
+from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import checked_clip
 from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
@@ -39,8 +39,6 @@ LIFTED = 3
 
 _LAGS = 128  # samples of λ round the lap
 _ROWS = 256  # of the corrections' table round the lap, at most
-_HARD = 5e-4  # [m] of the minimum of a sole's heights that tells where the ground is
-_RARE = 0.02  # share of frames in which a clip may be below the ground on which it stands
 _PAIR_STEPS = 24  # of the lap, at which clips are looked for that are neighbours
 (
     _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT,
@@ -274,16 +272,14 @@ class Lifted(ClipMap):
     def _packed(self, limbs: Sequence[Limb]) -> Array:
         drifts, rotations = self._drifts, (self._placed[0].poses.shape[1] - 3) // 4
         lags = self._common_lags(rotations, limbs)
-        channels, lowest = list[Array](), list[Array]()
+        channels = list[Array]()
         for clip, drift in zip(self._placed, drifts, strict=True):
-            result, ends, soles = clip.remainder[:, None], list[Array](), list[Array]()
+            result, ends = clip.remainder[:, None], list[Array]()
             rest, lag = result.copy(), round_lap(lags, clip.angles)
             for n, limb in enumerate(limbs):
                 quaternions, end = end_channels(rest, drift[None], limb, lag[:, n])
                 result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
                 ends.append(end)
-                soles.append(end[:, 0, 2] + [lowest_point(quaternions[:, 0], limb, soft) for soft in (_HARD, SOFTNESS)])
-            lowest.append(np.min(soles, axis=0) if limbs else np.zeros((2, 1)))
             channels.append(np.concatenate([result, *ends], axis=2)[:, 0])
         first = 3 + 4 * rotations
         ground = min((float(c[:, first + END - 1 :: END].min()) for c in channels if limbs), default=0.0)
@@ -301,19 +297,17 @@ class Lifted(ClipMap):
             packed_frames(splines),
             packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
             self._packed_pairs(packed_frames(splines), channels[0].shape[1], lags, limbs),
-            self._packed_soles(lowest, limbs),
+            self._packed_soles(channels, limbs),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
         return np.concatenate([[low[0], high[0], low[1], high[1], self.margin, len(self._placed), *at], *blocks])
 
-    def _packed_soles(self, lowest: list[Array], limbs: Sequence[Limb]) -> Array:
-        if len({len(limb.points) for limb in limbs}) > 1:
-            raise ParameterError(
-                f"limbs of a lifted map must have equally many points, got {[len(limb.points) for limb in limbs]}"
-            )
-        grounds, floor = [float(np.quantile(hard, _RARE)) for hard, _ in lowest], min(soft.min() for _, soft in lowest)
+    def _packed_soles(self, channels: list[Array], limbs: Sequence[Limb]) -> Array:
+        if not limbs:
+            return np.zeros(1 + len(channels))
+        floor = min(lowest_of_limbs(clip[:, None], limbs, SOFTNESS).min() for clip in channels)
         return np.concatenate([
-            [float(floor)], grounds, *((limb.points - limb.points.mean(axis=0)).ravel() for limb in limbs),
+            [floor], *(grounds(clip[:, None], limbs) for clip in channels), packed_soles(limbs),
         ])  # fmt: skip
 
     def _packed_pairs(self, frames: Array, size: int, lags: Array, limbs: Sequence[Limb]) -> Array:

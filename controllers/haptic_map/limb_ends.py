@@ -11,11 +11,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.limbs import Limb
+from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
 _SOFTNESS = 0.003  # [m] of the minimum of heights
+_HARD = 5e-4  # [m] likewise, where they tell where the ground is
+_RARE = 0.02  # share of frames in which a clip may be below the ground on which it stands
 
 
 def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
@@ -178,3 +180,35 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
     for end in ends:
         end[..., 4] -= ground
     return np.concatenate([result, *ends], axis=2)
+
+
+def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> Array:
+    """Height of the lowest point of all limbs [m], a soft minimum over each one's, of channels with ends.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq + 5 limbs)
+        Of `with_ends`.
+    limbs : sequence of Limb
+        At least one.
+    softness : float
+        [m].
+
+    Returns
+    -------
+    Array, shape (n, m)
+    """
+    first, heights = channels.shape[2] - END * len(limbs), list[Array]()
+    for n, limb in enumerate(limbs):
+        column = 3 + 4 * limb.joints[2]
+        low = lowest_point(channels[..., column : column + 4], limb, softness)
+        heights.append(channels[..., first + END * n + 2] + low)
+    return np.min(heights, axis=0)
+
+
+def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
+    """Height of the ground on which each clip stands [m], shape (m,): few of its frames are below.
+
+    `channels` and `limbs` are as `lowest_of_limbs` takes them.
+    """
+    return np.quantile(lowest_of_limbs(channels, limbs, _HARD), _RARE, axis=0)
