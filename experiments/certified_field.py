@@ -16,8 +16,8 @@ from controllers.certificates.sampling import Sampling
 from controllers.certificates.tolerance import JUDGING, Judging
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config import RunConfig
+from experiments.stretch import DAMPING
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compiled import source_hash
@@ -64,8 +64,8 @@ def certified_laws(config: RunConfig) -> dict[str, CertifiedLaw]:
         return {"": CertifiedLaw("follow" if along else "bunny", config.stiffness, config.damping, width)}
     if config.mode in ("stretch", "stretch-then-follow"):
         tubes = {
-            "": CertifiedLaw("seek", config.seek, StretchyTubes.b, float("inf")),
-            "_held": CertifiedLaw("hold", config.rubber, StretchyTubes.b, float("inf")),
+            "": CertifiedLaw("seek", config.seek, DAMPING, float("inf")),
+            "_held": CertifiedLaw("hold", config.rubber, DAMPING, float("inf")),
         }
         return tubes | ({"_then": follow} if config.mode == "stretch-then-follow" else {})
     if config.mode == "rivers":

@@ -18,6 +18,8 @@ from sim.users.intent import Grab
 Array = npt.NDArray[np.float64]
 
 CURVE_FILE = "curve.json"
+DAMPING = 14.0  # [N s/m] an edit that is undone takes the hand along in a tenth of a second, not in a fortieth
+REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap at about the curve's own pace
 PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
 
 
@@ -34,13 +36,13 @@ def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Stretc
         then = Follow(curve, config.stiffness, config.damping, config.tube)
         until = max((grab.end for grab in grabs), default=0.0) + PAUSE
     return StretchyTubes(
-        curve, config.seek, config.rubber, epsilon=config.rubber_tube, width=config.bump,
+        curve, config.seek, config.rubber, DAMPING, epsilon=config.rubber_tube, width=config.bump,
         until=np.inf if until is None else until, then=then,
     )  # fmt: skip
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
-    """What a hand does by default, in eleven seconds.
+    """What a hand does by default, in thirteen seconds.
 
     It pulls the curve outwards, pulls it up, takes that back and does it again by a short and a long click, and pushes
     it inwards from outside.
@@ -59,16 +61,16 @@ def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
     outwards = 0.02 * (first - centre) / np.linalg.norm(first - centre)
     still = np.zeros(3)
     doings = (
-        (outwards, 1.0, 0.4, first),
-        (np.array([0.0, 0.0, 0.015]), 1.0, 0.4, second),
+        (outwards, 1.3, 0.4, first),
+        (np.array([0.0, 0.0, 0.015]), 1.3, 0.4, second),
         (still, 0.15, 0.0, None),
         (still, 0.7, 0.0, None),
-        (-(3.5 * epsilon + 0.01) * away, 1.0, 0.4, third + 3.5 * epsilon * away),
+        (-(3.5 * epsilon + 0.01) * away, 1.3, 0.4, third + 3.5 * epsilon * away),
     )
     grabs: list[Grab] = []
     for carry, duration, hold, place in doings:
         start = grabs[-1].end + PAUSE if grabs else PAUSE
-        grabs.append(Grab(start, _vector(carry), duration, hold, None if place is None else _vector(place)))
+        grabs.append(Grab(start, _vector(carry), duration, hold, None if place is None else _vector(place), REACH))
     return tuple(grabs)
 
 

@@ -31,7 +31,7 @@ from sim.users.arm import Arm
 FLAGS = SimpleNamespace(
     mode="stretch", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5, stiffness=300.0, damping=4.0, tube=0.25
 )
-SECONDS = 3.2  # the first grab, and a little more
+SECONDS = 4.3  # the first grab, and a little more
 
 
 def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
@@ -64,7 +64,7 @@ def test_the_hand_bends_the_curve_and_the_held_point_is_at_the_stylus(ran) -> No
     _, field, told = ran
     held = told["switch"] > 0.0
     period = SECONDS / len(held)
-    assert np.sum(held) * period == pytest.approx(1.4, abs=0.01)
+    assert np.sum(held) * period == pytest.approx(1.7, abs=0.01)
     assert told["distance"][held].max() < 1e-9
     summary = stretch_summary(field, told["memory"])
     assert summary.edits == 1
