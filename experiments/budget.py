@@ -44,26 +44,27 @@ def energy_tank(
         Speed [m/s] to which a governor urges the hand.
     """
     pace, force = fastest(curve), limiter.peak
-    damped = river_power(config.damping, pace)
-    springs: tuple[tuple[float, float], ...] = ((config.stiffness, config.tube),)
+    stiffness, damping = config.gains
+    damped = river_power(damping, pace)
+    springs: tuple[tuple[float, float], ...] = ((stiffness, config.tube),)
     if config.mode == "follow":
         power = damped
     elif config.mode == "bunny":
         # ∫ k s exp(−s²/2δ²) ds = k δ² is what a spring of reach √2 δ holds.
-        springs = ((config.stiffness, np.sqrt(2.0) * config.bunny_width),)
-        power = damped + pace * min(config.stiffness * config.bunny_width * np.exp(-0.5), force)
+        springs = ((stiffness, np.sqrt(2.0) * config.bunny_width),)
+        power = damped + pace * min(stiffness * config.bunny_width * np.exp(-0.5), force)
     elif config.mode == "rivers":
-        bundle = river_bundle(curve, config.reach, config.damping / config.stiffness, config.damping, config.river_tube)
-        springs = ((config.stiffness, config.river_tube),) * len(bundle.rivers)
-        power = sum(river_power(config.damping, fastest(river.curve)) for river in bundle.rivers)
+        bundle = river_bundle(curve, config.reach, damping / stiffness, damping, config.river_tube)
+        springs = ((stiffness, config.river_tube),) * len(bundle.rivers)
+        power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
     elif config.mode in STRETCHING:
         # A press of the switch leaves the search for the rubber: its energy once a second.
         springs, power = ((max(config.seek, config.rubber), SPAN),), spring_store(config.rubber, config.rubber_tube)
         if config.mode == "stretch-then-follow":
             carried = max((float(np.linalg.norm(grab.carry)) for grab in grabs), default=0.0)
             springs, power = (
-                (*springs, (config.stiffness, config.tube)),
-                power + river_power(config.damping, pace + _BEND * carried / config.bump),
+                (*springs, (stiffness, config.tube)),
+                power + river_power(damping, pace + _BEND * carried / config.bump),
             )
     else:
         power, springs = force * pace, ((np.inf, SPAN),)

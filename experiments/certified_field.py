@@ -55,7 +55,7 @@ def certified_laws(config: RunConfig) -> dict[str, CertifiedLaw]:
     ParameterError
         If there is no certificate for the run's mode.
     """
-    follow = CertifiedLaw("follow", config.stiffness, config.damping, config.tube)
+    follow = CertifiedLaw("follow", *config.gains, config.tube)
     if config.mode == "follow":
         return {"": follow}
     if config.mode == "bunny":

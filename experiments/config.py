@@ -41,11 +41,13 @@ class RunConfig:
     seed : int
         Of where exactly the hand lets go of the stylus at the start.
     stiffness : float
-        k_r of the field [N/m]; 0: 300, but 50 in the rivers of a map from a file. These lie side by side: a hand that
-        goes over from one to the other is drawn within τ = b_d/k_r = 0.4 s, or the figure would have to be at the
-        other clip's speed at once.
+        k_r of the field [N/m].
     damping : float
-        b_d of the field [N s/m]; 0: 8, but 20 in the rivers of a map from a file.
+        b_d of the field [N s/m].
+    lifted_stiffness, lifted_damping : float
+        k_r and b_d of the rivers of a map from a file [N/m], [N s/m]. These lie side by side: a hand that goes over
+        from one to the other is drawn within τ = b_d/k_r, or the figure would have to be at the other clip's speed at
+        once.
     tube : float
         Radius ε in which the field is felt [m].
     orientation_stiffness : float
@@ -122,8 +124,10 @@ class RunConfig:
     user: Literal["relaxed", "trace", "push", "turn"] = "relaxed"
     seconds: float = 20.0
     seed: int = 1
-    stiffness: float = 0.0
-    damping: float = 0.0
+    stiffness: float = 300.0
+    damping: float = 8.0
+    lifted_stiffness: float = 50.0
+    lifted_damping: float = 20.0
     tube: float = 0.25
     orientation_stiffness: float = 0.0
     orientation_damping: float = 0.0
@@ -160,13 +164,15 @@ class RunConfig:
         if not self.clips:
             clips = ("walk",) if self.mode == "lead" else MAP_CLIPS.get(self.map, FIGURE_CLIPS)
             object.__setattr__(self, "clips", clips)
-        from_file = self.map.endswith(MAP_SUFFIX)
         if self.figure_ticks == 0:
-            object.__setattr__(self, "figure_ticks", 2 if from_file else 8)
-        side_by_side = from_file and self.mode == "rivers"
-        for name, own, usual in (("stiffness", 50.0, 300.0), ("damping", 20.0, 8.0)):
-            if getattr(self, name) == 0.0:
-                object.__setattr__(self, name, own if side_by_side else usual)
+            object.__setattr__(self, "figure_ticks", 2 if self.map.endswith(MAP_SUFFIX) else 8)
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """k_r [N/m] and b_d [N s/m] of the mode's field."""
+        if self.mode == "rivers" and self.map.endswith(MAP_SUFFIX):
+            return self.lifted_stiffness, self.lifted_damping
+        return self.stiffness, self.damping
 
 
 @dataclass(frozen=True)

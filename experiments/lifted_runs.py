@@ -67,7 +67,7 @@ def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
     SimError
         If the Phantom does not reach a curve.
     """
-    curves = [paced(haptic_map.curve(i), config.damping) for i in range(len(haptic_map.names))]
+    curves = [paced(haptic_map.curve(i), config.gains[1]) for i in range(len(haptic_map.names))]
     return RiverBundle(tuple(lifted_river(curve, config) for curve in curves), haptic_map.names)
 
 
@@ -80,7 +80,7 @@ def lifted_river(course: Trajectory, config: RunConfig) -> River:
         If a gain is out of its interval.
     """
     speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
-    return River(course, config.river_tube, river_time(config), config.damping, np.outer(speeds, _SPEEDS))
+    return River(course, config.river_tube, river_time(config), config.gains[1], np.outer(speeds, _SPEEDS))
 
 
 def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
@@ -91,8 +91,8 @@ def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
     SimError
         If the Phantom does not reach the curve.
     """
-    led = config.mode in ("follow", "rivers") and config.damping > 0.0
-    return paced(curve, config.damping) if led else curve
+    damping = config.gains[1]
+    return paced(curve, damping) if config.mode in ("follow", "rivers") and damping > 0.0 else curve
 
 
 def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
@@ -115,8 +115,8 @@ def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
     laps = [haptic_map.curve(i).duration for i in (first, second)]
     begin = laps[0]
     return (
-        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, config.damping),
-        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], config.damping),
+        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, config.gains[1]),
+        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], config.gains[1]),
     )
 
 

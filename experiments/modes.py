@@ -85,7 +85,7 @@ def default_rivers(config: RunConfig, curve: Trajectory) -> RiverBundle:
     ParameterError
         If a gain is out of its interval.
     """
-    return river_bundle(curve, config.reach, river_time(config), config.damping, config.river_tube)
+    return river_bundle(curve, config.reach, river_time(config), config.gains[1], config.river_tube)
 
 
 def river_time(config: RunConfig) -> float:
@@ -96,11 +96,10 @@ def river_time(config: RunConfig) -> float:
     ParameterError
         If a gain is not positive.
     """
-    if config.damping <= 0.0 or config.stiffness <= 0.0:
-        raise ParameterError(
-            f"a river's time is damping/stiffness: both must be positive, got {config.damping}, {config.stiffness}"
-        )
-    return config.damping / config.stiffness
+    stiffness, damping = config.gains
+    if damping <= 0.0 or stiffness <= 0.0:
+        raise ParameterError(f"a river's time is damping/stiffness: both must be positive, got {damping}, {stiffness}")
+    return damping / stiffness
 
 
 def _pace(curve: Trajectory, rivers: RiverBundle | None) -> float:

@@ -260,7 +260,7 @@ class Lifted(ClipMap):
         names = kept_names(arrays)
         return Lifted(
             kept_clips(arrays),
-            [bool(kept(arrays, f"closed/{name}", (1,))[0]) for name in names],
+            [_flag(f"closed/{name}", float(kept(arrays, f"closed/{name}", (1,))[0])) for name in names],
             [kept(arrays, f"angles/{name}", (None,)) for name in names],
             kept(arrays, "sites", (None, None, 2)),
             kept_limbs(arrays),
@@ -336,6 +336,12 @@ class Lifted(ClipMap):
             for phase, value in zip(phases, channels[:, i], strict=True):
                 interpolate_frames(packed, 0, phase, value, np.empty_like(value))
         return np.stack([end_lag(end_poses(channels, limb)[0], self._drifts) for limb in limbs], axis=1)
+
+
+def _flag(name: str, value: float) -> bool:
+    if value not in (0.0, 1.0):
+        raise ParameterError(f"{name} is {value}; expected 0 or 1")
+    return bool(value)
 
 
 def _placed_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Array) -> PlacedClip:

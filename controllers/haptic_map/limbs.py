@@ -70,7 +70,7 @@ class Limb:
         if numbers.shape != (LIMB,) or not np.isfinite(numbers).all():
             raise ParameterError(
                 f"a limb has {LIMB} finite numbers (joints 3, offsets 3 × 3, axis 3, centre 3, limits 3 × 3 × 2), got "
-                f"{numbers}"
+                f"{numbers.tolist()}"
             )
         if not (self.limits[..., 0] <= self.limits[..., 1]).all():
             raise ParameterError(f"the limits of a limb's joints must increase, got {self.limits.tolist()}")

@@ -23,7 +23,7 @@ def two_clips(transitions=((0.0, 1.0, 4.0, 0.1, 0.1),)):
 
 
 def test_gains_that_are_not_given_are_soft_where_rivers_are_side_by_side_and_as_usual_elsewhere():
-    assert (CONFIG.stiffness, CONFIG.damping) == (50.0, 20.0)
+    assert CONFIG.gains == (50.0, 20.0)
     for usual in (RunConfig(), RunConfig(mode="rivers"), RunConfig(map="map.npz")):
         assert (usual.stiffness, usual.damping) == (300.0, 8.0)
     given = RunConfig(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)
