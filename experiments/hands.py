@@ -15,6 +15,7 @@ from sim.users.intent import Grab, Push
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
+RIVER_PUSH = 0.9  # likewise in rivers of higher order, which let go of a hand that leaves their tube [N]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 
 _AWAY = 1e-3  # [m] by which beginnings differ
@@ -74,7 +75,8 @@ def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> A
     if config.user == "turn" and not turns:
         turns = tuple(turn for lap in laps for turn in lap_turns(lap * curve.duration, curve.duration, lap - 1))
     if config.user == "push" and not pushes:
-        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration))
+        force = RIVER_PUSH if config.mode == "rivers" else PUSH_FORCE
+        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration, force))
     if config.user == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
     if config.user == "trace":

@@ -75,16 +75,16 @@ class _MeanSquare:
     """Root mean square and largest of numbers that come in blocks."""
 
     def __init__(self) -> None:
-        self._sum, self._count, self.largest = 0.0, 0, 0.0
+        self._sum, self.count, self.largest = 0.0, 0, 0.0
 
     def add(self, values: Array) -> None:
         self._sum += float(np.sum(values**2))
-        self._count += values.size
+        self.count += values.size
         self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
 
     @property
     def root(self) -> float:
-        return math.sqrt(self._sum / self._count) if self._count else 0.0
+        return math.sqrt(self._sum / self.count) if self.count else 0.0
 
 
 class PathMeasure:
@@ -142,9 +142,8 @@ class PathMeasure:
         """What was taken so far."""
         laps = self._turned / self._span
         lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else None
-        return PathSummary(
-            1e3 * self._alone.root, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes)
-        )  # fmt: skip
+        alone = 1e3 * self._alone.root if self._alone.count else None
+        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes))
 
 
 def _joined(before: PushSummary, after: PushSummary) -> PushSummary:

@@ -37,7 +37,8 @@ class PathSummary:
     Attributes
     ----------
     deviation_rms_mm, deviation_max_mm : float
-        Distance from the curve after the first second, while and soon after pushes left out.
+        Distance from the curve after the first second, while and soon after pushes left out; the RMS is None if that
+        leaves nothing.
     laps : float
         Laps of a closed curve, or times its length.
     lap_seconds : float or None
@@ -45,7 +46,7 @@ class PathSummary:
     pushes : tuple of PushSummary
     """
 
-    deviation_rms_mm: float
+    deviation_rms_mm: float | None
     deviation_max_mm: float
     laps: float
     lap_seconds: float | None
@@ -161,8 +162,10 @@ class RunSummary:
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
         pushed, elsewhere = f"{self.animation.pushed_deg:.1f}° a joint", f"{self.animation.unpushed_deg:.2f}°"
         changed_by = f"{pushed} where it was pushed, {elsewhere} elsewhere" if pushes else f"{elsewhere} a joint"
+        alone = path.deviation_rms_mm
+        left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"
         on_curve = [
-            f"The stylus ran {path.laps:.2f} laps, {path.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
+            f"The stylus ran {path.laps:.2f} laps, {left}.",
             f"Pushes: {pushes}." if pushes else "The hand did not push.",
             f"The animation changed by up to {changed_by}.",
         ]

@@ -1,5 +1,6 @@
 """The measures of a run against the same measures taken at once, and against what is put into a recording by hand."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,13 @@ def summary_of(path: Path, root_error: np.ndarray | None = None) -> RunSummary:
         return summarise(
             recording, lambda points, phases, rivers: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {}
         )
+
+
+def test_a_hand_that_is_never_left_alone_is_not_told_to_have_been(tmp_path: Path) -> None:
+    summary = summary_of(tmp_path / "run.h5")
+    never = replace(summary, path=replace(summary.path, deviation_rms_mm=None))
+    assert "0.20 mm RMS from the curve when left alone" in summary.lines()[1]
+    assert "laps, never left alone." in never.lines()[1]
 
 
 def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
