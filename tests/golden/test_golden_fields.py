@@ -3,9 +3,8 @@
 ``python tests/golden/test_golden_fields.py`` writes the file anew, after a change of a law that is meant.
 """
 
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
+from experiments.config import RunConfig
 from experiments.modes import law
 
 GOLDEN = Path(__file__).with_name("fields.csv")
@@ -22,18 +22,11 @@ CURVE = Trajectory.circle(0.0477, 4.0)
 MODES = ("follow", "bunny", "rivers discrete", "rivers smooth", "rivers sum", "edited")
 
 
-@dataclass(frozen=True)
-class Flags:
-    mode: str
-    crossing: Literal["smooth", "discrete", "sum"] = "discrete"
-    stiffness: float = 300.0
-    damping: float = 4.0
-    tube: float = 0.25
-    bunny_width: float = 0.02
-    bunny_attraction: Literal["point", "along"] = "point"
-    bunny_pace: Literal["clock", "wait"] = "wait"
-    river_tube: float = 0.015
-    reach: float = 0.025
+# Written out, so that other defaults change no golden path.
+FLAGS = partial(
+    RunConfig, stiffness=300.0, damping=4.0, tube=0.25, bunny_width=0.02, bunny_attraction="point", bunny_pace="wait",
+    river_tube=0.015, reach=0.025,
+)  # fmt: skip
 
 
 @njit
@@ -56,7 +49,7 @@ def _field(mode):
         performed = performance(times, CURVE.point(times) * swell[:, None])
         return Edited(River(CURVE, 0.04), (performed,), (1.0,))
     name, _, crossing = mode.partition(" ")
-    return law(Flags(name, crossing or "discrete"), CURVE)
+    return law(FLAGS(mode=name, crossing=crossing or "discrete"), CURVE)
 
 
 def _trajectory(mode):
