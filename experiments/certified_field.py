@@ -140,7 +140,7 @@ def certificate_inputs(
         "crossing": (config.crossing, config.reach) if config.mode == "rivers" else None,
         "curve": certified_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
-        "judging": judging if clips else None,
+        "judging": judging,
         "figure": (config.scene.stature, config.scene.mass, config.floor_scale) if config.mode == "lead" else None,
         "period": sampling.period,
         "delay": sampling.delay,

@@ -50,18 +50,15 @@ def blend(
     angle, weights, changes, chain, memory, pose, jacobian
         As `combine` takes them.
     """
-    blend_corrected(
-        params, angle, weights, changes, np.empty((4, 0)), chain, memory, memory[:0], np.empty((0, 0, 3)), 0.0, pose,
-        jacobian,
-    )  # fmt: skip
+    blend_corrected(params, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian)
 
 
 @njit
 def blend_corrected(
     params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
-    footing: Array, soles: Array, ground: float, pose: Array, jacobian: Array,
+    pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
-    """`blend`, with a correction and with footing as `combine` takes them, and no floor."""
+    """`blend`, with a correction as `combine` takes it."""
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
     figure = params[_DRIFTS + 3 * clips :]
@@ -69,8 +66,8 @@ def blend_corrected(
     value, slope = np.empty((clips, channels)), np.empty((clips, channels))
     _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
     combine(
-        figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, footing, soles, ground,
-        -np.inf, pose, jacobian,
+        figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
+        np.empty((0, 0, 3)), 0.0, 0.0, pose, jacobian,
     )  # fmt: skip
 
 

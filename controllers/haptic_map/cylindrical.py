@@ -9,23 +9,19 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.blending import blend_corrected
 from controllers.haptic_map.clearance import cleared
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
-from controllers.haptic_map.combination import fresh_lap
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.footing import fresh_footing, packed_soles
 from controllers.haptic_map.inbetween import ROOT, correction, interpolation, packed_table, table_channels
-from controllers.haptic_map.lap import MEMORY
-from controllers.haptic_map.limb_ends import grounds, with_ends
+from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.state import Array
 
 CYLINDRICAL = 1
 _CLIPS = 4
-_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _LIMBS, _POINTS, _TABLE_SIZE, _GROUNDS = range(8)
+_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
 _NODES = 13  # of the corrections' table, across the blend each way
 _BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
 _EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
@@ -44,25 +40,17 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
         weights[0, i], changes[0, 1, i], changes[0, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
-    limbs, points, size = int(params[_LIMBS]), int(params[_POINTS]), int(params[_TABLE_SIZE])
-    ground, at = 0.0, _GROUNDS + _CLIPS
-    for i in range(_CLIPS):
-        ground += weights[0, i] * params[_GROUNDS + i]
-    soles = params[at : at + 3 * limbs * points].reshape(limbs, points, 3)
-    at += soles.size
+    size = int(params[_TABLE_SIZE])
     d = np.empty((4, 0))
     if size > 0:
-        table = params[at : at + size]
+        table = params[_TABLE : _TABLE + size]
         d = np.empty((4, table_channels(table)))
         i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
         j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
         correction(table, angle, i, j, d)
         d[2] *= i_slope
         d[3] *= j_slope
-    blend_corrected(
-        params[at + size :], angle, weights, changes, d, chain, memory[:MEMORY], memory[MEMORY:], soles, ground, pose,
-        jacobian,
-    )  # fmt: skip
+    blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
 def _mixtures(steps: int) -> tuple[Array, Array]:
@@ -81,14 +69,12 @@ class Cylindrical(AnimationMap):
     θ = atan2(y, x) is the phase: one lap of the hand is one lap of every clip. The weights w_i(r, z) blend the four
     clips bilinearly and ease in at the edges (C²); beyond them they stay, so no limb is ever extrapolated. How poses
     are blended is told in `blending`. With limbs, in-betweens are corrected by a table (`inbetween`): ends move while
-    they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`). Ends that stand while the mixture
-    changes stay where they stand (`footing`).
+    they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
 
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
     the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
-    continuous over the seam. If no clip travels or turns, A stays the identity, and without limbs h is a function of
-    the stylus position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is
-    not defined.
+    continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
+    position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.
 
     Parameters
     ----------
@@ -127,16 +113,13 @@ class Cylindrical(AnimationMap):
             )
         self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
-        soles = packed_soles(limbs)
-        fixed = (*numbers, len(limbs), soles.size / max(3 * len(limbs), 1), 0.0, *np.zeros(_CLIPS), *soles)
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, fixed, (), limbs)
-        self._numbers, self._fixed = numbers, len(fixed)
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
+        self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
         if limbs:
             rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
             channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
-            self._params[_GROUNDS : _GROUNDS + _CLIPS] = grounds(channels, limbs)
             found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
             share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
             shares = np.einsum("ai,bj->abij", share, share).reshape(_BETWEEN**2, _NODES**2)
@@ -145,14 +128,9 @@ class Cylindrical(AnimationMap):
 
     def _correct(self, values: Array) -> None:
         table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))
-        blend = self._params[self._fixed + int(self._params[_TABLE_SIZE]) :]
-        self._params = np.concatenate([self._params[: self._fixed], table, blend])
-        self._params[_TABLE_SIZE] = len(table)
+        blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
+        self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
         self._corrections = values
-
-    def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
-        return CompiledMap(CYLINDRICAL, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))]))
 
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
