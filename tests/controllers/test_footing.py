@@ -127,6 +127,7 @@ CLIPS = [(swinging(k, 120, travel=0.4 * k), 30.0) for k in (1, 2, 3)]
 MAP = Lifted(CLIPS, [True] * 3, [TURN * np.linspace(0.0, 1.0, 121)] * 3, ring(3), [LEG])
 
 
+@pytest.mark.slow
 def test_the_derivative_is_that_at_a_given_offset():
     rng, step = np.random.default_rng(3), 1e-6
     for r, angle, z in rng.uniform([0.035, 0.1, -0.015], [0.065, 6.1, 0.015], (40, 3)):
