@@ -13,7 +13,7 @@ from experiments.config import RunConfig
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.contacts import contacts
-from models.mocap.laps import lap_of
+from models.mocap.laps import CLOSES, lap_of
 from sim.users.arm import Arm
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +26,6 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
-_CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
 _BLINK = 0.05  # [s] a flight lasts longer
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
@@ -41,7 +40,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    clip, made = lap_of(clip).clip, clip.closes(_CLOSES)
+    clip, made = lap_of(clip).clip, clip.closes(CLOSES)
     marks = contacts(clip)
     phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
     frames = np.round(phases * steps).astype(int) % steps

@@ -79,36 +79,35 @@ def _mean_rotations(quaternions: Array, weights: Array) -> Array:
     return mean
 
 
-def _gap(moves: Array, free: Array, hold: Array, turn: Array) -> Array:
-    """How far the mean is ahead of the foot, forwards and backwards on average, at each sample.
+def gap(slips: Array, hold: Array, turn: Array) -> Array:
+    """How far what slips is ahead of what stands, c' = slip − κ g c, forwards and backwards round the lap on average.
 
     Parameters
     ----------
-    moves : Array, shape (n, k, J, 3)
-        Of the mean over the ground (x, y, heading) from each sample to the next.
-    free, hold : Array, shape (n, k, J)
-        g, and exp(−κ g Δs).
-    turn : Array, shape (k,)
+    slips : Array, shape (n, ..., 3)
+        Over the ground (x, y, heading) from each sample to the next.
+    hold : Array, shape (n, ...)
+        exp(−κ g Δs).
+    turn : Array, shape (...)
         Angle by which the lap turns [rad].
+
+    Returns
+    -------
+    Array, shape (n, ..., 3)
     """
-    n = len(moves)
-    ahead, behind = np.empty_like(moves), np.empty_like(moves)
-    gap, back = np.zeros_like(moves[0]), np.zeros_like(moves[0])
-    blocked, held, angle = (
-        (1.0 - free)[..., None] * moves,
-        hold[..., None],
-        np.broadcast_to(turn[:, None], gap.shape[:2]),
-    )
+    n, held = len(slips), hold[..., None]
+    ahead, behind = np.empty_like(slips), np.empty_like(slips)
+    front, back, angle = np.zeros_like(slips[0]), np.zeros_like(slips[0]), np.broadcast_to(turn, slips.shape[1:-1])
     for _ in range(_LAPS):
         for k in range(n):
-            ahead[k] = gap
-            gap = held[k] * gap + blocked[k]
+            ahead[k] = front
+            front = held[k] * front + slips[k]
         for k in range(n - 1, -1, -1):
             if k == n - 1:
                 back[..., :2] = turned(angle, back[..., :2])
-            back = held[k] * back - blocked[k]
+            back = held[k] * back - slips[k]
             behind[k] = back
-        gap[..., :2] = turned(-angle, gap[..., :2])
+        front[..., :2] = turned(-angle, front[..., :2])
     return 0.5 * (ahead + behind)
 
 
@@ -188,11 +187,12 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     held = smooth_step(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)
     rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
-    gap = _gap(feet.moves, free, np.exp(-rate * free / n), (weights @ drifts)[:, 2])
+    slips = (1.0 - free)[..., None] * feet.moves
+    ahead = gap(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])
     result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))
     for j in range(len(limbs)):
         at = ROOT + FOOT * j
-        result[..., at : at + 2] = turned(-feet.angles[:-1, :, j], -gap[:, :, j, :2])
+        result[..., at : at + 2] = turned(-feet.angles[:-1, :, j], -ahead[:, :, j, :2])
         result[..., at + 2] = (up - feet.height)[..., j]
-        result[..., at + 3] = -gap[:, :, j, 2]
+        result[..., at + 3] = -ahead[:, :, j, 2]
     return result

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controllers.haptic_map.footfalls import smooth_step
+from controllers.haptic_map.footfalls import gap, smooth_step
 from controllers.haptic_map.grounded import Mask, runs
 from controllers.haptic_map.limb_ends import contact_moves, end_channels, lowest_point
 from controllers.haptic_map.limbs import END, Limb
@@ -32,7 +32,6 @@ _LIFTS = 0.06  # of a swing, in which a foot comes to be clear of the floor
 _SMOOTH = 0.0025  # [m]
 _CLEAR = 0.01  # h_0, how high a foot swings at least [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap
-_LAPS = 4  # until the path repeats
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 
 
@@ -82,9 +81,9 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
         over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
         moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, _SOFTNESS)[:, 0]
-        gap = kept * _gap(stays[:, None] * moves, free, drift[2])
-        ends[:, :2] -= turned(-angle[:-1], gap[:, :2])
-        quaternions = yawed(-gap[:, 2], quaternions)
+        ahead = kept * gap(stays[:, None] * moves, np.exp(-_CATCH_UP * free / free.sum()), drift[2])
+        ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
+        quaternions = yawed(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
     low = (1.0 - window(stands, _RESTS)) * _above(0.0, heights - level)
     ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
@@ -106,27 +105,6 @@ def levels(heights: Array, stands: Mask) -> Array:
 def _above(least: float, heights: Array) -> Array:
     """The larger of heights and the least [m], smooth within some millimetres."""
     return 0.5 * (heights + least + np.hypot(heights - least, _SMOOTH))
-
-
-def _gap(slips: Array, free: Array, turn: float) -> Array:
-    """How far the clip's foot is ahead of the one that stands, c, forwards and backwards on average, shape (n, 3).
-
-    `slips` (n, 3) are those of the clip's foot over the ground, from each sample to the next, in a lap that turns.
-    """
-    n, hold = len(slips), np.exp(-_CATCH_UP * free / free.sum())
-    ahead, behind, gap, back = np.empty((n, 3)), np.empty((n, 3)), np.zeros(3), np.zeros(3)
-    angle = np.array(turn)
-    for _ in range(_LAPS):
-        for k in range(n):
-            ahead[k] = gap
-            gap = hold[k] * gap + slips[k]
-        for k in range(n - 1, -1, -1):
-            if k == n - 1:
-                back[:2] = turned(angle, back[:2])
-            back = hold[k] * back - slips[k]
-            behind[k] = back
-        gap[:2] = turned(-angle, gap[:2])
-    return 0.5 * (ahead + behind)
 
 
 def with_planted_ends(

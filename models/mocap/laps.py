@@ -23,7 +23,7 @@ from models.mocap.contacts import contacts
 Array = npt.NDArray[np.float64]
 
 _TIME, _LENGTH = 0.1, 0.5  # τ [s], r [m]
-_CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
+CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
 _SHORTEST = 0.4  # [s] of a lap
 _TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest turn of a lap
 _MOST_FRAMES = 1200  # that are compared with each other
@@ -51,7 +51,7 @@ class Lap(NamedTuple):
 def lap_of(clip: Clip) -> Lap:
     """The part of a clip that repeats itself best; the clip itself if it closes, or if no part of it is a lap."""
     whole = Lap(clip, 0.0, clip.duration, 0.0)
-    if clip.closes(_CLOSES) or clip.n_frames < 3:
+    if clip.closes(CLOSES) or clip.n_frames < 3:
         return whole
     every = -(-clip.n_frames // _MOST_FRAMES)
     frames = np.arange(0, clip.n_frames, every)
