@@ -34,11 +34,16 @@ def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Stretc
     then = until = None
     if config.mode == "stretch-then-follow":
         then = Follow(curve, config.stiffness, config.damping, config.tube)
-        until = max((grab.end for grab in grabs), default=0.0) + PAUSE
+        until = edited_until(grabs)
     return StretchyTubes(
         curve, config.seek, config.rubber, DAMPING, epsilon=config.rubber_tube, width=config.bump,
         until=np.inf if until is None else until, then=then,
     )  # fmt: skip
+
+
+def edited_until(grabs: tuple[Grab, ...]) -> float:
+    """When a hand has done all its grabs, and a pause after them [s]."""
+    return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:

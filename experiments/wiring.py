@@ -29,7 +29,7 @@ from experiments.config import MAP_SUFFIX, STRETCHING, RunConfig
 from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
-from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
+from experiments.hands import UPRIGHT, beginning, hand_remarks, stylus_path, user_arm
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
 from experiments.led_balance import LED_GAINS, balanced_on_ground
@@ -118,7 +118,10 @@ def wire(
         blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+    if config.mode in STRETCHING and not config.grabs:
+        config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube))
     parts = _assemble(config, (curve, course), blended, rivers, led, world)
+    remarks += hand_remarks(config, curve)
     ready(compiled_parts("figure", parts.compiled, parts.program.ops))
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
@@ -201,8 +204,7 @@ def _assemble(
     """
     curve, course = curves
     haptic_map = blended if isinstance(blended, Led) or not config.expressive else expressive_figure(blended)
-    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
-    urged = 0.0
+    grabs, urged = config.grabs, 0.0
     if led is not None:
         field = led
     elif config.mode in STRETCHING:
