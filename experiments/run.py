@@ -183,7 +183,7 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
 
 def _live_page(session: Session) -> Page:
     static = session.static()
-    return LivePage(session.world.model, np.asarray(static["curve"]), session.config.reach, P_WH)
+    return LivePage(session.world.model, np.asarray(static["curve"]), float(np.asarray(static["tube_radius"])), P_WH)
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:

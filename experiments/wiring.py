@@ -87,7 +87,9 @@ def wire(
     least = 2 * config.figure_ticks * config.scene.servo_period
     if not least <= config.seconds < np.inf:
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
-    for name in ("lap", "radius", "reach", "bump"):
+    if config.seed < 0:
+        raise ParameterError(f"seed is {config.seed}; expected 0 or more")
+    for name in ("lap", "radius", "reach", "bump", "river_tube", "rubber_tube", "bunny_width"):
         value = getattr(config, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} is {value}; expected a positive, finite number")
