@@ -279,7 +279,8 @@ def write_report_of(folder: Path) -> None:
         if config.mode == "lead":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        title = f"{config.mode.upper()} over {', '.join(Path(clip).stem for clip in config.clips)}"
+        # A map from a file has clips of its own.
+        title = f"{config.mode.upper()} over {', '.join(clip.name for clip in clips_of(recording))}"
         write_report(folder / REPORT, recording, world_model(config.scene), title, _lines(recording), figures)
 
 
