@@ -32,7 +32,7 @@ from experiments.governor import governed_law
 from experiments.hands import UPRIGHT, beginning, hand_remarks, stylus_path, user_arm
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
-from experiments.led_balance import LED_GAINS, balanced_on_ground
+from experiments.led_balance import balanced_on_ground, led_gains
 from experiments.lifted_runs import default_pushes, lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
@@ -159,7 +159,8 @@ def wire(
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
         sense_in_motion(port)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, LED_GAINS if leading else FigureGains())
+    gains = FigureGains() if led is None else led_gains(led.gait)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
     servo = Servo(
         plant=make_plant(world),
         port=port,
