@@ -45,5 +45,9 @@ def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
         # Where the root is on average is the clip's affair: the way back to it, at take-off, would throw the figure.
         sway += sway_of(outside[0] - outside[0].mean(axis=0), laps.height, seconds)
-        result = led.with_sway(sway)
+        swaying = led.with_sway(sway)
+        if not swaying.grounds:
+            # Who would have to stoop too far for it sways less.
+            break
+        result = swaying
     return result
