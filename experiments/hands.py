@@ -9,15 +9,22 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from experiments.config import RunConfig
 from experiments.expression import lap_turns
+from experiments.modes import WAVE
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
 
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
-RIVER_PUSH = 0.9  # likewise in rivers of higher order, which let go of a hand that leaves their tube [N]
+RIVER_PUSH = 1.1  # over into another river: in the middle of what takes a hand there and does not throw it out [N]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 
+_CROSSING, _LEAD, _OVER = (
+    0.5,
+    0.05,
+    0.4,
+)  # share of the lap where the wave rises through it; push before that [s], for [s]
+_PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
 _AWAY = 1e-3  # [m] by which beginnings differ
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
 
@@ -75,8 +82,9 @@ def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> A
     if config.user == "turn" and not turns:
         turns = tuple(turn for lap in laps for turn in lap_turns(lap * curve.duration, curve.duration, lap - 1))
     if config.user == "push" and not pushes:
-        force = RIVER_PUSH if config.mode == "rivers" else PUSH_FORCE
-        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration, force))
+        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration))
+        if config.mode == "rivers":
+            pushes = river_pushes(curve, config.reach, config.seconds)
     if config.user == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
     if config.user == "trace":
@@ -91,3 +99,25 @@ def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Pus
         Push(start + 0.1 * lap, 0.3 * lap, force),
         Push(start + 0.6 * lap, 0.3 * lap, -force),
     )
+
+
+def river_pushes(curve: Trajectory, reach: float, seconds: float) -> tuple[Push, ...]:
+    """Pushes from one default river into another: up where the wave rises through the curve, down from its crest.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        The default curve.
+    reach : float
+        Half width of the map's domain [m].
+    seconds : float
+        Of the run [s].
+    """
+    lap = curve.duration
+    pushes: list[Push] = []
+    for k, start in enumerate(lap * np.arange(0.25, max(1.0, seconds / lap))):
+        at = _CREST if k % 2 else _CROSSING
+        x, y, _ = (float(value) for value in curve.point(curve.start + at * lap - _LEAD))
+        z = WAVE * reach * (k % 2)
+        pushes.append(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, (-1.0) ** k), (x, y, z), _PLACE))
+    return tuple(pushes)
