@@ -169,8 +169,8 @@ def changed_over(config: RunConfig, newtons: float) -> tuple[int, int, int]:
         x, y, z = (float(value) for value in curve.point(at))
         push = Push(0.2, lasts, newtons, (0.0, 0.0, up), (x, y, z), 0.003)
         river = passage(program, curve.point(at - 0.5), 1.6, (push,)).river
-        lost = river[-1] < 0.0 or np.sum(river < 0.0) > 100
-        changed, out = changed + (not lost and river[-1] > 0.0), out + lost
+        lost = bool(river[-1] < 0.0 or np.sum(river < 0.0) > 100)
+        changed, out = changed + int(not lost and bool(river[-1] > 0.0)), out + int(lost)
     return changed, out, len(pushes)
 
 

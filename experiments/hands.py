@@ -19,12 +19,10 @@ PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answ
 RIVER_PUSH = 1.1  # over into another river: in the middle of what takes a hand there and does not throw it out [N]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 
-_CROSSING, _LEAD, _OVER = (
-    0.5,
-    0.05,
-    0.4,
-)  # share of the lap where the wave rises through it; push before that [s], for [s]
+_CROSSING = 0.5  # of the lap, where the wave rises through the level river
+_LEAD, _OVER = 0.05, 0.4  # [s] before it, when a push across begins, and [s] that it lasts
 _PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
+_CREST = 0.625  # of the lap, where the wave meets the high river
 _AWAY = 1e-3  # [m] by which beginnings differ
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
 

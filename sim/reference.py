@@ -147,7 +147,7 @@ def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, f
         limb_end(transition.limbs[foot], transition.ahead[row], new)
         turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
         place_clip(reference.memory, new, old[0], old[1], turn)
-        moved = np.hypot(new[0] - old[0], new[1] - old[1])
+        moved = math.hypot(new[0] - old[0], new[1] - old[1])
     return foot, moved
 
 

@@ -17,6 +17,7 @@ _ROOT = 6  # components of a tangent that are the root's
 _PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that stand on one foot bear little more
 _THROW = 20.0  # [m/s²] of the root that a change goes on with at most: a hand that is thrown off races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
+_LONGER = 1.75  # times the least blend time that a way aside makes a change last at most
 _SWING = 0.3  # [rad] by which a joint swings on at most
 
 
@@ -95,8 +96,10 @@ def set_duration(transition: Transition, aside: float) -> None:
     """Let a change last long enough for the root's way: up or down, as `note_change` found it, and aside [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
-        way = np.hypot(transition.change[0, 2], aside)
-        transition.lasts[0] = max(transition.seconds, np.sqrt(_BEND * way / _PULL))
+        up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
+        # No longer: what flies would fly on.
+        over = min(np.sqrt(_BEND * aside / _PULL), _LONGER * transition.seconds)
+        transition.lasts[0] = max(transition.seconds, up, over)
 
 
 @njit
