@@ -1,13 +1,14 @@
 """The figures of a run, drawn from its recording and nothing else.
 
 What is read: arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
+texts ``tube_name`` and ``hand_does``, "tube" and "pushes" without them; when a bent curve is performed, in the summary;
 in group ``ticks`` the channels t, p, distance, force, user and torque; in group ``frames`` the channels t, joint_error,
 root_error, residual, ground and flight. SI units and radians there; millimetres, centimetres and degrees in figures.
 """
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -82,16 +83,18 @@ def path_figure(recording: Recording) -> Figure:
         ax.add_collection(
             PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=PALE_TUBE, zorder=1), autolim=False
         )
+        ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube(recording))
         ax.plot(curve[:, i], curve[:, j], color=CURVE, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
-        for other in rivers:
-            ax.plot(other[:, i], other[:, j], color=CURVE, lw=0.6, ls=":", zorder=4)
+        for k, other in enumerate(rivers):
+            ax.plot(other[:, i], other[:, j], color=CURVE, lw=0.6, ls=":", zorder=4, label=None if k else "rivers")
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
-        ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label="hand, pushing", zorder=3)
+        if np.any(pushed):
+            ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label=f"where the hand {_does(recording)}", zorder=3)
         ax.margins(0.3)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -102,9 +105,9 @@ def deviation_figure(recording: Recording) -> Figure:
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
-        _shade(ax, t, pushed, PALE_USER, "hand pushes")
+        _shade(ax, t, pushed, PALE_USER, f"hand {_does(recording)}")
         if radius < 1.05 * np.max(distance):
-            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label="edge of the tube")
+            ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube(recording)}")
         ax.plot(t, distance, color=CURVE)
         ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
         _mark_changes(ax, recording)
@@ -192,13 +195,25 @@ def _legend(ax: Axes) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
 
 
+def _does(recording: Recording) -> str:
+    return recording.texts.get("hand_does", "pushes")
+
+
+def _tube(recording: Recording) -> str:
+    return recording.texts.get("tube_name", "tube")
+
+
 def _mark_changes(ax: Axes, recording: Recording) -> None:
-    """A line at every change of river, with the name of the new one."""
-    for change in river_changes(recording):
-        ax.axvline(change.t, color=USER, lw=0.8)
+    """A line at every change of river, with the name of the new one, and where a bent curve begins to be performed."""
+    marks = [(change.t, change.after) for change in river_changes(recording)]
+    performance = (recording.summary or {}).get("performance")
+    if isinstance(performance, dict):
+        marks.append((float(cast(dict[str, float], performance)["start"]), "performed"))
+    for t, name in marks:
+        ax.axvline(t, color=USER, lw=0.8)
         ax.annotate(
-            change.after, (change.t, 1.0), (2, -2), xycoords=("data", "axes fraction"), textcoords="offset points",
-            va="top", fontsize=7, color=USER,
+            name, (t, 1.0), (2, -2), xycoords=("data", "axes fraction"), textcoords="offset points", va="top",
+            fontsize=7, color=USER,
         )  # fmt: skip
 
 

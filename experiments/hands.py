@@ -7,9 +7,10 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.config import RunConfig
+from experiments.config import STRETCHING, RunConfig
 from experiments.expression import lap_turns
 from experiments.modes import WAVE
+from experiments.stretch import edited_until
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
 
@@ -75,20 +76,49 @@ def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> A
     ParameterError
         If a hand that traces should grab.
     """
-    pushes, turns = config.pushes, config.turns
-    laps = range(1, max(2, int(config.seconds / curve.duration)))
+    pushes, turns, lap = config.pushes, config.turns, curve.duration
+    laps = range(1, max(2, int(config.seconds / lap)))
     if config.user == "turn" and not turns:
-        turns = tuple(turn for lap in laps for turn in lap_turns(lap * curve.duration, curve.duration, lap - 1))
+        turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
     if config.user == "push" and not pushes:
-        pushes = tuple(push for lap in laps for push in lap_pushes(lap * curve.duration, curve.duration))
+        begin = first_pushed_lap(curve, grabs)
+        laps = range(max(1, int((config.seconds - begin) / lap)))
+        pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
         if config.mode == "rivers":
             pushes = river_pushes(curve, config.reach, config.seconds)
     if config.user == "trace" and grabs:
-        raise ParameterError("a hand that traces cannot grab; choose --user relaxed or push")
+        raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
     if config.user == "trace":
         times = np.arange(0.0, config.seconds, 0.01)
         return Arm(path=curve.point(times), period=0.01, pushes=pushes, turns=turns)
     return Arm(pushes=pushes, grabs=grabs, turns=turns)
+
+
+def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
+    """When the default hand that pushes begins to [s]: with the second lap, the first one after all grabs left out."""
+    return curve.duration + (edited_until(grabs) if grabs else 0.0)
+
+
+def handled(config: RunConfig) -> tuple[tuple[float, float], ...]:
+    """From and until when [s] the hand does something else than push: it grabs, traces or leads."""
+    if config.user == "trace" or config.mode == "lead":
+        return ((0.0, np.inf),)
+    return tuple((grab.start, grab.end) for grab in config.grabs)
+
+
+def hand_remarks(config: RunConfig, curve: Trajectory) -> tuple[str, ...]:
+    """What is said of a hand whose doings come too late, or are of no effect."""
+    remarks: list[str] = []
+    performed, pushed = edited_until(config.grabs), first_pushed_lap(curve, config.grabs)
+    if config.mode == "stretch-then-follow" and config.seconds <= performed:
+        remarks.append(f"the curve is bent until {performed:.1f} s and performed then; give --seconds more than that")
+    elif config.mode in STRETCHING and config.user == "push" and not config.pushes and config.seconds <= pushed:
+        remarks.append(
+            f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that"
+        )
+    if config.user == "turn" and not config.expressive:
+        remarks.append("the hand turns the stylus, and this map does not look at that; --expressive does")
+    return tuple(remarks)
 
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:

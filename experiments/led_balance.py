@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from controllers.fields.gait import Gait
 from controllers.haptic_map.led import Led
 from experiments.balance import measured_laps, nearest_supported, sway_of
 from sim.figure import FigureGains
@@ -11,14 +12,21 @@ from sim.reference import poses_along
 
 Array = npt.NDArray[np.float64]
 
-# Feet that are led do not hover while they stand: what is lifted so high bears nothing. With more, a foot that is
-# lifted slowly, going back, stays on the floor and turns the figure by 4 degrees.
-LED_GAINS = FigureGains(reference_reach=0.015)
+# A foot that bears what it is not held to turns about itself: the plan gives it load, and lifts it. So on a led figure,
+# which may stop anywhere, a point bears nothing from half the height on at which it is let go.
+_WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005)
+# Who flies changes feet within a hundredth of a second, and then would stand on none.
+_FLYING = _WALKING._replace(reference_reach=0.012)
 
 _ROWS = 192  # of a lap
 _ROUNDS = 6
 _PACE = 0.8  # of the clip's own
 _SHARE = 0.6  # of the support, about its middle, in which the zero-moment point is asked to lie
+
+
+def led_gains(gait: Gait) -> FigureGains:
+    """Of the physical figure that is led with a gait."""
+    return _FLYING if gait.flies else _WALKING
 
 
 def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
@@ -37,5 +45,9 @@ def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
         # Where the root is on average is the clip's affair: the way back to it, at take-off, would throw the figure.
         sway += sway_of(outside[0] - outside[0].mean(axis=0), laps.height, seconds)
-        result = led.with_sway(sway)
+        swaying = led.with_sway(sway)
+        if not swaying.grounds:
+            # Who would have to stoop too far for it sways less.
+            break
+        result = swaying
     return result

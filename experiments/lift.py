@@ -60,11 +60,13 @@ class LiftReport(NamedTuple):
         """In words."""
         lifting, names = self.lifted.lifting, self.lifted.names
         after, before = lifting.after, lifting.before
-        lines = [
-            f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_apart(after)} (before the arrangement "
-            f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
-            f"(before {100 * before.stress:.0f} %)."
-        ]
+        lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
+        if len(names) > 1:
+            lines = [
+                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_apart(after)} (before the arrangement "
+                f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
+                f"(before {100 * before.stress:.0f} %)."
+            ]
         for name, clip, curve, closed in zip(
             names, self.lifted.clips, after.curves, self.lifted.haptic_map.closed, strict=True
         ):
@@ -89,12 +91,17 @@ class LiftReport(NamedTuple):
         ]
         lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
         quality = self.quality
+        if len(names) > 1:
+            on, between = quality.conditioning, quality.conditioning_between
+            # Within the core of a curve nothing but its clip plays.
+            along = f"{on[0]:.1f} in the median, 9 of 10 below {on[1]:.0f}" if np.isfinite(on[1]) else "singular"
+            lines += [
+                f"Condition number of h_* along the curves: {along}; half way between: {between[0]:.1f} in the median, "
+                f"9 of 10 below {between[1]:.0f}.",
+                f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
+                f"{100 * quality.roughness[1]:.0f} %.",
+            ]
         lines += [
-            f"Condition number of h_* along the curves: {quality.conditioning[0]:.1f} in the median, 9 of 10 below "
-            f"{quality.conditioning[1]:.0f}; half way between {quality.conditioning_between[0]:.1f} and "
-            f"{quality.conditioning_between[1]:.0f}.",
-            f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
-            f"{100 * quality.roughness[1]:.0f} %.",
             *(f"  in-between {pair}: {_wrong(measure)}" for pair, measure in quality.between.items()),
             f"  the clips themselves: {_wrong(quality.clips)}",
         ]

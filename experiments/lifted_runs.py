@@ -109,7 +109,7 @@ def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
         pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]
         raise ParameterError(
             f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
-            f"{', '.join(pairs) or 'none'}; leave out --user push, or give --pushes"
+            f"{', '.join(pairs) or 'none'}; leave out --user push, or begin on another --curve"
         )
     second = int(rows[0][1] if int(rows[0][0]) == first else rows[0][0])
     laps = [haptic_map.curve(i).duration for i in (first, second)]

@@ -1,32 +1,36 @@
 """A recording measured block by block, in memory that does not grow with the run."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from experiments.changes import river_changes
-from experiments.summary import (
+from experiments.summary import RunSummary
+from experiments.summary_parts import (
     AnimationSummary,
     FigureSummary,
     PathSummary,
     PushSummary,
-    RunSummary,
     SpeedSummary,
     TankSummary,
+    TraceSummary,
 )
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.clip import pose_difference
 from sim.recording import Recording
 
 Array = npt.NDArray[np.float64]
+Span = tuple[float, float]
+"""From and until when [s]."""
 
 SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
 HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
 FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
 TOUCH = 1.0  # [N] from which the ground bears the figure
 BLOCK_FRAMES = 2000  # of the figure, read at a time
+BLOCK_ROWS = 16_000  # of the ticks, likewise
 _TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
 
@@ -36,6 +40,7 @@ def summarise(
     default_poses: Callable[[Array, Array, Array], Array],
     speed: SpeedSummary,
     warnings: dict[str, int],
+    handled: Sequence[Span] = (),
 ) -> RunSummary:
     """Measure a run, in memory that does not grow with it.
 
@@ -49,26 +54,49 @@ def summarise(
         in order of time.
     speed, warnings
         Taken over.
+    handled : sequence of Span
+        When the hand does something else than push: it grabs, traces, leads.
     """
-    path, animation, figure = PathMeasure(recording), AnimationMeasure(), FigureMeasure(recording)
+    path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
+    return RunSummary(path, animation, figure, tank, speed, warnings, changes=river_changes(recording))
+
+
+def measured(
+    recording: Recording, default_poses: Callable[[Array, Array, Array], Array], span: Span,
+    handled: Sequence[Span] = (),
+) -> tuple[PathSummary, AnimationSummary, FigureSummary, TankSummary]:  # fmt: skip
+    """Measure the part of a run between two times; the other arguments are those of `summarise`."""
+    path, animation, figure = (
+        PathMeasure(recording, span[0], handled),
+        AnimationMeasure(span[0]),
+        FigureMeasure(recording),
+    )
     tank = TankSummary(math.inf, 0)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
-    rows = BLOCK_FRAMES * per_frame
-    for first in range(0, len(recording.channel("ticks", "t")), rows):
-        ticks = {name: channel[first : first + rows] for name, channel in recording.groups["ticks"].items()
-                 if name in _TICKS}  # fmt: skip
-        start = first // per_frame
-        frames = {name: channel[start : start + BLOCK_FRAMES] for name, channel in recording.groups["frames"].items()
-                  if name in _FRAMES}  # fmt: skip
+    rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
+    begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)
+    for start in range(begin, end, BLOCK_FRAMES):
+        stop = min(start + BLOCK_FRAMES, end)
+        rows = slice(start * per_frame, stop * per_frame)
+        ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
+        frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
         pushed = path.add(ticks)
         default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
         animation.add(frames, default, pushed[::per_frame])
         figure.add(frames)
         least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
         tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
-    return RunSummary(
-        path.summary(), animation.summary(), figure.summary(), tank, speed, warnings, changes=river_changes(recording)
-    )
+    return path.summary(), animation.summary(), figure.summary(), tank
+
+
+def trace_summary(recording: Recording) -> TraceSummary:
+    """Measure a hand that traces."""
+    ticks, distance, force = recording.groups["ticks"], _MeanSquare(), 0.0
+    for first in range(0, len(ticks["t"]), BLOCK_ROWS):
+        rows = slice(first, first + BLOCK_ROWS)
+        distance.add(ticks["distance"][rows][ticks["t"][rows] >= SETTLING])
+        force = max(force, float(np.linalg.norm(ticks["user"][rows], axis=1).max()))
+    return TraceSummary(1e3 * distance.root, force)
 
 
 class _MeanSquare:
@@ -88,9 +116,10 @@ class _MeanSquare:
 
 
 class PathMeasure:
-    """`PathSummary` of ticks that come in blocks."""
+    """`PathSummary` of ticks that come in blocks, the first at `since` [s]; `handled` as for `summarise`."""
 
-    def __init__(self, recording: Recording):
+    def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
+        self._since, self._handled = since, tuple(handled)
         start, end = recording.array("curve_span")
         self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
         self._alone = _MeanSquare()
@@ -107,9 +136,10 @@ class PathMeasure:
         last = np.maximum.accumulate(np.where(at_work, t, self._released))
         pushed = t - last <= SETTLING
         self._released = float(last[-1])
-        self._alone.add(ticks["distance"][(t >= SETTLING) & ~pushed])
+        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
         self._add_phase(t, ticks["phase"])
-        self._add_pushes(ticks, size, at_work)
+        handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
+        self._add_pushes(ticks, size, at_work & ~handled)
         return pushed
 
     def _add_phase(self, t: Array, phase: Array) -> None:
@@ -156,16 +186,17 @@ def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
 
 
 class AnimationMeasure:
-    """`AnimationSummary` of frames that come in blocks."""
+    """`AnimationSummary` of frames that come in blocks, the first at `since` [s]."""
 
-    def __init__(self) -> None:
+    def __init__(self, since: float = 0.0) -> None:
+        self._since = since
         self._pushed, self._unpushed = 0.0, 0.0
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
         """Take a block of frames, their poses at the curve, and at which the hand pushes."""
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
-        settled = frames["t"] >= SETTLING
+        settled = frames["t"] >= self._since + SETTLING
         self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
         self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 
 from sim.recording import Recording
-from sim.viewer.palette import FIELD, USER
+from sim.viewer.palette import FIELD, PUSH, USER
 from sim.viewer.replay_html import FIGURE_TARGET, MAGNIFICATION, SECONDS, Target, drawn_tube, replay_html
 
 _PAGE = """<!DOCTYPE html>
@@ -36,7 +36,8 @@ img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
 <iframe title="Replay in 3D" srcdoc="{replay}"></iframe>
 <p>Drag to turn, wheel to zoom, right button to move; space plays and pauses, the bar scrubs.
 <b style="color:{field}">Green</b> arrow: force of the field. <b style="color:{user}">Orange</b> arrow: force of the
-hand; where it pushes, the path is orange too. Light blue: the tube around the curve{tube}. {replayed}
+hand; where that is above {push:g} N, the path is orange too. Light blue: the {name} around the curve{tube}. {curves}
+{replayed}
 The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
 their true size.</p>
 <h2>Figures</h2>
@@ -91,7 +92,10 @@ def write_report(
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
             replay=html.escape(replay_html(recording, model, target)),
             replayed=replayed,
+            name=recording.texts.get("tube_name", "tube"),
             tube=tube,
+            curves=_curves(recording),
+            push=PUSH,
             field=FIELD,
             user=USER,
             magnification=MAGNIFICATION,
@@ -101,3 +105,11 @@ def write_report(
         ),
         encoding="utf-8",
     )
+
+
+def _curves(recording: Recording) -> str:
+    """What is said where the curve that is drawn is not all there is to it."""
+    if "river_names" in recording.texts:
+        return "Of the rivers the one is drawn on which the run begins."
+    bent = str(recording.config.get("mode", "")).startswith("stretch")
+    return "The curve is drawn as it was before it was bent." if bent else ""

@@ -126,6 +126,8 @@ def wire_arm(
         raise ParameterError(f"arm_ticks is {config.arm_ticks}; expected 1 or more servo ticks between two updates")
     if not 1.5 <= config.seconds < np.inf:
         raise ParameterError(f"a run of {config.seconds} s; expected 1.5 s or more, and finite")
+    if config.seed < 0:
+        raise ParameterError(f"seed is {config.seed}; expected 0 or more")
     for name in ("lap", "radius"):
         if not (np.isfinite(getattr(config, name)) and getattr(config, name) > 0.0):
             raise ParameterError(f"{name} is {getattr(config, name)}; expected a positive, finite number")

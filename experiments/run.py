@@ -20,13 +20,15 @@ from experiments.clips import load_clips
 from experiments.compiling import compile_once
 from experiments.config import STRETCHING, RunConfig
 from experiments.figure_maps import packed_legs
-from experiments.hands import stylus_path
+from experiments.hands import handled, stylus_path
 from experiments.lead import walker_argument
 from experiments.lead_measures import lead_summary
-from experiments.measures import BLOCK_FRAMES, summarise
+from experiments.measures import BLOCK_FRAMES, summarise, trace_summary
 from experiments.session import Session
 from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
-from experiments.summary import RunSummary, SpeedSummary
+from experiments.stretch_measures import editing_summary, performance_summary
+from experiments.summary import RunSummary
+from experiments.summary_parts import SpeedSummary
 from experiments.wiring import wire
 from models.mocap.clip import Clip
 from models.mocap.own_bvh import write_bvh_blocks
@@ -181,20 +183,27 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
 
 def _live_page(session: Session) -> Page:
     static = session.static()
-    return LivePage(session.world.model, np.asarray(static["curve"]), session.config.reach, P_WH)
+    return LivePage(session.world.model, np.asarray(static["curve"]), float(np.asarray(static["tube_radius"])), P_WH)
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     with Recording(out / RECORDING) as recording:
-        summary = summarise(recording, default_poses(session), speed, session.world.warnings())
-        memory, field = session.servo.field.memory, session.field
+        busy, memory, field = handled(session.config), session.servo.field.memory, session.field
+        summary = summarise(recording, default_poses(session), speed, session.world.warnings(), busy)
         if isinstance(field, Leading):
             scene, fell_at = session.config.scene, summary.figure.fell_at
             return replace(summary, lead=lead_summary(recording, field, memory, scene, fell_at))
-    if not isinstance(session.field, StretchyTubes):
-        return summary
-    save_curve(session.field.edited(memory), out / CURVE_FILE)
-    return replace(summary, stretch=stretch_summary(session.field, memory))
+        if session.config.user == "trace":
+            summary = replace(summary, trace=trace_summary(recording))
+        if isinstance(field, StretchyTubes):
+            save_curve(field.edited(memory), out / CURVE_FILE)
+            return replace(
+                summary,
+                stretch=stretch_summary(field, memory),
+                editing=editing_summary(recording, field, default_poses(session), busy),
+                performance=performance_summary(recording, field, default_poses(session), busy),
+            )
+    return summary
 
 
 def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
@@ -270,7 +279,8 @@ def write_report_of(folder: Path) -> None:
         if config.mode == "lead":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        title = f"{config.mode.upper()} over {', '.join(Path(clip).stem for clip in config.clips)}"
+        # A map from a file has clips of its own.
+        title = f"{config.mode.upper()} over {', '.join(clip.name for clip in clips_of(recording))}"
         write_report(folder / REPORT, recording, world_model(config.scene), title, _lines(recording), figures)
 
 

@@ -12,7 +12,7 @@ from controllers.fields.leading import Leading
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.led import Led
-from experiments.config import MAP_SUFFIX, RunConfig
+from experiments.config import MAP_SUFFIX, STRETCHING, RunConfig
 from experiments.lead import lead_static
 from experiments.map_files import map_digest
 from experiments.modes import Field
@@ -22,6 +22,9 @@ from models.scene import P_WH
 from sim.figure import Figure
 from sim.servo import Servo
 from sim.world import World
+
+HAND_DOES = {"stretch": "grabs or pushes", "stretch-then-follow": "grabs or pushes", "lead": "leads"}
+"""What a hand that exerts a force does, in modes in which it does not just push; in figures."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class Session:
             "curve": self.curve.point(phases),
             "curve_span": np.array([self.curve.start, self.curve.end]),
             "curve_closed": float(self.curve.periodic),
-            "tube_radius": self.config.reach,
+            **self._tube(),
+            "hand_does": HAND_DOES.get(self.config.mode, "traces" if self.config.user == "trace" else "pushes"),
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
             "motor_peak": np.array(PREMIUM_1_5.peak_torque),
@@ -61,6 +65,13 @@ class Session:
             **(lead_static(self.field) if isinstance(self.field, Leading) else {}),
             **self._rivers(),
         }
+
+    def _tube(self) -> dict[str, npt.ArrayLike | str]:
+        """Radius of what is drawn about the curve [m], and what that is."""
+        tubes = {"rivers": self.config.river_tube} | dict.fromkeys(STRETCHING, self.config.rubber_tube)
+        if self.config.mode in tubes:
+            return {"tube_radius": tubes[self.config.mode], "tube_name": "tube"}
+        return {"tube_radius": self.config.reach, "tube_name": "map's domain"}
 
     def _rivers(self) -> dict[str, npt.ArrayLike | str]:
         """Names and curves of the rivers of a field that gives the hand to one of them."""

@@ -20,6 +20,9 @@ Array = npt.NDArray[np.float64]
 CURVE_FILE = "curve.json"
 DAMPING = 14.0  # [N s/m] an edit that is undone takes the hand along in a tenth of a second, not in a fortieth
 REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap at about the curve's own pace
+OUTSIDE = (
+    2.2  # radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third
+)
 PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
 
 
@@ -34,11 +37,16 @@ def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Stretc
     then = until = None
     if config.mode == "stretch-then-follow":
         then = Follow(curve, config.stiffness, config.damping, config.tube)
-        until = max((grab.end for grab in grabs), default=0.0) + PAUSE
+        until = edited_until(grabs)
     return StretchyTubes(
         curve, config.seek, config.rubber, DAMPING, epsilon=config.rubber_tube, width=config.bump,
         until=np.inf if until is None else until, then=then,
     )  # fmt: skip
+
+
+def edited_until(grabs: tuple[Grab, ...]) -> float:
+    """When a hand has done all its grabs, and a pause after them [s]."""
+    return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
@@ -65,7 +73,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
         (np.array([0.0, 0.0, 0.015]), 1.3, 0.4, second),
         (still, 0.15, 0.0, None),
         (still, 0.7, 0.0, None),
-        (-(3.5 * epsilon + 0.01) * away, 1.3, 0.4, third + 3.5 * epsilon * away),
+        (-(OUTSIDE * epsilon + 0.01) * away, 1.3, 0.4, third + OUTSIDE * epsilon * away),
     )
     grabs: list[Grab] = []
     for carry, duration, hold, place in doings:
@@ -108,6 +116,8 @@ class StretchSummary:
 
     def line(self) -> str:
         """What happened, in a sentence."""
+        if self.edits == 0:
+            return "The curve was not bent."
         times = "once" if self.edits == 1 else f"{self.edits} times"
         return (
             f"The curve was bent {times}, by up to {self.largest_mm:.1f} mm over {100 * self.changed:.0f} % of it; "

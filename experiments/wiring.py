@@ -29,10 +29,10 @@ from experiments.config import MAP_SUFFIX, STRETCHING, RunConfig
 from experiments.expression import expressive_figure, oriented
 from experiments.figure_maps import clip_map, figure_legs, packed_legs
 from experiments.governor import governed_law
-from experiments.hands import UPRIGHT, beginning, stylus_path, user_arm
+from experiments.hands import UPRIGHT, beginning, hand_remarks, stylus_path, user_arm
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
-from experiments.led_balance import LED_GAINS, balanced_on_ground
+from experiments.led_balance import balanced_on_ground, led_gains
 from experiments.lifted_runs import default_pushes, lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
@@ -87,7 +87,9 @@ def wire(
     least = 2 * config.figure_ticks * config.scene.servo_period
     if not least <= config.seconds < np.inf:
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
-    for name in ("lap", "radius", "reach", "bump"):
+    if config.seed < 0:
+        raise ParameterError(f"seed is {config.seed}; expected 0 or more")
+    for name in ("lap", "radius", "reach", "bump", "river_tube", "rubber_tube", "bunny_width"):
         value = getattr(config, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} is {value}; expected a positive, finite number")
@@ -118,7 +120,10 @@ def wire(
         blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+    if config.mode in STRETCHING and not config.grabs:
+        config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube))
     parts = _assemble(config, (curve, course), blended, rivers, led, world)
+    remarks += hand_remarks(config, curve)
     ready(compiled_parts("figure", parts.compiled, parts.program.ops))
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
@@ -154,7 +159,8 @@ def wire(
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
         sense_in_motion(port)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, LED_GAINS if leading else FigureGains())
+    gains = FigureGains() if led is None else led_gains(led.gait)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
     servo = Servo(
         plant=make_plant(world),
         port=port,
@@ -201,8 +207,7 @@ def _assemble(
     """
     curve, course = curves
     haptic_map = blended if isinstance(blended, Led) or not config.expressive else expressive_figure(blended)
-    grabs = config.grabs or (stretch_grabs(curve, config.rubber_tube) if config.mode in STRETCHING else ())
-    urged = 0.0
+    grabs, urged = config.grabs, 0.0
     if led is not None:
         field = led
     elif config.mode in STRETCHING:

@@ -2,32 +2,37 @@ r"""Feet that are clear of the ground where they move, also between the mixtures
 
 Which foot steps, and when, may change from one mixture of the clips to the next. Half way between two such nodes a
 table has a foot move as the one says, and lifted as the other: it would be dragged over the floor. So the
-interpolated paths are looked at between the nodes too. Where a foot at p is dragged a way D about a moment while its
-height h is less than h_c, it lacks
+interpolated paths of the soles' points are looked at between the nodes too. Where a point p is dragged a way D about
+a moment while its height h over the ground is less than h_c, its foot lacks
 
 .. math:: N = S\Bigl(\frac{D - D_0}{D_1 - D_0}\Bigr)\, S\Bigl(\frac{|\dot p|}{v}\Bigr)\, (h_c - h)_+,
 
-and the nodes around lift it by the largest N, widened in time. Where a clip is nearly alone its own slides are its.
+or as much as it is deeper than h_d in the ground. The nodes around lift it by the largest N, widened in time; this is
+done again where that was not enough. Where a clip is alone its own slides are its.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import convolve1d, maximum_filter1d, uniform_filter1d
+from scipy.spatial.transform import Rotation
 
-from controllers.haptic_map.footfalls import STANDS, BlendedFeet, blended_feet, own_shares, smooth_step
+from controllers.haptic_map.footfalls import MeanEnd, mean_end, own_shares, smooth_step
 from controllers.haptic_map.inbetween import FOOT, ROOT
+from controllers.haptic_map.limb_ends import grounds
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.loops import turned
 from controllers.state import Array
 
-_CLEAR = 0.0065  # h_c [m]
-_LEAST, _MOST = 0.027, 0.04  # D_0, D_1 [m]
-_FAST = 0.5  # v [m a lap]
+_CLEAR, _TOUCHES = 0.005, 0.004  # h_c, and how low what moves is dragged in full [m]
+_LEAST, _MOST = 0.0265, 0.029  # D_0, D_1 [m]
+_DEEP = 0.005  # h_d [m]
+_FAST = 0.3  # v [m a lap]
 _MOMENT = 0.1  # share of the lap over which D is taken
-_LEVER = 0.1  # [m] by which a foot that turns sweeps over the ground
 _SPREAD = 0.012  # share of the lap by which a lift begins early and ends late
 _TAKES_PART = 0.02  # least share that a node around has in the place between
+_ALONE = 0.1  # by which a clip's share of its own slides is less than 1 where feet are lifted in full
+_ROUNDS = 4
 
 
 def cleared(
@@ -50,32 +55,50 @@ def cleared(
     -------
     Array, shape (n, k, 2 + 4 limbs)
     """
-    n = len(values)
-    feet = blended_feet(channels, drifts, limbs, between)
-    lacking = _lacking(feet, shares @ values)
+    n, result = len(values), values.copy()
     width = max(1, round(_SPREAD * n))
     bump = np.hanning(2 * width + 3)
-    wide = maximum_filter1d(lacking, 2 * width + 1, axis=0, mode="wrap")
-    wide = convolve1d(wide, bump / bump.sum(), axis=0, mode="wrap")
-    result, mixed = values.copy(), 1.0 - own_shares(channels, nodes).sum(axis=1)
-    for k, around in enumerate(np.abs(shares.T) > _TAKES_PART):
-        result[:, k, ROOT + 2 :: FOOT] += mixed[k] * wide[:, around].max(axis=1)
+    ground = between @ grounds(channels, limbs)
+    mixed = smooth_step((1.0 - own_shares(channels, nodes).sum(axis=1)) / _ALONE)
+    for j, limb in enumerate(limbs):
+        foot = slice(ROOT + FOOT * j, ROOT + FOOT * (j + 1))
+        end = mean_end(channels, drifts, limbs, j, between)
+        levers = _levers(end.turn, limb)
+        looked_at = np.arange(len(between))
+        for _ in range(_ROUNDS):
+            there = MeanEnd(*(part[:, looked_at] for part in end))
+            lacking = _lacking(there, levers[:, looked_at], shares[looked_at] @ result[..., foot], ground[looked_at])
+            dragged = lacking.any(axis=0)
+            if not dragged.any():
+                break
+            looked_at, lacking = looked_at[dragged], lacking[:, dragged]
+            wide = maximum_filter1d(lacking, 2 * width + 1, axis=0, mode="wrap")
+            wide = convolve1d(wide, bump / bump.sum(), axis=0, mode="wrap")
+            for k, around in enumerate(np.abs(shares[looked_at].T) > _TAKES_PART):
+                result[:, k, foot.start + 2] += mixed[k] * wide[:, around].max(axis=1, initial=0.0)
     return result
 
 
-def _lacking(feet: BlendedFeet, d: Array) -> Array:
-    """N of feet with corrections d, shape (n, c, limbs)."""
-    n, lacking = len(d), np.empty_like(feet.height)
-    for j in range(feet.height.shape[2]):
-        at = ROOT + FOOT * j
-        offset = np.concatenate([d, d[:1]])[..., [at, at + 1, at + 3]]
-        offset[..., :2] = turned(feet.angles[:, :, j], offset[..., :2])
-        way = np.linalg.norm((feet.moves[:, :, j] + np.diff(offset, axis=0)) * [1.0, 1.0, _LEVER], axis=-1)
-        # Of the two steps beside a sample.
-        way = np.maximum(way, np.roll(way, 1, axis=0))
-        low = np.maximum(_CLEAR - feet.height[..., j] - d[..., at + 2], 0.0)
-        moment = max(1, round(_MOMENT * n))
-        on_ground = way * smooth_step(low / (_CLEAR - STANDS))
-        dragged = moment * uniform_filter1d(on_ground, moment, axis=0, mode="wrap")
-        lacking[..., j] = smooth_step((dragged - _LEAST) / (_MOST - _LEAST)) * smooth_step(n * way / _FAST) * low
-    return lacking
+def _levers(turn: Array, limb: Limb) -> Array:
+    """From the centre of a limb's points to each of them [m], shape (n, c, points, 3)."""
+    turns = Rotation.from_quat(turn.reshape(-1, 4), scalar_first=True)
+    levers = [turns.apply(point) for point in limb.points - limb.points.mean(axis=0)]
+    return np.stack(levers, axis=1).reshape(*turn.shape[:2], -1, 3)
+
+
+def _lacking(end: MeanEnd, levers: Array, d: Array, ground: Array) -> Array:
+    """N of a foot with corrections d (n, c, 4) over the ground at heights (c,), shape (n, c)."""
+    n = len(d)
+    height = (end.place[..., 2] + d[..., 2] - ground)[..., None] + levers[..., 2]
+    low = np.maximum(_CLEAR - height, 0.0)
+    place = (end.place[..., :2] + d[..., :2])[..., None, :] + turned(d[..., 3:], levers[..., :2])
+    place = turned(end.angle[..., None], np.concatenate([place, place[:1]])) + end.shift[..., None, :]
+    way = np.linalg.norm(np.diff(place, axis=0), axis=-1)
+    touches = smooth_step(low / (_CLEAR - _TOUCHES))
+    moment = max(1, round(_MOMENT * n))
+    on_ground = way * np.minimum(touches, np.roll(touches, -1, axis=0))
+    dragged = moment * uniform_filter1d(on_ground, moment, axis=0, mode="wrap")
+    # Of the two steps beside a sample.
+    speed = n * np.maximum(way, np.roll(way, 1, axis=0))
+    lacks = smooth_step((dragged - _LEAST) / (_MOST - _LEAST)) * smooth_step(speed / _FAST) * low
+    return np.maximum(lacks, -_DEEP - height).max(axis=2)

@@ -59,6 +59,27 @@ class BlendedFeet(NamedTuple):
     own: Array
 
 
+class MeanEnd(NamedTuple):
+    """Where the mean has the end of a limb at k mixtures, at n samples of the lap.
+
+    Attributes
+    ----------
+    place : Array, shape (n, k, 3)
+        Of the centre of its points [m], in a frame of its own.
+    turn : Array, shape (n, k, 4)
+        Its orientation there.
+    shift : Array, shape (n + 1, k, 2)
+        Of that frame over the ground [m], a lap on at last.
+    angle : Array, shape (n + 1, k)
+        By which it is turned [rad].
+    """
+
+    place: Array
+    turn: Array
+    shift: Array
+    angle: Array
+
+
 def smooth_step(x: Array) -> Array:
     """C² step from 0 to 1 on [0, 1]."""
     x = np.clip(x, 0.0, 1.0)
@@ -145,24 +166,13 @@ def own_shares(channels: Array, weights: Array) -> Array:
 
 def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:
     """What the mean asks of the feet; arguments as in `foot_corrections`."""
-    n, first = len(channels), channels.shape[2] - END * len(limbs)
-    ends = channels[..., first:].reshape(n, channels.shape[1], len(limbs), END)
-    s, drift = np.arange(n + 1) / n, weights @ drifts
-    columns = [3 + 4 * limb.joints[2] for limb in limbs]
-    soles = np.stack(
-        [lowest_point(channels[..., at : at + 4], limb, _SOFTNESS) for limb, at in zip(limbs, columns, strict=True)],
-        axis=2,
-    )
-    own = ends[..., 2] + soles
+    own = np.stack([_own_height(channels, limbs, j) for j in range(len(limbs))], axis=2)
     ground = own.min()
-    mean = np.einsum("km,nmjc->nkjc", weights, ends)
     height, moves, angles = [], [], []
     for j, limb in enumerate(limbs):
-        turn = _mean_rotations(channels[:, :, columns[j] : columns[j] + 4], weights)
-        height.append(mean[:, :, j, 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
-        lag = np.append(ends[:, 0, j, 3], ends[0, 0, j, 3])
-        shift, angle = plane_exponential((s + lag)[:, None, None] * drift)
-        place = np.concatenate([mean[:, :, j, :2], mean[:1, :, j, :2]])
+        place, turn, shift, angle = mean_end(channels, drifts, limbs, j, weights)
+        height.append(place[..., 2] + lowest_point(turn, limb, _SOFTNESS) - ground)
+        place = np.concatenate([place, place[:1]])[..., :2]
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
@@ -170,6 +180,26 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb, _SOFTNESS))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
+
+
+def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
+    """Of the end of limb j in each clip: position, λ and clearance (n, m, 5), and orientation (n, m, 4)."""
+    at, column = channels.shape[2] - END * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
+    return channels[..., at : at + END], channels[..., column : column + 4]
+
+
+def _own_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
+    end, turn = _own_end(channels, limbs, j)
+    return end[..., 2] + lowest_point(turn, limbs[j], _SOFTNESS)
+
+
+def mean_end(channels: Array, drifts: Array, limbs: Sequence[Limb], j: int, weights: Array) -> MeanEnd:
+    """Where the mean has the end of limb j; arguments as in `foot_corrections`."""
+    n = len(channels)
+    ends, turns = _own_end(channels, limbs, j)
+    lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
+    shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
+    return MeanEnd(np.einsum("km,nmx->nkx", weights, ends[..., :3]), _mean_rotations(turns, weights), shift, angle)
 
 
 def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:

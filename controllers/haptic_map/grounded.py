@@ -25,7 +25,7 @@ from controllers.state import Array
 Mask = npt.NDArray[np.bool_]
 
 _AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
-_LOWEST = 0.25  # by which the root may be lowered [m]: who leaps farther than that cannot step
+_LOWEST = 0.3  # by which the root may be lowered [m]: who leaps farther than that cannot step
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:

@@ -5,7 +5,8 @@ r"""The led figure: a clip that walks straight on walks on a path instead, and i
 A(s) ∈ SE(2) is the figure's path (`controllers.curves.walked_path`), ℓ the length of the clip's lap, ρ what is left of
 a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓλ rests, and advances while it swings
 (`limbs`): so a foot that stands stays where it is, however path and pelvis turn over it. The legs follow. Bends are
-walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s).
+walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s), and
+the root is lower by twice as much as that raises the outer hip.
 
 A clip that flies has a second form without flights (`grounded`), for paces at which nobody flies that long. Channels
 are (1 − u) ρ + u ρ_grounded; u, how far the figure stays on the ground, is the walker's second number.
@@ -39,10 +40,12 @@ from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
 
 LED = 7
-_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _HEADER = range(8)
+_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(9)
 
 _LEAST_TRAVEL = 0.5  # [m] of a lap
 _LARGEST_TURN = np.deg2rad(30.0)  # of a lap
+_UPRIGHT = 0.015  # [rad] of lean within which the root is hardly lowered
+_STOOP = 2.0  # times what the outer hip is raised by: in a bend feet swing beside the path too
 
 
 @njit
@@ -124,6 +127,16 @@ def _carried(
 
 
 @njit
+def _stooped(lean: float, leaning: float, width: float) -> tuple[float, float]:
+    """How much lower the root of a figure is that leans [m], and the derivative: in proportion to its raised hip.
+
+    A leg that lands straight would be too short otherwise, and its knee would stop with a jerk.
+    """
+    size = np.sqrt(lean * lean + _UPRIGHT * _UPRIGHT)
+    return width * (size - _UPRIGHT), width * leaning * lean / size
+
+
+@njit
 def _unit(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Array) -> None:
     """Unit quaternion of four channels and its local angular velocity (3, 2) by x, 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
     scale = 1.0 / np.sqrt(max(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2, 1e-12))
@@ -150,6 +163,9 @@ def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
     lean, leaning = path_value(memory, path, s, PATH_LEAN)
     _carried(memory, path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
     _carried(memory, path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
+    lower, lowering = _stooped(lean, leaning, params[_WIDTH])
+    root[0, 2] -= lower
+    root[1, 2] -= lowering
     for joint in range(1, rotations):
         at = 3 + 4 * joint
         _unit(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
@@ -258,7 +274,8 @@ class Led(HapticMap):
         self.grounds = len(forms) > 1
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
-        header = [self.stride, phase, at, samples, self._rotations, len(limbs), len(forms)]
+        width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
+        header = [self.stride, phase, at, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
         self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_footfalls import LEGS, REST, STILL, N, kicking
+from test_footfalls import LEGS, REST, STILL, N, bump, clip, kicking
 
 from controllers.haptic_map.clearance import cleared
 from controllers.haptic_map.footfalls import foot_corrections
@@ -49,6 +49,49 @@ def test_feet_that_a_coarse_table_drags_are_lifted(count):
     np.testing.assert_array_equal(change[..., ~upwards], 0.0)
     assert change.min() >= 0.0
     assert 0.002 < change.max() < 0.01
+
+
+def turning(angle):
+    """Both feet on the ground, the left one turned to and fro about its middle."""
+    channels = clip(*(np.tile([0.0, y, 0.0], (N, 1)) for y in (0.1, -0.1)))
+    half = 0.5 * angle * np.sin(2.0 * np.pi * 3.0 * np.arange(N) / N)
+    at = 3 + 4 * LEGS[0].joints[2]
+    channels[:, at], channels[:, at + 3] = np.cos(half), np.sin(half)
+    return channels
+
+
+@pytest.mark.parametrize(("angle", "lifted"), [(0.6, True), (0.05, False)])
+def test_the_toes_of_a_foot_that_turns_in_its_place_sweep_over_the_ground(angle, lifted):
+    clips = np.stack([turning(angle), turning(0.0), turning(2.0 * angle)], axis=1)
+    nodes = np.array([[0.0, 1.0, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
+    raised = cleared(np.zeros((N, 3, ROOT + 2 * FOOT)), clips, np.zeros((3, 3)), LEGS, nodes, nodes, np.eye(3))
+    left, right = raised[..., ROOT + 2], raised[..., ROOT + FOOT + 2]
+    np.testing.assert_array_equal(right, 0.0)
+    np.testing.assert_array_equal(left[:, 0], 0.0)
+    assert (left[:, 1:].max() > 0.003) == lifted
+    assert (left.max() > 0.0) == lifted
+
+
+def test_a_foot_that_sinks_between_the_nodes_is_lifted_there():
+    found = foot_corrections(CLIPS, STILL, LEGS, mixtures(5))
+    found[:, 2, ROOT + FOOT + 2] -= 0.02 * bump(0.7, 0.95)[1]
+    between = mixtures(9)
+    shares = interpolation(5, between[:, 1])
+    raised = cleared(found, CLIPS, STILL, LEGS, mixtures(5), between, shares)
+    mean = np.einsum("cm,nmk->nck", between, CLIPS)[..., REST + 5 + 2]
+    before, after = (mean + np.einsum("ck,nkx->ncx", shares, d)[..., ROOT + FOOT + 2] for d in (found, raised))
+    assert before.min() < -0.018
+    assert after.min() > -0.0065
+
+
+def test_feet_are_lifted_in_full_beside_a_clip_alone():
+    """Of the mixtures next to the corner, 4 % of the other clip drag a foot as 50 % do."""
+    nodes = np.array([[1.0, 0.0], [0.96, 0.04], [0.5, 0.5], [0.0, 1.0]])
+    slow = np.stack([kicking(0, 0.1, 0.4, height=0.0, ahead=0.3), kicking(0, 0.1, 0.4, height=0.0, ahead=0.3)], axis=1)
+    slow[:, 1, REST + 1] += 0.01
+    raised = cleared(np.zeros((N, 4, ROOT + 2 * FOOT)), slow, STILL, LEGS, nodes, nodes, np.eye(4))[..., ROOT + 2]
+    np.testing.assert_array_equal(raised[:, [0, 3]], 0.0)
+    assert raised[:, 1].max() > 0.9 * raised[:, 2].max() > 0.003
 
 
 def test_a_clip_that_is_given_twice_counts_as_one():

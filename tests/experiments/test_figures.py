@@ -26,7 +26,7 @@ TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torqu
 FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": ()}
 
 
-def record(path, n=2000, pushing=True):
+def record(path, n=2000, pushing=True, texts=None, summary=None):
     """A hand on a circle, pushed outwards from 0.5 s to 0.7 s; a flight from 1.0 s to 1.2 s."""
     t = np.arange(n) / 1000
     pushed = pushing * ((t >= 0.5) & (t < 0.7)).astype(float)
@@ -40,6 +40,7 @@ def record(path, n=2000, pushing=True):
         "motor_continuous": np.array([0.4, 0.3, 0.2]),
         "motor_peak": np.array([1.6, 1.2, 0.8]),
         "body_weight": 700.0,
+        **(texts or {}),
     }
     with Recorder(path, {}, 1, {"ticks": Group(1000, TICKS), "frames": Group(100, FRAMES)}, static) as recorder:
         recorder.append(
@@ -64,7 +65,7 @@ def record(path, n=2000, pushing=True):
                 "flight": flight,
             },
         )
-        recorder.close({})
+        recorder.close(summary or {})
     return Recording(path)
 
 
@@ -100,9 +101,28 @@ def test_the_path_is_in_millimetres_and_orange_where_the_hand_pushes(recording):
     above, right = path_figure(recording).axes
     hand = np.array(line(above, "hand").get_data())
     assert np.linalg.norm(hand[:, [100, 600]], axis=0) == pytest.approx([50.0, 60.0])
-    assert np.flatnonzero(np.isfinite(line(above, "hand, pushing").get_ydata())).tolist() == list(range(500, 700))
+    assert np.flatnonzero(np.isfinite(line(above, "where the hand pushes").get_ydata())).tolist() == list(
+        range(500, 700)
+    )
     assert np.linalg.norm(np.array(line(above, "curve φ").get_data()), axis=0) == pytest.approx(np.full(61, 50.0))
     assert np.all(line(right, "hand").get_ydata() == 0.0)
+
+
+def test_what_the_hand_does_and_what_surrounds_the_curve_is_called_as_the_recording_says(tmp_path):
+    texts = {"hand_does": "leads", "tube_name": "map's domain"}
+    with record(tmp_path / "led.h5", texts=texts) as led:
+        drawn = {line.get_label() for line in path_figure(led).axes[0].lines}
+        labels = deviation_figure(led).axes[0].get_legend_handles_labels()[1]
+    assert {"where the hand leads", "map's domain"} <= drawn
+    assert "hand leads" in labels
+    with record(tmp_path / "alone.h5", pushing=False) as alone:
+        assert not any("where" in str(line.get_label()) for line in path_figure(alone).axes[0].lines)
+
+
+def test_where_a_bent_curve_begins_to_be_performed_is_marked(tmp_path):
+    with record(tmp_path / "bent.h5", summary={"performance": {"start": 1.25}}) as bent:
+        for figure in (deviation_figure(bent), tracking_figure(bent)):
+            assert all("performed" in [text.get_text() for text in ax.texts] for ax in figure.axes)
 
 
 def test_the_deviation_is_in_millimetres_with_pushes_shaded(recording):

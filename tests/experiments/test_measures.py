@@ -8,7 +8,8 @@ import pytest
 
 from experiments import measures
 from experiments.measures import summarise
-from experiments.summary import RunSummary, SpeedSummary
+from experiments.summary import RunSummary
+from experiments.summary_parts import SpeedSummary
 from models.humanoid.skeleton import rest_pose
 from sim.recorder import Group, Recorder
 from sim.recording import Recording
@@ -55,12 +56,15 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     return Recording(path)
 
 
-def summary_of(path: Path, root_error: np.ndarray | None = None) -> RunSummary:
+def summary_of(
+    path: Path, root_error: np.ndarray | None = None, handled: tuple[tuple[float, float], ...] = ()
+) -> RunSummary:
     error = np.full(N // EVERY, 0.03) if root_error is None else root_error
     with recording_of(path, error) as recording:
         return summarise(
-            recording, lambda points, phases, rivers: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {}
-        )
+            recording, lambda points, phases, rivers: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {},
+            handled,
+        )  # fmt: skip
 
 
 def test_a_hand_that_is_never_left_alone_is_not_told_to_have_been(tmp_path: Path) -> None:
@@ -111,6 +115,45 @@ def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.Monk
                 assert vars(other[0]) == pytest.approx(vars(value[0]))
             else:
                 assert other == (value if value is None else pytest.approx(value)), name
+
+
+def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
+    with recording_of(tmp_path / "run.h5", np.full(N // EVERY, 0.03)) as recording:
+        parts = [
+            measures.measured(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
+            for span in ((0.0, 1.7003), (1.7003, 2.2), (2.2, np.inf))
+        ]
+    paths = [path for path, *_ in parts]
+    # A part begins with the first frame after its time, and its first tick has no step.
+    assert [path.laps for path in paths] == pytest.approx([1.709 / 1.5, 0.489 / 1.5, 1.799 / 1.5])
+    assert [len(path.pushes) for path in paths] == [0, 1, 1]
+    assert paths[1].pushes[0].start == pytest.approx(2.0, abs=0.01)
+    assert [path.deviation_rms_mm for path in paths] == [pytest.approx(0.2), None, pytest.approx(0.2)]
+    assert [animation.unpushed_deg for _, animation, _, _ in parts] == [0.0, 0.0, 0.0]
+    flights = [figure.flight_seconds for _, _, figure, _ in parts]
+    assert flights == pytest.approx([0.2, 0.0, 0.0])
+
+
+def test_a_hand_that_does_something_else_does_not_push_and_is_not_left_alone(tmp_path: Path) -> None:
+    whole = summary_of(tmp_path / "whole.h5")
+    handled = summary_of(tmp_path / "run.h5", handled=((1.9, 2.6),))
+    assert handled.path.pushes == ()
+    assert handled.path.deviation_rms_mm == whole.path.deviation_rms_mm
+    assert handled.animation == whole.animation
+    assert "The hand did not push." in handled.lines()
+    assert f"up to {whole.animation.pushed_deg:.2f}° a joint." in " ".join(handled.lines())
+
+
+def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
+    summary = summary_of(tmp_path / "run.h5", handled=((0.0, np.inf),))
+    with Recording(tmp_path / "run.h5") as recording:
+        trace = measures.trace_summary(recording)
+        settled = recording.channel("ticks", "distance")[:][round(1.0 / PERIOD) :]
+    assert trace.deviation_rms_mm == pytest.approx(1e3 * np.sqrt(np.mean(settled**2)))
+    assert trace.peak_force == pytest.approx(3.0)
+    lines = replace(summary, trace=trace).lines()
+    assert any(line.startswith("The hand traced the curve by itself, within ") for line in lines)
+    assert not any("push" in line.lower() for line in lines)
 
 
 def test_a_fall_is_told_and_what_follows_does_not_count(tmp_path: Path) -> None:

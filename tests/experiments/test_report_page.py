@@ -70,6 +70,10 @@ def test_what_is_not_drawn_to_scale_is_said(write):
     assert "first 60 of 300 seconds" in " ".join(write(radius=0.003).texts)
 
 
+def test_what_surrounds_the_curve_is_called_what_it_is(write):
+    assert "Light blue: the tube around the curve" in " ".join(" ".join(write(radius=0.004).texts).split())
+
+
 def test_seed_and_versions_are_shown(write):
     text = " ".join(write().texts)
     assert "seed 42" in text
