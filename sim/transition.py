@@ -15,6 +15,7 @@ Array = npt.NDArray[np.float64]
 DWELL = 0.04  # [s] for which a river must have the hand before its clip plays: noise gives a hand away for less
 _ROOT = 6  # components of a tangent that are the root's
 _PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that stand on one foot bear little more
+_ASIDE = 5.0  # [m/s²] and over the ground, where it goes on besides
 _THROW = 20.0  # [m/s²] of the root that a change goes on with at most: a hand that is thrown off races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
 _LONGER = 1.75  # times the least blend time that a way aside makes a change last at most
@@ -98,7 +99,7 @@ def set_duration(transition: Transition, aside: float) -> None:
     if transition.seconds > 0.0:
         up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
         # No longer: what flies would fly on.
-        over = min(np.sqrt(_BEND * aside / _PULL), _LONGER * transition.seconds)
+        over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds)
         transition.lasts[0] = max(transition.seconds, up, over)
 
 
