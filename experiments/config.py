@@ -44,6 +44,9 @@ class RunConfig:
         k_r of the field [N/m].
     damping : float
         b_d of the field [N s/m].
+    river_stiffness, river_damping : float
+        k_r and b_d of the rivers [N/m], [N s/m]. Softer and slower than one curve alone: so a push takes a hand over
+        into another river before it throws it out of all.
     lifted_stiffness, lifted_damping : float
         k_r and b_d of the rivers of a map from a file [N/m], [N s/m]. These lie side by side: a hand that goes over
         from one to the other is drawn within τ = b_d/k_r, or the figure would have to be at the other clip's speed at
@@ -126,6 +129,8 @@ class RunConfig:
     seed: int = 1
     stiffness: float = 300.0
     damping: float = 8.0
+    river_stiffness: float = 150.0
+    river_damping: float = 16.0
     lifted_stiffness: float = 50.0
     lifted_damping: float = 20.0
     tube: float = 0.25
@@ -173,6 +178,8 @@ class RunConfig:
         """k_r [N/m] and b_d [N s/m] of the mode's field."""
         if self.mode == "rivers" and self.map.endswith(MAP_SUFFIX):
             return self.lifted_stiffness, self.lifted_damping
+        if self.mode == "rivers":
+            return self.river_stiffness, self.river_damping
         return self.stiffness, self.damping
 
 

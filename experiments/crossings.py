@@ -3,6 +3,7 @@
 ``python -m experiments.crossings`` prints the table of `docs/fields.md`.
 """
 
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import mujoco
@@ -11,14 +12,16 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.certificates.hand import HandImpedance
+from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER, Program
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from controllers.safety import ForceLimiter, limit_force
+from experiments.config import RunConfig
 from experiments.field_figures import SPEED, straight_river
-from experiments.modes import ADMISSION, HYSTERESIS, SIGMA
+from experiments.modes import ADMISSION, HYSTERESIS, LOOK, SIGMA, law, river_time
 from experiments.trial_simulation import trial_model
 from models.scene import PHANTOM, SceneConfig
 from sim.devices.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
@@ -36,6 +39,11 @@ PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)
 PUSH_SECONDS = 0.2
 SECONDS = 1.25  # from 45 mm before the crossing to 45 mm behind it
 CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
+
+GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]
+HARDER = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
+BEFORE = (-0.1, 0.0, 0.1)  # [s] before the crossing, when a push begins
+LASTING = (0.2, 0.4)  # [s]
 
 
 class Passage(NamedTuple):
@@ -111,10 +119,14 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
 
 
 def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
-    """Field of the river along x and of a second one, or of the first alone."""
-    rivers = (straight_river(0.0), second)
+    """Field of the river along x and of a second one, or of the first alone, with the gains of the mode of rivers."""
+    gains = RunConfig(mode="rivers")
+    rivers = tuple(
+        replace(river, epsilon=gains.river_tube, tau=river_time(gains), drag=gains.river_damping)
+        for river in (straight_river(0.0), second)
+    )
     bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
-    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form).program()
+    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form, LOOK[form]).program()
 
 
 def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
@@ -144,5 +156,34 @@ def crossing_passages() -> str:
     return "\n".join(lines)
 
 
+def changed_over(config: RunConfig, newtons: float) -> tuple[int, int, int]:
+    """How many hands on the level river go over into another one, and are thrown out, and how many there are.
+
+    They are pushed up where the wave rises through it, or down where it falls.
+    """
+    curve = Trajectory.circle(config.radius, config.lap)
+    program, changed, out = law(config, curve).program(), 0, 0
+    pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in BEFORE for lasts in LASTING]
+    for up, lead, lasts in pushes:
+        at = curve.start + (0.5 if up > 0.0 else 0.75) * curve.duration - lead
+        x, y, z = (float(value) for value in curve.point(at))
+        push = Push(0.2, lasts, newtons, (0.0, 0.0, up), (x, y, z), 0.003)
+        river = passage(program, curve.point(at - 0.5), 1.6, (push,)).river
+        lost = bool(river[-1] < 0.0 or np.sum(river < 0.0) > 100)
+        changed, out = changed + int(not lost and bool(river[-1] > 0.0)), out + int(lost)
+    return changed, out, len(pushes)
+
+
+def pushed_rivers() -> str:
+    """The table as Markdown: by gains and push, how many hands change over, and how many are thrown out."""
+    lines = ["| k_r, b_d | " + " | ".join(f"{f:g} N" for f in HARDER) + " |", "|---|" + "--:|" * len(HARDER)]
+    for stiffness, damping in GAINS:
+        config = RunConfig(mode="rivers", river_stiffness=stiffness, river_damping=damping)
+        cells = [changed_over(config, f) for f in HARDER]
+        told = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
+        lines.append(f"| {stiffness:g}, {damping:g} | {told} |")
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
-    print(crossing_passages())
+    print(crossing_passages(), pushed_rivers(), sep="\n\n")

@@ -9,6 +9,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.footsteps import packed_steppers
 from controllers.haptic_map.joint_limits import MARGIN
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
@@ -74,5 +75,5 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
 
 
 def packed_legs(figure: mujoco.MjModel) -> Array:
-    """`figure_legs` as the kernel takes them, shape (2, 36)."""
-    return np.array([leg.packed() for leg in figure_legs(figure)])
+    """`figure_legs` as those that step (`packed_steppers`), shape (2, 48)."""
+    return packed_steppers(figure_legs(figure))

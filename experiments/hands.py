@@ -16,9 +16,12 @@ from sim.users.intent import Grab, Push
 Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
-RIVER_PUSH = 0.9  # likewise in rivers of higher order, which let go of a hand that leaves their tube [N]
+RIVER_PUSH = 1.0  # over into another river: in the middle of what takes a hand there and does not throw it out [N]
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
 
+_CROSSING = 0.5  # of the lap, where the wave rises through the level river
+_LEAD, _OVER = 0.05, 0.3  # [s] before it, when a push across begins, and [s] that it lasts
+_PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
 _AWAY = 1e-3  # [m] by which beginnings differ
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
 
@@ -75,11 +78,12 @@ def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> A
     laps = range(1, max(2, int(config.seconds / lap)))
     if config.user == "turn" and not turns:
         turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
-    if config.user == "push" and not pushes:
-        force = RIVER_PUSH if config.mode == "rivers" else PUSH_FORCE
+    if config.user == "push" and not pushes and config.mode == "rivers":
+        pushes = river_pushes(curve, config.seconds)
+    elif config.user == "push" and not pushes:
         begin = first_pushed_lap(curve, grabs)
         laps = range(max(1, int((config.seconds - begin) / lap)))
-        pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap, force))
+        pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
     if config.user == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
     if config.user == "trace":
@@ -121,3 +125,19 @@ def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Pus
         Push(start + 0.1 * lap, 0.3 * lap, force),
         Push(start + 0.6 * lap, 0.3 * lap, -force),
     )
+
+
+def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
+    """Pushes from one default river into another: up where the wave rises through the curve, if the hand is there.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        The default curve.
+    seconds : float
+        Of the run [s].
+    """
+    lap = curve.duration
+    x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD))
+    starts = lap * np.arange(0.25, max(1.0, seconds / lap))
+    return tuple(Push(float(start), _OVER, RIVER_PUSH, (0.0, 0.0, 1.0), (x, y, z), _PLACE) for start in starts)

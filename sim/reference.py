@@ -132,21 +132,23 @@ def _show_on(reference: CompiledReference) -> None:
 
 
 @njit
-def _stand_on_pivot(reference: CompiledReference, params: Array) -> int:
-    """Place the motion where it has the foot that stands before and after; returns which it is, −1 if there is none.
+def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, float]:
+    """Place the motion where it has the foot that stands before and after; which it is, −1 for none, and how far [m].
 
     A figure that stands on it alone turns with it.
     """
     transition, old, new = reference.transition, np.empty(7), np.empty(7)
     _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
     _look_ahead(reference, params, transition.lasts[0], transition.ahead[1])
-    foot = pivot_of(transition)
+    foot, row = pivot_of(transition)
+    moved = 0.0
     if foot >= 0:
         limb_end(transition.limbs[foot], transition.shown[0], old)
-        limb_end(transition.limbs[foot], transition.ahead[1], new)
+        limb_end(transition.limbs[foot], transition.ahead[row], new)
         turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
         place_clip(reference.memory, new, old[0], old[1], turn)
-    return foot
+        moved = math.hypot(new[0] - old[0], new[1] - old[1])
+    return foot, moved
 
 
 @njit
@@ -163,7 +165,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
     _look_around(reference)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
-    set_duration(transition)
+    set_duration(transition, 0.0)
     way, seconds = np.zeros(3), transition.lasts[0]
     for i in range(2):
         way[i] = stopping_way(change[1, i], change[2, i], seconds)
@@ -171,7 +173,10 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
     way[2] = stopping_way(spin, twist, seconds)
     place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
-    foot = _stand_on_pivot(reference, params)
+    _, moved = _stand_on_pivot(reference, params)
+    set_duration(transition, moved)
+    # Where the motion stands when a longer change ends.
+    foot, _ = _stand_on_pivot(reference, params)
     _look_around(reference)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
     transition.since[0] = 0.0
@@ -327,8 +332,8 @@ def make_reference(
         Of the tracking filter, ω/2π [Hz].
     blend : float
         In which one clip goes over into another [s]; 0: the figure jumps.
-    limbs : Array, shape (n, 36), optional
-        Legs that step meanwhile, `Limb.packed`; without them the feet slide.
+    limbs : Array, optional
+        Legs that step meanwhile, `packed_steppers`; without them the feet slide.
 
     Raises
     ------

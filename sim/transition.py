@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, put_limb, step_end
+from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, put_limb, shortfall, step_end
 from controllers.haptic_map.inertialization import add_offset, offset_left
 from sim.native import mj_differentiate_pos
 
@@ -15,7 +15,10 @@ Array = npt.NDArray[np.float64]
 DWELL = 0.04  # [s] for which a river must have the hand before its clip plays: noise gives a hand away for less
 _ROOT = 6  # components of a tangent that are the root's
 _PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that stand on one foot bear little more
+_ASIDE = 5.0  # [m/s²] and over the ground, where it goes on besides
+_THROW = 20.0  # [m/s²] of the root that a change goes on with at most: a hand that is thrown off races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
+_LONGER = 1.75  # times the least blend time that a way aside makes a change last at most
 _SWING = 0.3  # [rad] by which a joint swings on at most
 
 
@@ -27,13 +30,13 @@ class Transition(NamedTuple):
     seconds : float
         Least blend time [s]; 0: the figure jumps.
     lasts : Array
-        T of the last change [s], longer where the root has far up or down to go, shape (1,).
+        T of the last change [s], longer where the root has far to go, shape (1,).
     since : Array
         Time since the last change [s], infinite before the first, shape (1,).
     change : Array
         Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
     limbs, steps : Array
-        Legs, shape (n, 36), and how they step, shape (n, 28).
+        Legs (`packed_steppers`), and how they step, shape (n, 28).
     ends : Array
         Scratch: where the feet of the new motion are, shape (n, 7).
     rival : Array
@@ -65,7 +68,7 @@ class Transition(NamedTuple):
 
 
 def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transition:
-    """A transition before the first change, of poses of nq and tangents of nv numbers, with legs (n, 36) that step."""
+    """A transition before the first change, of poses of nq and tangents of nv numbers, with `packed_steppers`."""
     n = len(limbs)
     return Transition(
         seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs,
@@ -84,18 +87,20 @@ def dwells(transition: Transition, river: float, period: float) -> bool:
 
 
 @njit
-def pivot_of(transition: Transition) -> int:
-    """The leg on which the figure stands before and after a change, −1 for none; see `footsteps.pivot`."""
+def pivot_of(transition: Transition) -> tuple[int, int]:
+    """The leg on which the figure stands before and after a change, −1 for none, and when; see `footsteps.pivot`."""
     return pivot(transition.limbs, transition.shown[0], transition.ahead, transition.stands)
 
 
 @njit
-def set_duration(transition: Transition) -> None:
-    """Let a change last long enough for the height by which the root is off, as `note_change` found it."""
-    height = abs(transition.change[0, 2])
+def set_duration(transition: Transition, aside: float) -> None:
+    """Let a change last long enough for the root's way: up or down, as `note_change` found it, and aside [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
-        transition.lasts[0] = max(transition.seconds, np.sqrt(_BEND * height / _PULL))
+        up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
+        # No longer: what flies would fly on.
+        over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds)
+        transition.lasts[0] = max(transition.seconds, up, over)
 
 
 @njit
@@ -107,10 +112,14 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     at = min(since + s, lasts)
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
-        step_end(transition.steps[n], at, lasts, ends[n])
+        step_end(limbs[n], transition.steps[n], at, lasts, ends[n])
     offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
     offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
     add_offset(pose, transition.offset)
+    low = 0.0
+    for n in range(limbs.shape[0]):
+        low += shortfall(limbs[n], transition.steps[n], pose, ends[n]) ** 2
+    pose[2] -= np.sqrt(low)
     for n in range(limbs.shape[0]):
         put_limb(limbs[n], pose, ends[n])
 
@@ -132,6 +141,8 @@ def note_change(
         transition.change[0, i] = now[i]
         transition.change[1, i] = 0.5 * (next_[i] - then[i]) / period
         transition.change[2, i] = (next_[i] - 2.0 * now[i] + then[i]) / period**2
+    for i in range(3):
+        transition.change[2, i] = min(max(transition.change[2, i], -_THROW), _THROW)
     if transition.seconds > 0.0:
         plan_steps(
             transition.limbs, transition.steps, transition.shown, pose, period, transition.lasts[0], second,

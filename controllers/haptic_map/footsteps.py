@@ -11,25 +11,57 @@ change and after it is the pivot (`pivot`): the new motion is placed where it ha
 then hardly. Where there is none, the foot that the new motion stands on steps first; else the one that is higher, or
 has the longer way to go. So position, velocity and acceleration of the feet are continuous, a foot that moves does so
 above the ground, and one foot stands. The limb's joints follow (`limbs`).
+
+A limb is a row of `packed_steppers`: `Limb.packed`, then its points as the last segment has them.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
 
+from controllers.haptic_map.footing import packed_soles
 from controllers.haptic_map.inertialization import offset_left, stopping_way
-from controllers.haptic_map.limbs import place_limb
+from controllers.haptic_map.limbs import LIMB, Limb, place_limb
+from controllers.haptic_map.vectors import cross, dot, product, turned_back, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
 
 _LIFT = 0.2  # λ: height of a step over its length
 _TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
+_ROUND = 3e-3  # [m] a way so short is hardly worth a lift
 _LEVEL = 0.01  # [m] feet that differ by less in height are equally high
+_TOUCHES = 0.05  # [m] height from which a foot does not have to reach what it is asked for
+_SPARE = 5e-3  # [m] by which a foot that is out of reach may stay off
+_FARTHEST = 0.5  # of a limb's length, the way over the floor at which it is given up
+_BACK = 0.04  # [rad] half of which a knee bends backwards at most, before it is bent as it has to be
 _FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
 _CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
 _SOONEST = 0.05  # [s] in which a foot that falls comes to rest at least
 # A row of `steps`: when the step begins, place and orientation where the old motion comes to rest, and the offsets
 # from there with their rates, (3, 3) each; the time to get there; and the height of the floor.
 _BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, _FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28
+
+
+def packed_steppers(limbs: Sequence[Limb]) -> Array:
+    """Limbs that step, as the kernels take them: shape (n, 36 + 3 k) for k points each.
+
+    Raises
+    ------
+    ParameterError
+        If one has more points than another.
+    """
+    return np.hstack([[limb.packed() for limb in limbs], packed_soles(limbs).reshape(len(limbs), -1)])
+
+
+@njit
+def sole_height(limb: Array, end: Array) -> float:
+    """Height of the lowest point of a limb's end [m], which is at `end` (7,)."""
+    least = np.inf
+    for k in range(LIMB, limb.shape[0], 3):
+        _, _, z = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
+        least = min(least, z)
+    return end[2] + least
 
 
 @njit
@@ -48,11 +80,49 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
 
 
 @njit
+def _bend_forwards(limb: Array, rotations: Array) -> None:
+    """Take back what a limb's middle joint is bent backwards, all but a little: `place_limb` takes it for forwards.
+
+    An angle α < 0 becomes α / (1 + (α/a)²), which leaves α = 0 with two derivatives alike.
+    """
+    q = rotations[int(limb[1])]
+    a, b, axis = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12)
+    m = turned_back((q[0], q[1], q[2], q[3]), a)
+    angle = np.arctan2(dot(m, cross(b, axis)), dot(m, b) - dot(m, axis) * dot(b, axis))
+    if angle < 0.0:
+        # Beyond −π/2 it is bent forwards by more than half a turn.
+        wanted = angle / (1.0 + (angle / _BACK) ** 2) if angle > -0.5 * np.pi else -angle
+        half = 0.5 * (wanted - angle)
+        sine = np.sin(half)
+        q[0], q[1], q[2], q[3] = product(
+            (q[0], q[1], q[2], q[3]), (np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2])
+        )
+
+
+@njit
+def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
+    """How much lower the root must be for a limb to reach its end, `end` (7,), where that is near the floor [m]."""
+    line, hip = np.empty(3), rotate(pose[3], pose[4], pose[5], pose[6], limb[3], limb[4], limb[5])
+    sole, longest = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17]), 0.0
+    for i in range(3):
+        line[i] = end[i] - sole[i] - pose[i] - hip[i]
+    for first in (6, 9):
+        longest += np.sqrt(limb[first] ** 2 + limb[first + 1] ** 2 + limb[first + 2] ** 2)
+    away = min(line[0] ** 2 + line[1] ** 2, (_FARTHEST * longest) ** 2)
+    short = max(0.0, -line[2] - np.sqrt(longest**2 - away))
+    x = min(max(1.0 - (sole_height(limb, end) - step[_FLOOR]) / _TOUCHES, 0.0), 1.0)
+    return short * short / (short + _SPARE) * x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+@njit
 def put_limb(limb: Array, pose: Pose, end: Array) -> None:
     """Correct the joints of a limb such that its end is where `end` (7,) says."""
     rotations = pose[3:].reshape(-1, 4)
-    rotations[int(limb[2])] = end[3:]
-    place_limb(limb, rotations, np.empty((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
+    _bend_forwards(limb, rotations)
+    # Once from a limb that is straight leaves up to two centimetres.
+    for _ in range(2):
+        rotations[int(limb[2])] = end[3:]
+        place_limb(limb, rotations, np.empty((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
 
 
 @njit
@@ -66,42 +136,50 @@ def _come_to_rest(values: Array, period: float, seconds: float, rest: Array, cha
 
 
 @njit
-def standing(limbs: Array, pose: Pose, stands: Array) -> None:
-    """Which ends of limbs are about as low as the lowest: 1 in `stands` (n,), else 0."""
-    end, ground = np.empty(7), np.inf
+def _heights(limbs: Array, pose: Pose, heights: Array) -> float:
+    """Heights of the lowest points of the ends of limbs [m], written; returns the least."""
+    end = np.empty(7)
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, end)
-        stands[n], ground = end[2], min(ground, end[2])
-    for n in range(limbs.shape[0]):
-        stands[n] = 1.0 if stands[n] < ground + _LEVEL else 0.0
+        heights[n] = sole_height(limbs[n], end)
+    return heights.min()
 
 
 @njit
-def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> int:
-    """The limb on which a figure stands both before and after a change, −1 if it is none or both.
+def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, int]:
+    """The limb on which a figure stands both before and after a change, −1 if there is none, and when after.
+
+    One on which the new motion stands throughout comes first. With all of them there is none to choose.
 
     Parameters
     ----------
-    limbs : Array, shape (n, 36)
-        `Limb.packed`.
+    limbs : Array, shape (n, 36 + 3 k)
+        `packed_steppers`.
     shown : Pose
         Of the old motion at the change.
     ahead : Array, shape (2, nq)
         Poses of the new motion when the first step ends, and when the second does.
     stands : Array, shape (n,)
         Written: 1 where the new motion stands on the limb in both poses, else 0.
+
+    Returns
+    -------
+    int, int
+        Limb, and the row of `ahead` in which it stands (the last one).
     """
-    also, found = np.empty(limbs.shape[0]), -1
-    standing(limbs, ahead[0], stands)
-    standing(limbs, ahead[1], also)
-    stands *= also
-    standing(limbs, shown, also)
-    for n in range(limbs.shape[0]):
-        if stands[n] * also[n] > 0.0:
-            if found >= 0:
-                return -1
-            found = n
-    return found
+    count = limbs.shape[0]
+    heights, ground = np.empty((3, count)), np.inf
+    for i, pose in enumerate((shown, ahead[0], ahead[1])):
+        ground = min(ground, _heights(limbs, pose, heights[i]))
+    low = heights < ground + _LEVEL
+    found, row, best, equal = -1, 1, 0, 0
+    for n in range(count):
+        stands[n] = 1.0 if low[1, n] and low[2, n] else 0.0
+        score = 0 if not low[0, n] else 2 * int(low[1, n]) + int(low[2, n])
+        equal = 1 if score > best else equal + int(score == best)
+        if score > best:
+            found, row, best = n, 1 if low[2, n] else 0, score
+    return (-1, 1) if equal > 1 else (found, row)
 
 
 @njit
@@ -112,8 +190,8 @@ def plan_steps(
 
     Parameters
     ----------
-    limbs : Array, shape (n, 36)
-        `Limb.packed`.
+    limbs : Array, shape (n, 36 + 3 k)
+        `packed_steppers`.
     steps : Array, shape (n, STEP)
         Written.
     shown : Array, shape (3, nq)
@@ -127,16 +205,14 @@ def plan_steps(
     """
     half = 0.5 * seconds
     ends, turns, way = np.empty((3, 7)), np.empty((3, 3)), np.empty(3)
-    urgency, ground = np.empty(limbs.shape[0]), np.inf
-    for n in range(limbs.shape[0]):
-        limb_end(limbs[n], shown[0], ends[0])
-        ground = min(ground, ends[0, 2])
+    urgency, heights = np.empty(limbs.shape[0]), np.empty(limbs.shape[0])
+    ground = _heights(limbs, shown[0], heights)
     for n in range(limbs.shape[0]):
         step = steps[n]
         for j in range(3):
             limb_end(limbs[n], shown[j], ends[j])
         # Not deeper than the foot that stands.
-        fall, height = 0.5 * (ends[1, 2] - ends[2, 2]) / period, ends[0, 2] - ground
+        fall, height = 0.5 * (ends[1, 2] - ends[2, 2]) / period, heights[n] - ground
         stop = half if fall <= 0.0 else min(half, max(2.0 * height / fall, _SOONEST))
         # Nor farther than a leg in full swing can be caught.
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
@@ -165,14 +241,16 @@ def plan_steps(
 
 
 @njit
-def step_end(step: Array, s: float, seconds: float, end: Array) -> None:
+def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> None:
     """Move an end of the new motion, `end` (7,), to where it is s seconds after the change, in its step."""
     stop = step[_STOP]
     x = min(max((s - step[_BEGIN]) / (0.5 * seconds), 0.0), 1.0)
     if x >= 1.0:
         return
     share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    left, way, floor, new = np.empty(3), 0.0, step[_FLOOR], end[2]
+    left, floor = np.empty(3), min(step[_FLOOR], sole_height(limb, end))
+    # What the old motion still carries it counts too: a foot in mid-swing would scrape.
+    way = step[_AWAY] ** 2 + step[_AWAY + 1] ** 2
     offset_left(step[_AWAY:_TURNED].reshape(3, 3), stop, min(s, stop), left)
     for i in range(3):
         old = step[_PLACE + i] + left[i]
@@ -189,6 +267,6 @@ def step_end(step: Array, s: float, seconds: float, end: Array) -> None:
     )
     way += _TURN_ARM**2 * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
     # Rounded at zero, where a root has no derivative.
-    lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT * (np.sqrt(way + 1e-4) - 1e-2)
-    # A foot that comes down fast would swing through the floor.
-    end[2] = max(end[2], min(floor, new)) + lift
+    lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT * (np.sqrt(way + _ROUND**2) - _ROUND)
+    # A foot that comes down fast, or turns, would go through the floor.
+    end[2] += max(0.0, floor - sole_height(limb, end)) + lift

@@ -217,6 +217,19 @@ def _two(clips: RiverClips, first: int, second: int, moment: float, away: bool) 
     return poses[round(moment / PERIOD) :]
 
 
+@pytest.mark.parametrize("clips", [("squat_dance", "walk", "angry"), ("walk", "run", "squat_dance")])
+def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]) -> None:
+    made = [(clip.poses, clip.fps) for clip in load_clips(clips)[0]]
+    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
+    draw = np.random.default_rng(3 if clips[0] == "squat_dance" else 2)
+    for _ in range(18):
+        first, second = draw.permutation(3)[:2]
+        soles = _soles(_two(rivers, int(first), int(second), 1.2 + 3.0 * draw.random(), False))
+        # Where a kick went over into a walk that changes feet within the change it was 22 cm.
+        assert _slide(soles) < 0.03
+        assert soles[..., 2].min() > -0.003
+
+
 @pytest.mark.parametrize("away", [False, True])
 def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(away: bool) -> None:
     made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "cheer", "angry"))[0]]
@@ -226,7 +239,7 @@ def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_t
         first, second = draw.permutation(3)[:2]
         soles = _soles(_two(clips, int(first), int(second), 1.2 + 3.0 * draw.random(), away))
         # Without a foot that stands and phases of rest it was 6 cm, and 50 cm below the floor.
-        assert soles[..., 2].min(axis=1).max() < (0.03 if away else 0.015)
+        assert soles[..., 2].min(axis=1).max() < 0.015
         assert soles[..., 2].min() > -0.003
         assert _slide(soles) < 0.03
 
