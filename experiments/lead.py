@@ -119,12 +119,19 @@ def law(config: RunConfig, gait: Gait) -> Leading:
     Raises
     ------
     ParameterError
-        If a number is out of its interval.
+        If a number is out of its interval, or an option has no meaning here.
     """
-    if config.map != "cylindrical" or config.user == "push" or config.walls or config.governor or config.expressive:
+    given = {
+        f"--map {config.map}": config.map != "cylindrical",
+        f"--user {config.user}": config.user != "relaxed",
+        "--walls": config.walls,
+        "--governor": config.governor,
+        "--expressive": config.expressive,
+    }
+    if any(given.values()):
         raise ParameterError(
-            "in the mode lead the map is the led figure's and the hand leads; leave --map, --user push, --walls, "
-            "--governor and --expressive away"
+            "in the mode lead the map is the led figure's and the hand leads; leave out "
+            + ", ".join(option for option, is_given in given.items() if is_given)
         )
     curve = s_curve()
     x, y, _ = curve.point(curve.start)

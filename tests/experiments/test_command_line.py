@@ -35,6 +35,8 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--mode", "stretch", "--user", "trace"], "--user relaxed, push or turn"),
         (["--mode", "stretch", "--rubber-tube", "inf"], "rubber_tube is inf"),
         (["--mode", "rivers", "--river-tube", "0"], "river_tube is 0"),
+        (["--mode", "rivers", "--river-damping", "-1"], "-1"),
+        (["--mode", "lead", "--user", "trace", "--walls"], "leave out --user trace, --walls\n"),
         (["--cutoff", "0"], "cutoff"),
         (["--smoothing", "1000"], "1000"),
         (["--physics-step", "0.0003"], "does not divide"),
