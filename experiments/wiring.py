@@ -33,7 +33,7 @@ from experiments.hands import UPRIGHT, beginning, hand_remarks, stylus_path, use
 from experiments.lead import gait_remark, lap_remark, leading_hand, led_map, s_curve
 from experiments.lead import law as lead_law
 from experiments.led_balance import balanced_on_ground, led_gains
-from experiments.lifted_runs import default_pushes, lifted_course, lifted_curve, lifted_rivers
+from experiments.lifted_runs import LIFTED_GAINS, default_pushes, lifted_course, lifted_curve, lifted_rivers
 from experiments.map_files import load_figure_map
 from experiments.modes import Field
 from experiments.rests import with_rests
@@ -159,7 +159,9 @@ def wire(
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
         sense_in_motion(port)
-    gains = FigureGains() if led is None else led_gains(led.gait)
+    gains = LIFTED_GAINS if isinstance(blended, Lifted) else FigureGains()
+    if led is not None:
+        gains = led_gains(led.gait)
     figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
     servo = Servo(
         plant=make_plant(world),

@@ -107,7 +107,7 @@ def test_the_lines_tell_it() -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"map": "composite"}, "leave --map"),
+        ({"map": "composite"}, "leave out --map"),
         ({"user": "push"}, "--user push"),
         ({"walls": True}, "--walls"),
         ({"clips": ("walk", "run")}, "one clip is led, got 2"),
