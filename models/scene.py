@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.errors import ModelError
+from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_spec
 from models.phantom.spec import phantom_spec
 from models.robot_arm.spec import arm_spec
@@ -99,10 +100,7 @@ def _device_spec(config: SceneConfig) -> mujoco.MjSpec:
     spec.add_material(name="floor", textures=textures, texrepeat=[1, 1], texuniform=True)
     world = spec.worldbody
     world.add_light(pos=[1.5, -2.0, 4.0], dir=[-0.3, 0.4, -1.0], castshadow=True)
-    world.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor",
-        contype=1, conaffinity=0, condim=3, friction=[0.9, 0.005, 0.0001],
-    )  # fmt: skip
+    add_floor(spec, material="floor")
     _add_table(world)
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, R_WP.ravel())

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec
 from models.mocap.clip import Clip, pose_difference
 from sim.clip_motion import ClipMotion, clip_motion
@@ -167,10 +168,7 @@ def floor_world(config: TrackingConfig) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.timestep = config.physics_step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.worldbody.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05],
-        contype=1, conaffinity=0, condim=3, friction=[0.9, 0.005, 0.0001],
-    )  # fmt: skip
+    add_floor(spec)
     spec.attach(figure_spec(config.stature, config.mass), prefix=_PREFIX, frame=spec.worldbody.add_frame())
     return spec.compile()
 

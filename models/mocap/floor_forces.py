@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
 
+from models.floor import FRICTION
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-FRICTION = 0.9
 _SHARE = 0.01  # ε: makes the forces unique, so that they share the load and depend continuously on the state
 _SLOPE = FRICTION / np.sqrt(2)  # the pyramid lies inside the cone
 _EDGES = np.array([(x * _SLOPE, y * _SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
