@@ -6,6 +6,7 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait, Leading
+from controllers.haptic_map.captures import Capture
 from controllers.haptic_map.grounded import runs
 from controllers.haptic_map.led import Led
 from controllers.haptic_map.limbs import Limb
@@ -50,8 +51,10 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else CONTACT_RADIUS)
-    return led, Gait(led.stride, led.stride / led.duration, np.roll(support, -first), led.reach)
+    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
+    if not led.flies:
+        support = np.maximum(support, 1)
+    return led, Gait(led.stride, led.pace * led.stride / led.duration, np.roll(support, -first), led.reach)
 
 
 def lap_remark(clip: Clip) -> tuple[str, ...]:
@@ -78,16 +81,21 @@ def _without_blinks(standing: npt.NDArray[np.bool_], shortest: float) -> npt.NDA
     return filled
 
 
-def gait_remark(name: str, gait: Gait, grounds: bool) -> tuple[str, ...]:
+def gait_remark(name: str, led: Led) -> tuple[str, ...]:
     """What is said of a clip that flies: a body in the air falls with g, at whatever pace it is led."""
-    if not gait.flies:
-        return ()
-    if grounds:
+    if led.flies and led.grounds:
         return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
-    return (
-        f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any pace, "
-        "the physical figure may fall where it is slow",
-    )
+    if led.grounds:
+        return (
+            f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
+            f"{led.pace * led.stride / led.duration:.1f} m/s",
+        )
+    if led.flies:
+        return (
+            f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any "
+            "pace, the physical figure may fall where it is slow",
+        )
+    return ()
 
 
 def _middle_of_longest(mask: npt.NDArray[np.bool_]) -> int:

@@ -38,7 +38,8 @@ class LeadSummary:
         Largest way over the floor of a point of the animation's soles while it touched; and of the physical figure's
         while it pressed on the floor, until it fell, if it did.
     retrace_cm, retrace_deg : float or None
-        Backwards, how far the animation's root was from its way forwards at most; None if it never went back.
+        Backwards, how far the animation's root was from its way forwards at most, where it had been; None if it never
+        went back.
     physical_retrace_cm, physical_retrace_deg : float or None
         Likewise the physical figure's, until it fell, if it did.
     """
@@ -169,7 +170,8 @@ class _Retrace:
 
     def _compare(self, place: Array) -> None:
         near = self._way[np.abs(self._way[:, 0] - place[0]) < 0.3]
-        if len(near) < 2:
+        # Behind where it began there is no way forwards.
+        if len(near) < 2 or place[0] < self._way[0, 0]:
             return
         start, step = near[:-1], np.diff(near, axis=0)
         step[:, 3] = np.remainder(step[:, 3] + np.pi, 2.0 * np.pi) - np.pi

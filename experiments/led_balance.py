@@ -1,4 +1,4 @@
-"""A led figure that goes too slowly to fly stands on its feet: its root sways (see `experiments.balance`)."""
+"""A led figure that is captured, or goes too slowly to fly, stands on its feet: its root sways (`experiments.balance`)."""
 
 import mujoco
 import numpy as np
@@ -15,25 +15,25 @@ Array = npt.NDArray[np.float64]
 # A foot that bears what it is not held to turns about itself: the plan gives it load, and lifts it. So on a led figure,
 # which may stop anywhere, a point bears nothing from half the height on at which it is let go.
 _WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005)
-# Who flies changes feet within a hundredth of a second, and then would stand on none.
+# Who flies, or flew, changes feet within a hundredth of a second, and then would stand on none.
 _FLYING = _WALKING._replace(reference_reach=0.012)
 
 _ROWS = 192  # of a lap
 _ROUNDS = 6
-_PACE = 0.8  # of the clip's own
+_PACE = 0.8  # of the gait's own
 _SHARE = 0.6  # of the support, about its middle, in which the zero-moment point is asked to lie
 
 
-def led_gains(gait: Gait) -> FigureGains:
-    """Of the physical figure that is led with a gait."""
-    return _FLYING if gait.flies else _WALKING
+def led_gains(led: Led) -> FigureGains:
+    """Of the physical figure that is led with a clip."""
+    return _FLYING if led.flies or led.grounds else _WALKING
 
 
-def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
+def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
     """The same map, whose form without flights sways such that the floor can bear it at the pace of going back."""
-    if not led.grounds:
+    if not led.sways:
         return led
-    sway, result, seconds = np.zeros((_ROWS, 2)), led, led.duration / _PACE
+    sway, result, seconds = np.zeros((_ROWS, 2)), led, gait.stride / (_PACE * gait.speed)
     walker = np.zeros((_ROWS + 2, 7))
     walker[:, 0] = led.stride * (np.arange(-1, _ROWS + 1) / _ROWS - led.phase)
     walker[:, 1] = walker[:, 3] = 1.0
@@ -43,10 +43,11 @@ def balanced_on_ground(led: Led, figure: mujoco.MjModel) -> Led:
         poses_along(compiled.kind, compiled.params, compiled.memory, walker, poses[0])
         laps = measured_laps(poses, seconds / _ROWS, figure)
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
-        # Where the root is on average is the clip's affair: the way back to it, at take-off, would throw the figure.
-        sway += sway_of(outside[0] - outside[0].mean(axis=0), laps.height, seconds)
+        # Where the root of who flies is on average is the clip's affair: the way back to it would throw the figure.
+        mean = outside[0].mean(axis=0) if gait.flies else 0.0
+        sway += sway_of(outside[0] - mean, laps.height, seconds)
         swaying = led.with_sway(sway)
-        if not swaying.grounds:
+        if not swaying.sways:
             # Who would have to stoop too far for it sways less.
             break
         result = swaying

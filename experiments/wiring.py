@@ -106,7 +106,7 @@ def wire(
     if leading:
         blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
         led = lead_law(config, gait)
-        remarks += lap_remark(only(clips)) + gait_remark(only(clips).name, gait, blended.grounds)
+        remarks += lap_remark(only(clips)) + gait_remark(only(clips).name, blended)
     elif config.map.endswith(MAP_SUFFIX):
         blended, clips = load_figure_map(Path(config.map))
         remarks += (f"the clips are those of the map: {', '.join(blended.names)}",)
@@ -132,8 +132,8 @@ def wire(
     if isinstance(blended, RiverClips):
         blended = with_rests(blended, world.figure)
         parts = _assemble(config, (curve, course), blended, rivers, led, world)
-    if isinstance(blended, Led):
-        blended = balanced_on_ground(blended, world.figure)
+    if isinstance(blended, Led) and led is not None:
+        blended = balanced_on_ground(blended, led.gait, world.figure)
         parts = _assemble(config, (curve, course), blended, rivers, led, world)
     haptic_map, field, program, compiled, user, limiter, tank, port = parts
     memory = program.fresh_memory()
@@ -160,8 +160,8 @@ def wire(
     if moves:
         sense_in_motion(port)
     gains = LIFTED_GAINS if isinstance(blended, Lifted) else FigureGains()
-    if led is not None:
-        gains = led_gains(led.gait)
+    if isinstance(blended, Led):
+        gains = led_gains(blended)
     figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
     servo = Servo(
         plant=make_plant(world),

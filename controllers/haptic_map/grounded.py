@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
 
 from controllers.haptic_map.limbs import END, Limb
-from controllers.haptic_map.reaching import shortfall
+from controllers.haptic_map.reaching import extension, shortfall
 from controllers.haptic_map.splines import round_lap
 from controllers.state import Array
 
@@ -77,7 +77,11 @@ def grounded(
             result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
         result[:, first + END * j + 3] += (warp - np.arange(n)) / n
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
-    short = np.max([shortfall(rows, result, stride, limb, first + END * j) for j, limb in enumerate(limbs)], axis=0)
+    short = np.zeros(n)
+    for j, limb in enumerate(limbs):
+        at = first + END * j
+        # As straight as in the clip.
+        short = np.maximum(short, shortfall(result, stride, limb, at, extension(rows, stride, limb, at)))
     width = max(3, round(n / len(flights)))
     window = np.hanning(width + 2)[1:-1]
     ceiling = minimum_filter1d(rows[:, 2] - short, width, mode="wrap")
@@ -85,6 +89,13 @@ def grounded(
     if np.max(rows[:, 2] - result[:, 2]) > _LOWEST:
         return None
     return result
+
+
+def hastened(standing: Mask) -> float:
+    """Largest ψ' of limbs that stand as `standing` (n, limbs) says: how much faster one swings than in its clip."""
+    flights, n = runs(~np.any(standing, axis=1)), len(standing)
+    warps = [_warp(standing, j, flights) for j in range(standing.shape[1])]
+    return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
 
 
 def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:

@@ -29,7 +29,8 @@ from controllers.curves.walked_path import (
 )
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.grounded import Mask, grounded
+from controllers.haptic_map.captures import Capture, lap_signs, low_passed
+from controllers.haptic_map.grounded import Mask, grounded, hastened, runs
 from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
 from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
 from controllers.haptic_map.loops import checked_clip, closed_loop, turned, yawed
@@ -212,11 +213,23 @@ class Led(HapticMap):
         Where the packed path begins in the memory.
     standing : array of bool, shape (m, limbs), optional
         Which limbs stand, at m equal steps of the lap: between its flights. Without it u changes nothing.
-    radius : float, optional
-        How high over the floor the points of a limb are that stand on it [m]: there the limbs that stand are held
-        (`planted`). Without it they move as they do in the clip.
+    capture : Capture, optional
+        How a captured clip is made fit for the floor: low-passed, the limbs that stand held (`planted`), and without
+        flights whatever u is, unless it hops on one foot. Without it the clip is led as it is.
     sway : Array, shape (k, 2), optional
-        By which the root moves over the floor where no flight is left [m], at k equal steps of the lap.
+        By which the root of a form without flights, or of a capture, moves over the floor [m], at k equal steps of the
+        lap.
+
+    Attributes
+    ----------
+    flies, grounds : bool
+        Whether there are flights in it at u = 0, and whether it has a form without those of its clip.
+    sways : bool
+        Whether the sway moves any of it.
+    stride, duration : float
+        Way [m] and time [s] of a lap: less than the clip's way if the steps would be too long without flights.
+    pace : float
+        Times the clip's own, at which no limb swings faster than in the clip.
 
     Raises
     ------
@@ -231,10 +244,10 @@ class Led(HapticMap):
         phase: float = 0.0,
         at: int = 0,
         standing: Mask | None = None,
-        radius: float | None = None,
+        capture: Capture | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._made_of = (clip, tuple(limbs), phase, at, standing, radius)
+        self._made_of = (clip, tuple(limbs), phase, at, standing, capture)
         poses, fps = clip
         loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
         self.phase = phase
@@ -246,12 +259,14 @@ class Led(HapticMap):
                 f"{np.degrees(_LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
                 f"{np.degrees(loop.drift[2]):.0f}°. Walk and run do"
             )
-        samples = int(np.clip(len(poses) - 1, 64 if radius is None else 256, 2048))
+        samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
         # The path is along x, whichever way the figure faces while it goes.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
         channels[:, :2] = turned(course, channels[:, :2])
         channels[:, 3:7] = yawed(course, channels[:, 3:7])
+        if capture is not None:
+            channels = low_passed(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
         rows, limbs = channels, [limb.allowing([channels]) for limb in limbs]
         for limb in limbs:
@@ -261,17 +276,28 @@ class Led(HapticMap):
             rows = np.concatenate([rows, ends[:, 0]], axis=1)
             rows[:, column : column + 4] = quaternions[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        signs = np.ones(rows.shape[1])
-        for first in range(3, channels.shape[1], 4):
-            signs[first : first + 4] = 1.0 if rows[-1, first : first + 4] @ rows[0, first : first + 4] >= 0.0 else -1.0
-        forms = [rows]
+        signs = lap_signs(rows, self._rotations)
+        forms, self.flies, self.grounds, self.pace = [rows], False, False, 1.0
         if standing is not None:
             stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
-            if radius is not None:
-                rows = with_planted_ends(rows, channels, drift[0], limbs, stands, radius)
-            low = grounded(rows, signs, self.stride, limbs, stands, np.zeros((2, 2)) if sway is None else sway)
-            forms = [rows] if low is None else [rows, low if radius is None else reached(low, self.stride, limbs)]
-        self.grounds = len(forms) > 1
+            flights = runs(~np.any(stands, axis=1))
+            self.flies = bool(flights)
+            sway = np.zeros((2, 2)) if sway is None else sway
+            if capture is None:
+                low = grounded(rows, signs, self.stride, limbs, stands, sway)
+                forms, self.grounds = ([rows], False) if low is None else ([rows, low], True)
+            else:
+                # Nobody leaps who steps.
+                steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
+                held = (channels, drift[0], limbs, stands, capture.radius)
+                forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]
+                low = grounded(forms[0], signs, steps, limbs, stands, sway)
+                if low is not None:
+                    forms, self.stride, self.flies, self.grounds = [reached(low, steps, limbs)], steps, False, True
+                    self.pace = 1.0 / hastened(stands)
+                elif flights:
+                    forms = [with_planted_ends(rows, *held, self.stride, np.zeros((2, 2)))]
+        self.sways = self.grounds or (capture is not None and not self.flies)
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)

@@ -7,6 +7,7 @@ swings, and g, which is the other way round, both C² and never above 0 together
 - Its own clock (`led`) advances at the pace g, so that it rests in a stance to the last bit.
 - Place and heading are p = p̄ − c, with the slip c' = h p̄' − κ g c. Forwards round the lap this holds a foot where it
   landed, backwards where it will leave; the average of both is taken.
+- It is turned about its length until its breadth is level: on one corner a foot turns and creeps.
 - Its height is lessened by what it is in the stance, and by the median of that in the swing, which goes on smoothly
   from one stance to the next. In a swing it is h_0 over the floor at least.
 
@@ -16,6 +17,7 @@ The root is lower by as much as the legs would be too short for that.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.footfalls import gap, smooth_step
 from controllers.haptic_map.grounded import Mask, runs
@@ -23,15 +25,18 @@ from controllers.haptic_map.limb_ends import contact_moves, end_channels, lowest
 from controllers.haptic_map.limbs import END, Limb
 from controllers.haptic_map.loops import plane_exponential, turned, yawed
 from controllers.haptic_map.reaching import reached, shortfall
+from controllers.haptic_map.splines import round_lap
 from controllers.state import Array
 
 _SWINGS = 0.35  # share of a swing at each end in which g rises
 _STANDS = 0.01  # and of a stance in which h does: feet land and leave with a little speed of their own
-_RESTS = 0.12  # of a stance, in which its height comes to rest
-_LIFTS = 0.06  # of a swing, in which a foot comes to be clear of the floor
+_RESTS = 0.15  # of a stance, in which its height comes to rest
+_LIFTS = 0.12  # of a swing, in which a foot comes to be clear of the floor
 _SMOOTH = 0.0025  # [m]
 _CLEAR = 0.01  # h_0, how high a foot swings at least [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap
+_NARROW = 0.02  # [m] an end of less breadth has no level
+_LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which on its level counts less, and nothing
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 
 
@@ -71,7 +76,7 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
     lag = (np.cumsum(free) - 0.5 * free) / free.sum() - (np.arange(n) + 0.5) / n
     lag -= lag.mean()
     turns, parts = end_channels(channels[:, None], drift[None], limb, lag)
-    quaternions, ends = turns[:, 0], parts[:, 0]
+    quaternions, ends = _level(turns[:, 0], limb, 1.0 - free), parts[:, 0]
     heights = ends[:, 2] + lowest_point(quaternions, limb, _SOFTNESS) - radius
     # Over the ground, once round: the last sample is the first one a lap on.
     shift, angle = plane_exponential((np.arange(n + 1) / n + np.append(lag, lag[0]))[:, None] * drift)
@@ -88,6 +93,22 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
     low = (1.0 - window(stands, _RESTS)) * _above(0.0, heights - level)
     ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
     return quaternions, ends
+
+
+def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
+    """Orientations of an end (n, 4), turned about its length by a share (n,) of what its breadth is out of level."""
+    _, sizes, axes = np.linalg.svd(limb.points - limb.points.mean(axis=0))
+    if len(sizes) < 2 or sizes[1] < _NARROW:
+        return quaternions
+    turn = Rotation.from_quat(quaternions, scalar_first=True)
+    length, breadth = turn.apply(axes[0]), turn.apply(axes[1])
+    tilt = np.arctan2(breadth[:, 2], np.cross(length, breadth)[:, 2])
+    tilt -= np.pi * np.round(tilt / np.pi)
+    # What is upright has no level.
+    lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
+    levelled = (Rotation.from_rotvec(-(share * lies * tilt)[:, None] * length) * turn).as_quat(scalar_first=True)
+    same = np.sum(levelled * quaternions, axis=1, keepdims=True) >= 0.0
+    return np.where(same, levelled, -levelled)
 
 
 def levels(heights: Array, stands: Mask) -> Array:
@@ -108,7 +129,14 @@ def _above(least: float, heights: Array) -> Array:
 
 
 def with_planted_ends(
-    rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stands: Mask, radius: float
+    rows: Array,
+    channels: Array,
+    drift: Array,
+    limbs: Sequence[Limb],
+    stands: Mask,
+    radius: float,
+    stride: float,
+    sway: Array,
 ) -> Array:
     """Rows of a led clip whose feet stand where they stand, and whose root is low enough for that.
 
@@ -125,13 +153,19 @@ def with_planted_ends(
         Which of them stand.
     radius : float
         How high over the floor their points are then [m].
+    stride : float
+        Way of a lap [m]; shorter than the clip's, each step is shorter by the same share.
+    sway : Array, shape (m, 2)
+        By which the root is moved over the floor [m], at m equal steps of the lap.
     """
     first, result, short = channels.shape[1], rows.copy(), list[Array]()
+    result[:, 0] *= stride / drift[0]
+    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
     for j, limb in enumerate(limbs):
         at, column = first + END * j, 3 + 4 * limb.joints[2]
         quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius)
         result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
-        short.append(shortfall(rows, result, float(drift[0]), limb, at))
+        short.append(shortfall(result, stride, limb, at))
     # By the same all the time: a root that bobbed for its legs would weigh more and less.
     result[:, 2] -= np.max(short)
-    return reached(result, float(drift[0]), limbs)
+    return reached(result, stride, limbs)

@@ -12,26 +12,32 @@ from scipy.spatial.transform import Rotation
 from controllers.haptic_map.limbs import END, Limb
 from controllers.state import Array
 
-_STRETCHED = 0.985  # of its length a limb may have between its ends, or as much as in the clip
+_STRETCHED = 0.99  # of its length a limb may have between its ends: straighter, its joint turns ever faster
 _LEAST_BEND = 0.03  # [rad]
 
 
-def shortfall(clip: Array, rows: Array, stride: float, limb: Limb, at: int) -> Array:
+def extension(rows: Array, stride: float, limb: Limb, at: int) -> float:
+    """How long a limb is between its first joint and its last at most [m]; parameters as in `shortfall`."""
+    return float(np.linalg.norm(_line(rows, stride, limb, at), axis=1).max())
+
+
+def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 0.0) -> Array:
     """How much lower the root must be for a limb to reach its end [m], shape (n,).
 
     Parameters
     ----------
-    clip, rows : Array, shape (n, nq + 5 limbs)
-        Channels (`led`) as they were and as they are to be.
+    rows : Array, shape (n, nq + 5 limbs)
+        Channels (`led`).
     stride : float
         Way of a lap [m], along x.
     limb : Limb
     at : int
         First column of its end.
+    longest : float
+        How long it may be [m], if that is more than what leaves its middle joint well bent.
     """
-    length = float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2]))
-    was, line = (_line(channels, stride, limb, at) for channels in (clip, rows))
-    longest = max(_STRETCHED * length, float(np.linalg.norm(was, axis=1).max()))
+    longest = max(_STRETCHED * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
+    line = _line(rows, stride, limb, at)
     away = np.linalg.norm(line[:, :2], axis=1)
     return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))
 

@@ -21,7 +21,6 @@ _CERTAIN = 0.005  # what is lower than this touches, however fast [m]
 _REACH, _HAND_REACH = 0.06, 0.12  # what is higher than this does not, however slow [m]
 _SLOW = 0.6  # m/s: soles that stand slip and roll slower, soles that fly pass faster
 _HIGHER = 0.005  # what has come to rest on the floor is not so much higher than later [m]
-_SKIDS = 0.2  # share of a stance for which it may skid before and after
 _LOW, _LEVEL = 0.03, 0.25  # what is lower [m] and hardly rises or sinks [m/s] skids over the floor
 
 
@@ -65,21 +64,14 @@ class Contacts(NamedTuple):
 
     @property
     def settled(self) -> Mask:
-        """Whether each foot stands, no higher than it does for most of that stance, left and right, shape (n, 2).
-
-        It is at rest, or so a moment before or after: captures skid as they land.
-        """
+        """Whether each foot stands at rest, no higher than for most of that stance, left and right, shape (n, 2)."""
         settled = self.planted
         for foot, stands in enumerate(settled.T):
             lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
             edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(int), [0]))))
             for start, end in zip(edges[::2], edges[1::2], strict=True):
                 level = float(np.median(lowest[start:end]))
-                around = max(1, round(_SKIDS * (end - start)))
                 settled[start:end, foot] = lowest[start:end] < level + _HIGHER
-                for moment in (np.arange(start - 1, start - 1 - around, -1), np.arange(end, end + around)):
-                    inside = moment[(moment >= 0) & (moment < len(lowest))]
-                    settled[inside[np.cumprod(lowest[inside] < level + _HIGHER) > 0], foot] = True
         return settled
 
 

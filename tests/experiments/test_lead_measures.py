@@ -5,6 +5,7 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
+from controllers.haptic_map.led import Led
 from experiments.cli import main
 from experiments.clips import load_clips
 from experiments.config import RunConfig
@@ -13,7 +14,7 @@ from experiments.lead import gait_remark, law, leading_hand, led_map, s_curve, w
 from experiments.lead_measures import LeadSummary, _Retrace, _Soles, support_at
 from experiments.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
-from models.mocap.clip import PlanarDisplacement
+from models.mocap.clip import Clip, PlanarDisplacement
 from models.mocap.library import embedded
 from models.scene import SceneConfig
 from sim.world import phantom_angles
@@ -85,11 +86,17 @@ def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int
 
 def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     legs = figure_legs(figure_model())
-    _, walk = led_map(embedded("walk"), legs, 0)
-    led, run = led_map(embedded("run"), legs, 0)
-    assert gait_remark("walk", walk, False) == ()
-    assert "led slowly it goes without flights" in gait_remark("run", run, led.grounds)[0]
-    assert "may fall where it is slow" in gait_remark("hop", run, False)[0]
+    walk, run = (led_map(embedded(name), legs, 0)[0] for name in ("walk", "run"))
+    jerked = embedded("run").poses.copy()
+    jerked[-20:, 7:11] = jerked[-21, 7:11]
+    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), legs, 0)
+    assert gait_remark("walk", walk) == ()
+    assert "led slowly it goes without flights" in gait_remark("run", run)[0]
+    assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture)[0]
+    standing = np.zeros((8, 2), dtype=bool)
+    standing[:4, 0] = True
+    hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, 0, standing)
+    assert "may fall where it is slow" in gait_remark("hop", hop)[0]
 
 
 def test_the_lines_tell_it() -> None:

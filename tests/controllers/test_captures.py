@@ -1,0 +1,59 @@
+"""Captures that are led: noise above the cutoff goes, what is below stays, round the lap."""
+
+import numpy as np
+import pytest
+from scipy import signal
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.haptic_map.captures import Capture, lap_signs, low_passed
+
+N, DURATION = 256, 1.25
+
+
+def waves(frequency: float, size: float) -> np.ndarray:
+    """A lap whose root moves up and down, and whose one joint is bent, at a frequency [Hz]."""
+    t = DURATION * np.arange(N) / N
+    wave = size * np.sin(2.0 * np.pi * frequency * t)
+    quaternions = Rotation.from_rotvec(np.outer(wave, [0.0, 1.0, 0.0])).as_quat(scalar_first=True)
+    return np.concatenate([np.outer(wave, [0.0, 0.0, 1.0]), quaternions], axis=1)
+
+
+@pytest.mark.parametrize("cycles", [1, 4, 8, 16, 32])
+def test_each_frequency_is_let_through_as_the_filter_says(cycles: int) -> None:
+    frequency, cutoff = cycles / DURATION, 5.0
+    size = 0.01
+    passed = low_passed(waves(frequency, size), DURATION, cutoff)
+    share = 1.0 / (1.0 + (frequency / cutoff) ** 4)
+    np.testing.assert_allclose(passed[:, 2], share * waves(frequency, size)[:, 2], atol=1e-12)
+    bent = Rotation.from_quat(passed[:, 3:], scalar_first=True).as_rotvec()[:, 1]
+    np.testing.assert_allclose(bent, share * waves(frequency, size)[:, 2], atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(passed[:, 3:], axis=1), 1.0, atol=1e-15)
+
+
+def test_it_is_what_a_butterworth_filter_does_forwards_and_backwards() -> None:
+    rng = np.random.default_rng(1)
+    lap = waves(0.8, 0.1)
+    lap[:, 2] += 0.02 * rng.normal(size=N)
+    laps = np.tile(lap[:, 2], 9)
+    sections = signal.butter(2, 5.0, fs=N / DURATION, output="sos")
+    twice = signal.sosfiltfilt(sections, laps)[4 * N : 5 * N]
+    np.testing.assert_allclose(low_passed(lap, DURATION, 5.0)[:, 2], twice, atol=2e-4)
+
+
+def test_a_rotation_that_comes_back_with_the_opposite_sign_is_one() -> None:
+    angle = 2.0 * np.pi * np.arange(N) / N
+    turning = Rotation.from_rotvec(np.outer(angle, [0.0, 0.0, 1.0])).as_quat(scalar_first=True)
+    # Followed continuously, one turn ends at −q.
+    turning[turning[:, 3] < 0.0] *= -1.0
+    lap = np.concatenate([np.zeros((N, 3)), turning], axis=1)
+    assert lap_signs(lap, 1).tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+    passed = Rotation.from_quat(low_passed(lap, DURATION, 5.0)[:, 3:], scalar_first=True)
+    difference = passed * Rotation.from_quat(turning, scalar_first=True).inv()
+    assert difference.magnitude().max() < 1e-6
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 5.0, 0.75), (0.02, np.nan, 0.75), (0.02, 5.0, -1.0)])
+def test_a_capture_has_positive_numbers(numbers: tuple[float, float, float]) -> None:
+    with pytest.raises(ParameterError, match="all positive"):
+        Capture(*numbers)
