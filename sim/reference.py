@@ -305,7 +305,10 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
         If the bandwidth is not positive, or too high for the period; or the blend time negative or not finite.
     """
     if not 0.0 < bandwidth < 0.5 / period:
-        raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
+        raise SimError(
+            f"smoothing, the bandwidth of the stylus filter, is {bandwidth} Hz; expected more than 0 and less than "
+            f"{0.5 / period:g} Hz"
+        )
     if not 0.0 <= blend < math.inf:
         raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
 
