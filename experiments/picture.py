@@ -66,7 +66,7 @@ class _Stage:
     ) -> None:
         """Add a rod or an arrow between two points of the world."""
         scene = self._renderer.scene
-        kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow else mujoco.mjtGeom.mjGEOM_CAPSULE
+        kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow else mujoco.mjtGeom.mjGEOM_CYLINDER
         geom = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(rgba, dtype=np.float32))
         mujoco.mjv_connector(geom, kind, width, start, end)
