@@ -48,14 +48,14 @@ def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, di
     Raises
     ------
     SimError
-        If the file is none of these, or damaged.
-    OSError
-        If it cannot be read.
+        If the file cannot be read, is none of these, or damaged.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
             version, kind = int(archive["version"]), str(archive["kind"])
             arrays: dict[str, Array] = {str(key): archive[str(i)] for i, key in enumerate(archive["keys"])}
+    except OSError as error:
+        raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a {what}") from None
     except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile) as error:
         raise SimError(f"{path}: is no file of a {what}, or damaged ({error})") from None
     if version != VERSION:

@@ -7,7 +7,6 @@ _STARTED = time.perf_counter()
 # The matrices here are small: more threads only get into each other's way. Read by NumPy when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import json  # noqa: E402
 import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
 from dataclasses import dataclass, field  # noqa: E402
@@ -22,6 +21,8 @@ from controllers.certificates.tolerance import BallisticTolerance, Judging  # no
 from controllers.errors import ControllerError  # noqa: E402
 from controllers.haptic_map.room import Room  # noqa: E402
 from experiments.config import ArmConfig, RunConfig  # noqa: E402
+from experiments.json_text import json_text  # noqa: E402
+from experiments.options import above, at_least, check_numbers  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -94,7 +95,7 @@ class Track:
 
     clips: Positional[tuple[str, ...]] = ()
     """Names of embedded clips, or files; all embedded clips by default."""
-    seconds: float = 10.0
+    seconds: float = above(0.0, 10.0, "s")
     """Simulated time for each [s]."""
     json: bool = False
     """Print the reports as JSON."""
@@ -119,15 +120,15 @@ class Certify:
     out: Path | None = None
     """Folder for the certificate, runs/certificate by default, runs/certificate-CLIP of a clip; one that is there
     already is taken if nothing has changed."""
-    delay: float = 0.0
+    delay: float = at_least(0.0, 0.0, "s")
     """Of the motors' torques, for a field [s]."""
-    hand_push: float = 1.0
+    hand_push: float = at_least(0.0, 1.0, "N")
     """Largest force of the hand for which the distance from the curve is bounded [N]."""
     hand: HandRange = field(default_factory=HandRange)
     no_hand: bool = False
     """Certify for nobody's hand on the stylus."""
     tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
-    friction: float = Judging.friction
+    friction: float = above(0.0, Judging.friction)
     """Coefficient of friction of soles on the floor, for clips."""
     verify: Path | None = None
     """Only check that this certificate.json is of the same field, hands, clips and code; exit code 1 if it is not."""
@@ -140,7 +141,7 @@ class Certify:
         if certificate is None:
             return 1
         if self.json:
-            print(json.dumps(certificate.to_json(), indent=2))
+            print(json_text(certificate.to_json()))
             return 0
         if self.verify is not None:
             print(f"{self.verify}: all that it is of is as it was")
@@ -238,7 +239,7 @@ class Lift:
     room: Room = field(default_factory=Room)
     cyclic: tuple[str, ...] = ()
     """Clips that have to close; by default all those are closed curves that do."""
-    seed: int = 1
+    seed: int = at_least(0, 1)
     """Of the places from which the arrangement begins."""
     overwrite: bool = False
     """Replace the file if it exists."""
@@ -250,7 +251,7 @@ class Lift:
         from experiments.lift import lift_into
 
         report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
-        print(json.dumps(report.to_json(), indent=2) if self.json else "\n".join(report.lines()))
+        print(json_text(report.to_json()) if self.json else "\n".join(report.lines()))
         return 0
 
 
@@ -344,11 +345,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     command: Command = tyro.cli(Command, prog="hvf", args=arguments, description=__doc__)  # pyright: ignore[reportArgumentType, reportUnknownVariableType, reportCallIssue]
     try:
+        check_numbers(command)
         return command()
     except BrokenPipeError:
         raise
-    except (ModelError, ControllerError, SimError, OSError) as error:
+    except (ModelError, ControllerError, SimError) as error:
         print(f"hvf: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        said = f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else error
+        print(f"hvf: {said}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("hvf: stopped; what was recorded so far is kept", file=sys.stderr)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from experiments.options import above, at_least
 from models.scene import SceneConfig
 from sim.users.intent import Grab, Push, Turn
 
@@ -80,7 +81,7 @@ class RunConfig:
         Metres of floor for one of the stylus, where a figure is led; by default such that it goes along the default S
         in five seconds.
     seek : float
-        k_f, with which stretchy tubes draw the hand to the curve [N/m].
+        k_f, with which stretchy tubes draw the hand to the curve [N/m]; on a map from a file it is `lifted_stiffness`.
     rubber : float
         k_s of a held or pushed tube [N/m].
     rubber_tube : float
@@ -125,41 +126,41 @@ class RunConfig:
     curve: str = ""
     expressive: bool = False
     user: Literal["relaxed", "trace", "push", "turn"] = "relaxed"
-    seconds: float = 20.0
-    seed: int = 1
-    stiffness: float = 300.0
-    damping: float = 8.0
-    river_stiffness: float = 150.0
-    river_damping: float = 16.0
-    lifted_stiffness: float = 50.0
-    lifted_damping: float = 20.0
-    tube: float = 0.25
-    orientation_stiffness: float = 0.0
-    orientation_damping: float = 0.0
-    bunny_width: float = 0.05
+    seconds: float = above(0.0, 20.0, "s")
+    seed: int = at_least(0, 1)
+    stiffness: float = at_least(0.0, 300.0, "N/m")
+    damping: float = at_least(0.0, 8.0, "N s/m")
+    river_stiffness: float = above(0.0, 150.0, "N/m")
+    river_damping: float = above(0.0, 16.0, "N s/m")
+    lifted_stiffness: float = above(0.0, 50.0, "N/m")
+    lifted_damping: float = above(0.0, 20.0, "N s/m")
+    tube: float = at_least(1e-4, 0.25, "m", infinite=True)
+    orientation_stiffness: float = at_least(0.0, 0.0, "N m/rad")
+    orientation_damping: float = at_least(0.0, 0.0, "N m s/rad")
+    bunny_width: float = at_least(1e-4, 0.05, "m")
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
-    river_tube: float = 0.015
+    river_tube: float = at_least(1e-4, 0.015, "m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
-    blend: float = 0.4
+    blend: float = at_least(0.0, 0.4, "s")
     governor: bool = False
-    governor_drag: float = 8.0
-    leash: float = 120.0
-    floor_scale: float | None = None
-    seek: float = 150.0
-    rubber: float = 150.0
-    rubber_tube: float = 0.008
+    governor_drag: float = at_least(0.0, 8.0, "N s/m")
+    leash: float = at_least(0.0, 120.0, "N/m")
+    floor_scale: float | None = at_least(1e-3, None)
+    seek: float = at_least(0.0, 150.0, "N/m")
+    rubber: float = at_least(0.0, 150.0, "N/m")
+    rubber_tube: float = at_least(1e-4, 0.008, "m")
     walls: bool = False
-    wall_stiffness: float = 0.1
-    wall_margin: float = 0.09
-    joint_speed: float = 20.0
-    bump: float = 0.5
-    lap: float = 4.0
-    radius: float = 0.0477
-    reach: float = 0.025
-    cutoff: float = 150.0
-    smoothing: float = 6.0
-    figure_ticks: int = 0
+    wall_stiffness: float = at_least(0.0, 0.1, "N m/rad")
+    wall_margin: float = at_least(1e-6, 0.09, "rad")
+    joint_speed: float = at_least(1e-6, 20.0, "rad/s", infinite=True)
+    bump: float = above(0.0, 0.5, "s")
+    lap: float = above(0.0, 4.0, "s")
+    radius: float = above(0.0, 0.0477, "m")
+    reach: float = above(0.0, 0.025, "m")
+    cutoff: float = above(0.0, 150.0, "Hz")
+    smoothing: float = above(0.0, 6.0, "Hz")
+    figure_ticks: int = at_least(0, 0)
     scene: SceneConfig = field(default_factory=SceneConfig)
     pushes: tuple[Push, ...] = ()
     turns: tuple[Turn, ...] = ()
@@ -210,14 +211,14 @@ class ArmConfig:
     """
 
     user: Literal["relaxed", "push"] = "push"
-    seconds: float = 12.0
-    seed: int = 1
-    stiffness: float = 300.0
-    damping: float = 8.0
-    tube: float = 0.25
-    lap: float = 4.0
-    radius: float = 0.05
-    cutoff: float = 150.0
-    smoothing: float = 6.0
-    arm_ticks: int = 4
+    seconds: float = at_least(1.5, 12.0, "s")
+    seed: int = at_least(0, 1)
+    stiffness: float = at_least(0.0, 300.0, "N/m")
+    damping: float = at_least(0.0, 8.0, "N s/m")
+    tube: float = at_least(1e-4, 0.25, "m", infinite=True)
+    lap: float = above(0.0, 4.0, "s")
+    radius: float = above(0.0, 0.05, "m")
+    cutoff: float = above(0.0, 150.0, "Hz")
+    smoothing: float = above(0.0, 6.0, "Hz")
+    arm_ticks: int = at_least(1, 4)
     scene: SceneConfig = field(default_factory=SceneConfig)

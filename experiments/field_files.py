@@ -30,9 +30,7 @@ def load_field(path: Path) -> RiverBundle | Edited:
     Raises
     ------
     SimError
-        If the file is none of these, or what it holds makes no field.
-    OSError
-        If it cannot be read.
+        If the file cannot be read, is none of these, or what it holds makes no field.
     """
     kind, arrays = read_archive(path, _KINDS, "field")
     try:

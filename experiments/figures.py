@@ -1,7 +1,8 @@
 """The figures of a run, drawn from its recording and nothing else.
 
 What is read: arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
-texts ``tube_name`` and ``hand_does``, "tube" and "pushes" without them; when a bent curve is performed, in the summary;
+texts ``tube_name``, ``hand_does`` and ``distance_from``, "tube", "pushes" and "the curve" without them; of rivers
+``river_curves`` and ``river_names``; when a bent curve is performed, in the summary;
 in group ``ticks`` the channels t, p, distance, force, user and torque; in group ``frames`` the channels t, joint_error,
 root_error, residual, ground and flight. SI units and radians there; millimetres, centimetres and degrees in figures.
 """
@@ -20,6 +21,7 @@ from matplotlib.patches import Circle
 
 from experiments.changes import river_changes
 from sim.recording import Recording
+from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 
 Array = npt.NDArray[np.float64]
@@ -74,48 +76,49 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 def path_figure(recording: Recording) -> Figure:
     """Path of the hand against curve and tube, seen along z and along y of the hand frame [mm]."""
-    curve, path = 1e3 * recording.array("curve"), 1e3 * _rows(recording, "ticks", "p")
-    rivers = 1e3 * recording.arrays.get("river_curves", np.empty((0, 0, 3)))
+    drawn, path = courses(recording.arrays | recording.texts), 1e3 * _rows(recording, "ticks", "p")
     radius = 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
-        ax.add_collection(
-            PatchCollection([Circle((c[i], c[j]), radius) for c in curve], color=PALE_TUBE, zorder=1), autolim=False
-        )
-        ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube(recording))
-        ax.plot(curve[:, i], curve[:, j], color=CURVE, lw=0.8, ls=(0, (4, 3)), label="curve φ", zorder=4)
-        for k, other in enumerate(rivers):
-            ax.plot(other[:, i], other[:, j], color=CURVE, lw=0.6, ls=":", zorder=4, label=None if k else "rivers")
+        for course in drawn:
+            points = 1e3 * course.points[:, (i, j)]
+            ax.plot(*points.T, color=course.line, lw=0.8, ls=(0, (4, 3)), label=course.name or "curve φ", zorder=4)
+            discs = [Circle((float(x), float(y)), radius) for x, y in points]
+            ax.add_collection(PatchCollection(discs, color=PALE_TUBE, zorder=1), autolim=False)
+            ax.update_datalim(np.concatenate([points - radius, points + radius]))
+        if radius > 0.0:
+            ax.plot([], [], color=PALE_TUBE, lw=6.0, label=_tube(recording))
         ax.plot(path[:, i], path[:, j], color=FIELD, label="hand", zorder=2)
         held = np.where(pushed[:, None], path, np.nan)
         if np.any(pushed):
             ax.plot(held[:, i], held[:, j], color=USER, lw=1.6, label=f"where the hand {_does(recording)}", zorder=3)
-        ax.margins(0.3)
+        ax.margins(0.1)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
     return figure
 
 
 def deviation_figure(recording: Recording) -> Figure:
-    """Distance of the hand from the curve, pushes shaded, and again at a scale for a hand left alone [mm]."""
+    """Distance of the hand from what leads it, pushes shaded, and again at a scale for a hand left alone [mm]."""
     t = _rows(recording, "ticks", "t")
     distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
         _shade(ax, t, pushed, PALE_USER, f"hand {_does(recording)}")
-        if radius < 1.05 * np.max(distance):
+        if 0.0 < radius < 1.05 * np.max(distance):
             ax.axhline(radius, color=TUBE, lw=0.8, ls="--", label=f"edge of the {_tube(recording)}")
         ax.plot(t, distance, color=CURVE)
         ax.set(ylabel="d [mm]", xlim=(t[0], t[-1]))
         _mark_changes(ax, recording)
     left_alone = distance if np.all(pushed) else distance[~pushed]
-    axes[0].set(title="distance from the curve", ylim=(0, 1.08 * np.max(distance) + 1e-3))
+    source = recording.texts.get("distance_from", "the curve")
+    axes[0].set(title=f"distance of the hand from {source}", ylim=(0, 1.08 * np.max(distance) + 1e-3))
     axes[1].set(title="magnified", ylim=(0, 1.5 * np.percentile(left_alone, 90) + 1e-3), xlabel="time [s]")
     if axes[0].get_legend_handles_labels()[0]:
-        _legend(axes[0])
+        legend_above(axes[0])
     return figure
 
 
@@ -131,7 +134,7 @@ def forces_figure(recording: Recording) -> Figure:
         for axis, color in enumerate(AXES):
             ax.plot(t, force[:, axis], color=color, lw=1.0, label="xyz"[axis])
         ax.set(title=title, ylabel="F [N]", xlim=(t[0], t[-1]))
-    _legend(axes[0])
+    legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
     return figure
 
@@ -144,12 +147,14 @@ def torques_figure(recording: Recording) -> Figure:
     figure, axes = _panels(3, 1, height=4.8)
     for i, ax in enumerate(axes):
         ax.plot(t, torque[:, i], color=AXES[i])
-        for sign in (-1, 1):
-            ax.axhline(sign * continuous[i], color=CURVE, lw=0.8, ls="--", label="continuous" if sign > 0 else None)
-            ax.axhline(sign * peak[i], color=CURVE, lw=0.8, ls=":", label="peak" if sign > 0 else None)
-        reach = max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
-        ax.set(title=f"motor {i + 1}", ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-1.25 * reach, 1.25 * reach))
-    _legend(axes[0])
+        reach = 1.25 * max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
+        for name, limit, dashes in (("continuous", continuous[i], "--"), ("peak", peak[i], ":")):
+            # A limit far beyond what the motor gave would only make that small.
+            for line in (-limit, limit) if limit < reach else ():
+                ax.axhline(line, color=CURVE, lw=0.8, ls=dashes, label=name if line > 0.0 else None)
+        title = f"motor {i + 1}: {continuous[i]:.0f} mN m for long, {peak[i]:.0f} mN m for a moment"
+        ax.set(title=title, ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-reach, reach))
+    legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
     return figure
 
@@ -174,7 +179,7 @@ def tracking_figure(recording: Recording) -> Figure:
         ax.set_ylim(bottom=0)
         _mark_changes(ax, recording)
     if np.any(flight):
-        _legend(axes[0])
+        legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
     return figure
 
@@ -190,7 +195,7 @@ def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]
     return figure, list(grid.ravel())
 
 
-def _legend(ax: Axes) -> None:
+def legend_above(ax: Axes) -> None:
     """In a row above the axes, where it hides no data."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
 
@@ -209,10 +214,15 @@ def _mark_changes(ax: Axes, recording: Recording) -> None:
     performance = (recording.summary or {}).get("performance")
     if isinstance(performance, dict):
         marks.append((float(cast(dict[str, float], performance)["start"]), "performed"))
+    low, high = ax.get_xlim()
+    last, row = -np.inf, 0
     for t, name in marks:
+        # A name that the next line would run through is below the one before.
+        row = row + 1 if t - last < 0.1 * (high - low) else 0
+        last = t
         ax.axvline(t, color=USER, lw=0.8)
         ax.annotate(
-            name, (t, 1.0), (2, -2), xycoords=("data", "axes fraction"), textcoords="offset points", va="top",
+            name, (t, 1.0), (2, -2 - 9 * row), xycoords=("data", "axes fraction"), textcoords="offset points", va="top",
             fontsize=7, color=USER,
         )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""A led figure that is captured, or goes too slowly to fly, stands on its feet: its root sways (`experiments.balance`)."""
+"""Led figures that are captured, or go too slowly to fly, stand on their feet: they sway (`experiments.balance`)."""
 
 import mujoco
 import numpy as np

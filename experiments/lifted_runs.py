@@ -96,7 +96,8 @@ def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
         If the Phantom does not reach the curve.
     """
     damping = config.gains[1]
-    return paced(curve, damping) if config.mode in ("follow", "rivers") and damping > 0.0 else curve
+    leads = config.mode in ("follow", "rivers", "stretch-then-follow")
+    return paced(curve, damping) if leads and damping > 0.0 else curve
 
 
 def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:

@@ -34,9 +34,7 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
     Raises
     ------
     SimError
-        If the file is none of these, or what it holds makes no map.
-    OSError
-        If it cannot be read.
+        If the file cannot be read, is none of these, or what it holds makes no map.
     """
     kind, arrays = read_archive(path, _KINDS, "map")
     try:
@@ -52,8 +50,6 @@ def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple
     ------
     SimError
         As `load_map`, or if its poses are not the figure's.
-    OSError
-        If it cannot be read.
     """
     haptic_map = load_map(path)
     if haptic_map.nq != N_POSE:

@@ -13,6 +13,8 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import PlanarDisplacement
 from models.scene import FIGURE, P_WH, PHANTOM, world_model
 from sim.recording import Recording
+from sim.viewer.courses import courses
+from sim.viewer.palette import rgb
 
 Array = npt.NDArray[np.float64]
 
@@ -21,12 +23,8 @@ DEVICE_SHARE = 0.36  # of the width
 MOMENTS = 5  # of the figure, evenly over the second half of the run
 SPACING = 1.25  # between them [m]
 GHOST_AT = np.array([-0.75, 0.0])  # of the animation, behind the physical figure [m]
-GREEN, SLATE, TUBE, GHOST = (
-    (0.13, 0.63, 0.27, 1.0),
-    (0.24, 0.27, 0.35, 1.0),
-    (0.3, 0.55, 0.85, 0.22),
-    (0.3, 0.55, 0.85, 0.4),
-)
+GREEN, GHOST = (0.13, 0.63, 0.27, 1.0), (0.3, 0.55, 0.85, 0.4)
+MOST_GEOMS = 20_000
 
 
 class _Stage:
@@ -68,7 +66,7 @@ class _Stage:
     ) -> None:
         """Add a rod or an arrow between two points of the world."""
         scene = self._renderer.scene
-        kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow else mujoco.mjtGeom.mjGEOM_CAPSULE
+        kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow else mujoco.mjtGeom.mjGEOM_CYLINDER
         geom = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(rgba, dtype=np.float32))
         mujoco.mjv_connector(geom, kind, width, start, end)
@@ -92,9 +90,9 @@ def draw_picture(folder: Path, target: Path) -> None:
         model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
         model.vis.quality.offsamples = 8
         left = round(DEVICE_SHARE * WIDTH)
-        with mujoco.Renderer(model, HEIGHT, left, max_geom=4000) as renderer:
+        with mujoco.Renderer(model, HEIGHT, left, max_geom=MOST_GEOMS) as renderer:
             device = _device(recording, _Stage(model, renderer))
-        with mujoco.Renderer(model, HEIGHT, WIDTH - left, max_geom=4000) as renderer:
+        with mujoco.Renderer(model, HEIGHT, WIDTH - left, max_geom=MOST_GEOMS) as renderer:
             figures = _figures(recording, _Stage(model, renderer))
     matplotlib.image.imsave(target, np.hstack((device, figures)))
 
@@ -105,18 +103,25 @@ def _camera(lookat: Array, distance: float, azimuth: float, elevation: float) ->
     return camera
 
 
+def _rgba(color: str, opacity: float) -> tuple[float, float, float, float]:
+    red, green, blue = rgb(color)
+    return red / 255, green / 255, blue / 255, opacity
+
+
 def _device(recording: Recording, stage: _Stage) -> npt.NDArray[np.uint8]:
-    """The Phantom at the hardest push, with the curve in its tube and the force of the field."""
+    """The Phantom at the hardest push, with its curve or rivers in their tubes and the force of the field."""
     user, force, p = (recording.channel("ticks", name)[:] for name in ("user", "force", "p"))
     tick = int(np.argmax(np.linalg.norm(user, axis=1)))
     t = recording.channel("ticks", "t")[tick]
     frame = int(np.argmin(np.abs(recording.channel("frames", "t")[:] - t)))
     stage.clear(_camera(P_WH + np.array([0.06, 0.0, 0.0]), 0.75, 62.0, -20.0), table=True)
     stage.add(recording.channel("frames", "qpos")[frame], figure=False)
-    curve = P_WH + recording.array("curve")
-    for start, end in itertools.pairwise(curve):
-        stage.line(start, end, 0.0012, SLATE, arrow=False)
-        stage.line(start, end, float(recording.array("tube_radius")) / 3.0, TUBE, arrow=False)
+    radius = float(recording.array("tube_radius")) / 3.0
+    for course in courses(recording.arrays | recording.texts):
+        for start, end in itertools.pairwise(P_WH + course.points):
+            stage.line(start, end, 0.0012, _rgba(course.line, 1.0), arrow=False)
+            if radius > 0.0:
+                stage.line(start, end, radius, _rgba(course.tube, 0.22), arrow=False)
     path = P_WH + p[max(0, tick - 600) : tick + 1 : 20]
     for start, end in itertools.pairwise(path):
         stage.line(start, end, 0.0018, GREEN, arrow=False)

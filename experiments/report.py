@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 
 from sim.recording import Recording
+from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
 from sim.viewer.replay_html import FIGURE_TARGET, MAGNIFICATION, SECONDS, Target, drawn_tube, replay_html
 
@@ -36,7 +37,7 @@ img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
 <iframe title="Replay in 3D" srcdoc="{replay}"></iframe>
 <p>Drag to turn, wheel to zoom, right button to move; space plays and pauses, the bar scrubs.
 <b style="color:{field}">Green</b> arrow: force of the field. <b style="color:{user}">Orange</b> arrow: force of the
-hand; where that is above {push:g} N, the path is orange too. Light blue: the {name} around the curve{tube}. {curves}
+hand; where that is above {push:g} N, the path is orange too. {curves}
 {replayed}
 The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
 their true size.</p>
@@ -92,9 +93,7 @@ def write_report(
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
             replay=html.escape(replay_html(recording, model, target)),
             replayed=replayed,
-            name=recording.texts.get("tube_name", "tube"),
-            tube=tube,
-            curves=_curves(recording),
+            curves=_curves(recording, tube),
             push=PUSH,
             field=FIELD,
             user=USER,
@@ -107,9 +106,12 @@ def write_report(
     )
 
 
-def _curves(recording: Recording) -> str:
-    """What is said where the curve that is drawn is not all there is to it."""
-    if "river_names" in recording.texts:
-        return "Of the rivers the one is drawn on which the run begins."
+def _curves(recording: Recording, tube: str) -> str:
+    """The colours of the curve and of what is about it, or of each river; and where that is not all there is to it."""
+    name, drawn = recording.texts.get("tube_name", "tube"), courses(recording.arrays | recording.texts)
+    if drawn[0].name:
+        rivers = ", ".join(f'<b style="color:{course.line}">{html.escape(course.name)}</b>' for course in drawn)
+        return f"The rivers, each in its {name}{tube}: {rivers}."
     bent = str(recording.config.get("mode", "")).startswith("stretch")
-    return "The curve is drawn as it was before it was bent." if bent else ""
+    about = f"Light blue: the {name} around the curve{tube}." if recording.array("tube_radius") > 0.0 else ""
+    return about + " The curve is drawn as it was before it was bent." * bent

@@ -1,6 +1,5 @@
 """Telerobotics: the same field and the same loop lead a robot arm of seven joints instead of a human figure."""
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from experiments.compiling import compile_once, compiled_parts
 from experiments.config import ArmConfig
 from experiments.figures import STYLE
 from experiments.hands import lap_pushes
+from experiments.json_text import json_text
 from experiments.report import write_report
 from experiments.run import RECORDING, REPORT, SUMMARY, check_folder
 from models.phantom.parameters import PREMIUM_1_5
@@ -233,7 +233,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
         with Recording(out / RECORDING) as recording:
             summary = arm_summary(recording, world.arm, config, times.real_time_factor)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
-    (out / SUMMARY).write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
+    (out / SUMMARY).write_text(json_text(asdict(summary)) + "\n", encoding="utf-8")
     with Recording(out / RECORDING) as recording:
         with mpl.rc_context(STYLE):
             arm_figure(recording).savefig(out / FIGURE, dpi=150)

@@ -1,6 +1,5 @@
 """A run from a configuration to a folder: recording, summary, animations, figures, page."""
 
-import json
 import shutil
 import time
 from collections.abc import Callable
@@ -21,6 +20,7 @@ from experiments.compiling import compile_once
 from experiments.config import STRETCHING, RunConfig
 from experiments.figure_maps import packed_legs
 from experiments.hands import handled, stylus_path
+from experiments.json_text import json_text
 from experiments.lead import walker_argument
 from experiments.lead_measures import lead_summary
 from experiments.measures import BLOCK_FRAMES, summarise, trace_summary
@@ -42,6 +42,7 @@ from sim.recording import Recording
 from sim.reference import make_reference, poses_along, reference_along
 from sim.servo import FrameLog, TickLog
 from sim.users.intent import Grab, Push, Turn
+from sim.viewer.courses import courses
 from sim.viewer.page import LivePage, NullPage, Page
 
 Array = npt.NDArray[np.float64]
@@ -95,7 +96,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         told = asdict(summary) | {"lines": summary.lines()}
         recorder.close(told)
     _write_animations(out, session)
-    (out / SUMMARY).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    (out / SUMMARY).write_text(json_text(told) + "\n", encoding="utf-8")
     write_report_of(out)
     for line in summary.lines():
         print(line)
@@ -183,7 +184,7 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
 
 def _live_page(session: Session) -> Page:
     static = session.static()
-    return LivePage(session.world.model, np.asarray(static["curve"]), float(np.asarray(static["tube_radius"])), P_WH)
+    return LivePage(session.world.model, courses(static), float(np.asarray(static["tube_radius"])), P_WH)
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.leading import Leading
 from controllers.haptic_map.animation import ClipMap
@@ -25,6 +26,8 @@ from sim.world import World
 
 HAND_DOES = {"stretch": "grabs or pushes", "stretch-then-follow": "grabs or pushes", "lead": "leads"}
 """What a hand that exerts a force does, in modes in which it does not just push; in figures."""
+DISTANCE_FROM = {"rivers": "its river", "lead": "the figure's path"}
+"""What the recorded distance is from, in modes in which that is not the one curve; in figures."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class Session:
             "curve_span": np.array([self.curve.start, self.curve.end]),
             "curve_closed": float(self.curve.periodic),
             **self._tube(),
+            "distance_from": DISTANCE_FROM.get(self.config.mode, "the curve"),
             "hand_does": HAND_DOES.get(self.config.mode, "traces" if self.config.user == "trace" else "pushes"),
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
@@ -67,16 +71,19 @@ class Session:
         }
 
     def _tube(self) -> dict[str, npt.ArrayLike | str]:
-        """Radius of what is drawn about the curve [m], and what that is."""
+        """Radius of what is drawn about the curve [m], and what that is; 0 where there is nothing about it."""
         tubes = {"rivers": self.config.river_tube} | dict.fromkeys(STRETCHING, self.config.rubber_tube)
         if self.config.mode in tubes:
             return {"tube_radius": tubes[self.config.mode], "tube_name": "tube"}
+        if self.config.mode == "lead":
+            return {"tube_radius": 0.0}
         return {"tube_radius": self.config.reach, "tube_name": "map's domain"}
 
     def _rivers(self) -> dict[str, npt.ArrayLike | str]:
-        """Names and curves of the rivers of a field that gives the hand to one of them."""
-        if not isinstance(self.field, HigherOrder):
+        """Names and curves of a field's rivers."""
+        if not isinstance(self.field, HigherOrder | RiverBundle):
             return {}
-        bundle, share = self.field.bundle, np.linspace(0.0, 1.0, 241)
+        bundle = self.field.bundle if isinstance(self.field, HigherOrder) else self.field
+        share = np.linspace(0.0, 1.0, 241)
         curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
         return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}

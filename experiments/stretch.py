@@ -12,6 +12,8 @@ from controllers.errors import CurveError
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.config import RunConfig
+from models.mocap.clip import Clip
+from models.mocap.contacts import contacts
 from sim.errors import SimError
 from sim.users.intent import Grab
 
@@ -23,11 +25,17 @@ REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap
 OUTSIDE = (
     2.2  # radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third
 )
+EASE = 1.0  # [s] in which the performance of the bent curve comes to its pace
+LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other
+_BLINK = 0.05  # [s] a flight lasts longer
 PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
 
 
-def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> StretchyTubes:
+def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...], lifted: bool = False) -> StretchyTubes:
     """Field of the modes "stretch", and "stretch-then-follow", which performs once the last grab is over.
+
+    On a lifted map the search is as soft as rivers there are: what the hand does, the figure has to do, and curves
+    that are near each other hold different motions.
 
     Raises
     ------
@@ -38,10 +46,35 @@ def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Stretc
     if config.mode == "stretch-then-follow":
         then = Follow(curve, config.stiffness, config.damping, config.tube)
         until = edited_until(grabs)
+    seek, damping = (config.lifted_stiffness, config.lifted_damping) if lifted else (config.seek, DAMPING)
     return StretchyTubes(
-        curve, config.seek, config.rubber, DAMPING, epsilon=config.rubber_tube, width=config.bump,
-        until=np.inf if until is None else until, then=then,
+        curve, seek, config.rubber, damping, epsilon=config.rubber_tube, width=config.bump,
+        until=np.inf if until is None else until, then=then, ease=EASE,
     )  # fmt: skip
+
+
+def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
+    """What is said of clips that fly where a hand may hold them: a body in the air falls with g."""
+    flying: list[str] = []
+    over: list[str] = []
+    for clip in clips:
+        air = ~contacts(clip).supported
+        longest = max((len(run) for run in "".join("x" if flies else " " for flies in air).split()), default=0)
+        if longest <= _BLINK * clip.fps:
+            continue
+        flying.append(clip.name)
+        # The height of the root's own vertical axis.
+        if np.any(clip.poses[air, 4] ** 2 + clip.poses[air, 5] ** 2 > 0.5):
+            over.append(clip.name)
+    remarks: list[str] = []
+    if flying:
+        remarks.append(
+            f"nobody hovers: where the hand is slower than the clips, the flights of {', '.join(flying)} are let down "
+            "to the floor, and a run may fall there"
+        )
+    if over:
+        remarks.append(f"who turns over in the air ({', '.join(over)}) and is held there falls")
+    return tuple(remarks)
 
 
 def edited_until(grabs: tuple[Grab, ...]) -> float:
@@ -49,7 +82,7 @@ def edited_until(grabs: tuple[Grab, ...]) -> float:
     return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
-def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
+def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tuple[Grab, ...]:
     """What a hand does by default, in thirteen seconds.
 
     It pulls the curve outwards, pulls it up, takes that back and does it again by a short and a long click, and pushes
@@ -61,19 +94,21 @@ def stretch_grabs(curve: Trajectory, epsilon: float) -> tuple[Grab, ...]:
         φ, in the hand frame H.
     epsilon : float
         Radius of its tube [m].
+    share : float
+        Of the ways by which it bends the curve.
     """
     phases = curve.start + curve.duration * np.array([1.0, 3.0, 5.0]) / 8.0
     first, second, third = curve.point(phases)
     centre = curve.point(np.linspace(curve.start, curve.end, 64, endpoint=not curve.periodic)).mean(axis=0)
     away = (third - centre) / np.linalg.norm(third - centre)
-    outwards = 0.02 * (first - centre) / np.linalg.norm(first - centre)
+    outwards = 0.02 * share * (first - centre) / np.linalg.norm(first - centre)
     still = np.zeros(3)
     doings = (
         (outwards, 1.3, 0.4, first),
-        (np.array([0.0, 0.0, 0.015]), 1.3, 0.4, second),
+        (np.array([0.0, 0.0, 0.015 * share]), 1.3, 0.4, second),
         (still, 0.15, 0.0, None),
         (still, 0.7, 0.0, None),
-        (-(OUTSIDE * epsilon + 0.01) * away, 1.3, 0.4, third + OUTSIDE * epsilon * away),
+        (-(OUTSIDE * epsilon - epsilon + share * (epsilon + 0.01)) * away, 1.3, 0.4, third + OUTSIDE * epsilon * away),
     )
     grabs: list[Grab] = []
     for carry, duration, hold, place in doings:

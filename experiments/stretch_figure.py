@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from experiments.figures import STYLE
 from experiments.stretch import CURVE_FILE, load_curve
 from sim.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
@@ -21,7 +23,8 @@ def draw_stretch(recording: Recording, folder: Path, target: Path) -> None:
     path = recording.channel("ticks", "p")
     thin = path[:: max(1, len(path) // POINTS)]
     phases = np.linspace(bent.start, bent.end, POINTS)
-    stretch_figure(recording.array("curve"), bent.point(phases), thin).savefig(target, dpi=150)
+    with mpl.rc_context(STYLE):
+        stretch_figure(recording.array("curve"), bent.point(phases), thin).savefig(target, dpi=150)
 
 
 def stretch_figure(before: Array, after: Array, path: Array) -> Figure:
@@ -32,7 +35,7 @@ def stretch_figure(before: Array, after: Array, path: Array) -> Figure:
     before, after, path : Array
         Points of the curves and of the stylus in H [m], shapes (n, 3).
     """
-    figure = Figure(figsize=(8.0, 3.9), layout="constrained")
+    figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     for ax, (i, j), title in zip(
         figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the right"), strict=True
     ):
@@ -40,9 +43,6 @@ def stretch_figure(before: Array, after: Array, path: Array) -> Figure:
         ax.plot(1e3 * before[:, i], 1e3 * before[:, j], color=CURVE, lw=0.9, ls=(0, (4, 3)), label="curve before")
         ax.plot(1e3 * after[:, i], 1e3 * after[:, j], color=FIELD, lw=1.8, label="curve after")
         ax.set_aspect("equal", adjustable="datalim")
-        ax.set_title(title, loc="left")
-        ax.set(xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
-        ax.grid(color="#e6e8ec")
-        ax.spines[["top", "right"]].set_visible(False)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+        ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

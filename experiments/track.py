@@ -1,11 +1,11 @@
 """The physical figure on its own, following clips: how well, and with how much help."""
 
-import json
 from dataclasses import asdict
 
 from rich.console import Console
 
 from experiments.clips import load_clips
+from experiments.json_text import json_text
 from models.mocap.library import embedded_names
 from sim.compiled import is_cached
 from sim.tracking import track
@@ -37,7 +37,7 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
         console.print("Compiling the figure's control; this happens once for each version of the code.")
     reports = {name: track(clip, seconds) for name, clip in zip(names, clips, strict=True)}
     if as_json:
-        print(json.dumps({name: asdict(report) for name, report in reports.items()}, indent=2))
+        print(json_text({name: asdict(report) for name, report in reports.items()}))
         return
     for name, report in reports.items():
         print(f"{name}: {report}")

@@ -38,8 +38,8 @@ from experiments.map_files import load_figure_map
 from experiments.modes import Field
 from experiments.rests import with_rests
 from experiments.session import Session
+from experiments.stretch import LIFTED_CARRY, flight_remarks, stretch_grabs
 from experiments.stretch import law as stretch_law
-from experiments.stretch import stretch_grabs
 from experiments.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
@@ -50,6 +50,7 @@ from sim.plant import make_hand, make_plant
 from sim.reference import begin_in_motion, check_reference, make_reference, poses_along
 from sim.servo import Field as CompiledField
 from sim.servo import Servo
+from sim.settling import stood
 from sim.users.arm import Arm
 from sim.world import World, phantom_angles
 
@@ -120,8 +121,11 @@ def wire(
         blended = clip_map(config, clips, curve, world.figure)
     if config.curve and not isinstance(blended, Lifted):
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+    if config.mode in STRETCHING:
+        remarks += flight_remarks(clips)
     if config.mode in STRETCHING and not config.grabs:
-        config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube))
+        share = LIFTED_CARRY if isinstance(blended, Lifted) else 1.0
+        config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube, share))
     parts = _assemble(config, (curve, course), blended, rivers, led, world)
     remarks += hand_remarks(config, curve)
     ready(compiled_parts("figure", parts.compiled, parts.program.ops))
@@ -141,15 +145,21 @@ def wire(
         # The path that the figure is on is the one that the field lays.
         compiled = compiled._replace(memory=memory)
     period = config.scene.servo_period * config.figure_ticks
-    legs = packed_legs(world.figure)
-    reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs)
+    legs, bends = packed_legs(world.figure), config.mode in STRETCHING
+    # Where a curve is bent, a hand may hold the figure in the middle of a flight.
+    held = 0.0
+    if bends and not isinstance(blended, Led):
+        held = curve.duration if isinstance(blended, Lifted) else blended.lap_seconds
+    reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs, held)
     # A walk at full speed cannot begin from rest.
-    moves = isinstance(blended, Lifted) and config.mode not in STRETCHING
+    moves = isinstance(blended, Lifted) and not bends
     begin = beginning(curve, np.random.default_rng(config.seed), moves)
     poses = np.empty((1, haptic_map.nq))
     walker = memory[TRACE_SIZE + ARGUMENT :][:7]
     argument = walker[None] if leading else stylus_path(begin.point[None])
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
+    if bends:
+        stood(legs, poses[0])
     orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
     if moves:
         v_H = begin.velocity
@@ -159,7 +169,7 @@ def wire(
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
         sense_in_motion(port)
-    gains = LIFTED_GAINS if isinstance(blended, Lifted) else FigureGains()
+    gains = LIFTED_GAINS if bends or isinstance(blended, Lifted) else FigureGains()
     if isinstance(blended, Led):
         gains = led_gains(blended)
     figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
@@ -213,7 +223,7 @@ def _assemble(
     if led is not None:
         field = led
     elif config.mode in STRETCHING:
-        field = stretch_law(config, curve, grabs)
+        field = stretch_law(config, course, grabs, isinstance(blended, Lifted))
     else:
         assert not isinstance(blended, Led)
         field, urged = governed_law(config, course, blended, rivers)

@@ -34,8 +34,10 @@ from sim.compiled import entry_point
 from sim.errors import SimError
 from sim.kernel_units import map_units
 from sim.native import mj_differentiate_pos
+from sim.settling import approach, let_down, slowness
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
 from sim.transition import Transition, carry_on, dwells, make_transition, note_change, pivot_of, set_duration
+from sim.waiting import leaps, stands, waits_no_longer
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -66,6 +68,10 @@ class CompiledReference(NamedTuple):
         What the figure should do, shapes (75,), (57,), (57,).
     transition : Transition
         From clip to clip, where rivers play clips of their own.
+    clip_seconds : float
+        Time of the clips [s] where flights that are held are let down to the floor (`sim.settling`); 0: they are not.
+    settled : Array
+        Share by which they are, and its rates, shape (3,).
     """
 
     figure_model: int
@@ -83,6 +89,8 @@ class CompiledReference(NamedTuple):
     velocity: Array
     acceleration: Array
     transition: Transition
+    clip_seconds: float
+    settled: Array
     scratch_memory: Array
     scratch_x: Array
     before: Array
@@ -111,6 +119,15 @@ def _carry(reference: CompiledReference) -> None:
     carry_on(reference.transition, 0.0, reference.pose)
     carry_on(reference.transition, -reference.period, reference.before)
     carry_on(reference.transition, reference.period, reference.after)
+
+
+@njit
+def _settle(reference: CompiledReference) -> None:
+    """Let the three poses down to the floor, by the share of a hand that is slow."""
+    s, period, transition = reference.settled, reference.period, reference.transition
+    for way, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
+        share = s[0] + way * period * s[1] + 0.5 * (way * period) ** 2 * s[2]
+        let_down(transition.limbs, transition.ends, share, pose)
 
 
 @njit
@@ -183,6 +200,24 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
 
 
 @njit
+def _may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
+    """Whether the figure stands, and another river's clip does not leap before it is shown; or has waited for that."""
+    transition, memory = reference.transition, reference.scratch_memory
+    if waits_no_longer(transition):
+        return True
+    if not stands(transition, reference.pose, reference.velocity[2]):
+        return False
+    for k in range(3):
+        memory[:] = reference.memory
+        change_clip(memory, river, phase)
+        ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
+        evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
+        if leaps(transition, transition.ahead[0]):
+            return False
+    return True
+
+
+@njit
 def _change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Let another river's clip go on from what is shown."""
     _show_on(reference)
@@ -223,15 +258,18 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         reference.started[0] = 1.0
         hand[0, :] = stylus[:3]
         reference.orientation[:] = stylus[3:]
+        reference.settled[0] = slowness(hand[0], hand[1], reference.clip_seconds)
     else:
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
+        approach(reference.settled, slowness(hand[0], hand[1], reference.clip_seconds), period)
     reference.transition.since[0] += period
     kind, params = base_of(reference.kind, reference.params)
     # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
     taken = kind == RIVER_CLIPS and takes_over(params, reference.memory, trace[TRACE_RIVER])
-    if dwells(reference.transition, trace[TRACE_RIVER] if taken else -1.0, period) and settled:
+    over = dwells(reference.transition, trace[TRACE_RIVER] if taken else -1.0, period) and settled
+    if over and _may_change(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE]):
         _change_river(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE])
     elif kind == RIVER_CLIPS:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
@@ -239,6 +277,8 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
             _stop(reference, params)
     _look_around(reference)
     _carry(reference)
+    if reference.clip_seconds > 0.0:
+        _settle(reference)
     for pose, difference in ((reference.before, reference.to_before), (reference.after, reference.to_after)):
         mj_differentiate_pos(reference.figure_model, difference.ctypes, 1.0, reference.pose.ctypes, pose.ctypes)
     for i in range(reference.velocity.shape[0]):
@@ -305,7 +345,10 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
         If the bandwidth is not positive, or too high for the period; or the blend time negative or not finite.
     """
     if not 0.0 < bandwidth < 0.5 / period:
-        raise SimError(f"the bandwidth of the stylus filter is {bandwidth} Hz; expected 0 to {0.5 / period:g} Hz")
+        raise SimError(
+            f"smoothing, the bandwidth of the stylus filter, is {bandwidth} Hz; expected more than 0 and less than "
+            f"{0.5 / period:g} Hz"
+        )
     if not 0.0 <= blend < math.inf:
         raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
 
@@ -317,6 +360,7 @@ def make_reference(
     bandwidth: float,
     blend: float = 0.0,
     limbs: Array | None = None,
+    clip_seconds: float = 0.0,
 ) -> CompiledReference:
     """The reference of a run, before its first update.
 
@@ -334,6 +378,8 @@ def make_reference(
         In which one clip goes over into another [s]; 0: the figure jumps.
     limbs : Array, optional
         Legs that step meanwhile, `packed_steppers`; without them the feet slide.
+    clip_seconds : float
+        Time of the clips [s], where flights that are held are to be let down to the floor.
 
     Raises
     ------
@@ -349,6 +395,6 @@ def make_reference(
         units=map_units([(kind, params)]), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs),
-        scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq),
-        to_before=np.zeros(nv), to_after=np.zeros(nv),
+        clip_seconds=clip_seconds, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
+        before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip

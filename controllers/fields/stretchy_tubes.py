@@ -35,13 +35,22 @@ NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6
 # Memory: phase t*, mode, when and where the switch was pressed, how far the stylus was carried since, the normal of a
 # push, FOLLOW's gains, how far off the stylus a held point ever was, then the record of the curve.
 _PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13, 14
-_SEEK, _STRETCH, _DAMPING, _RADIUS, _UNTIL = range(5)
+_SEEK, _STRETCH, _DAMPING, _RADIUS, _UNTIL, _EASE = range(6)
 
 
 @njit
 def stretch_force(p: float, v: float, target: float, stiffness: float, damping: float) -> float:
     """F = k (target − p) − b v, one component of each in H, or whole vectors."""
     return stiffness * (target - p) - damping * v
+
+
+@njit
+def eased_share(t: float, seconds: float) -> float:
+    """Share σ = x³ (10 − 15 x + 6 x²), x = t/T, that FOLLOW has at t [s] of an easing of T [s], which may be 0; C²."""
+    if t >= seconds:
+        return 1.0
+    x = max(t, 0.0) / seconds
+    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
 @njit
@@ -106,7 +115,7 @@ def _push(params: Array, at: int, memory: Array, slot: int, p: Array) -> float:
 
 @njit
 def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction STRETCHY: parameters [k_f, k_s, b, ε, until]; the memory holds the curve, see the module."""
+    """Instruction STRETCHY: parameters [k_f, k_s, b, ε, until, ease]; the memory holds the curve, see the module."""
     p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
@@ -122,6 +131,11 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         _release(memory, slot, hand[HAND_TIME])
     if performing:
         follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
+        share = eased_share(hand[HAND_TIME] - params[at + _UNTIL], params[at + _EASE])
+        target = curve_point(memory, curve, memory[slot + _PHASE])
+        for i in range(3):
+            seek = stretch_force(p[i], v[i], target[i], params[at + _SEEK], params[at + _DAMPING])
+            wrench[i] = share * wrench[i] + (1.0 - share) * seek
         return
     phase, distance = closest_phase(memory, curve, p[0], p[1], p[2], memory[slot + _PHASE])
     memory[slot + _PHASE] = phase
@@ -195,6 +209,9 @@ class StretchyTubes:
         When stretching ends [s]; may be infinite. An edit that is under way then is committed.
     then : Follow, optional
         Gains with which the bent curve is performed from then on; needed if there is an end. Its curve is not used.
+    ease : float
+        T, in which the search goes over into the performance [s]: F = (1 − σ) F_open + σ F_follow, with
+        σ = x³ (10 − 15x + 6x²), x = t/T. A body that stands cannot go on at once at the speed of a walk.
     depth : int
         How many edits can be undone.
 
@@ -214,6 +231,7 @@ class StretchyTubes:
     width: float = 0.5
     until: float = np.inf
     then: Follow | None = None
+    ease: float = 0.0
     depth: int = 64
 
     def __post_init__(self) -> None:
@@ -222,6 +240,7 @@ class StretchyTubes:
         checked("b", self.b, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4)
         checked("until", self.until, "s", infinite=True)
+        checked("ease", self.ease, "s")
         if np.isfinite(self.until) and self.then is None:
             raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
 
@@ -232,7 +251,7 @@ class StretchyTubes:
         state = np.zeros(_RECORD)
         state[_PHASE], state[_GAINS:_OFF] = np.nan, gains
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
-        params = [self.k_f, self.k_s, self.b, self.epsilon, self.until]
+        params = [self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease]
         return Program.law(STRETCHY, params, memory.tolist())
 
     def program(self) -> Program:

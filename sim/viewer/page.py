@@ -1,6 +1,7 @@
 """A page in the browser on which a world is seen while it runs; and the page of a run that nobody watches."""
 
 import time
+from collections.abc import Sequence
 from typing import Protocol
 
 import mujoco
@@ -9,6 +10,8 @@ import numpy.typing as npt
 import viser
 from mjviser import ViserMujocoScene
 
+from sim.viewer.courses import Course
+from sim.viewer.palette import rgb
 from sim.viewer.shapes import tube
 
 Array = npt.NDArray[np.float64]
@@ -46,17 +49,17 @@ class LivePage:
     ----------
     model : mujoco.MjModel
         The world; not stepped here.
-    curve : array (m, 3)
-        Points of φ in the hand frame.
+    drawn : sequence of Course
+        The curves.
     radius : float
-        Of the tube around it [m].
+        Of the tube around each [m], 0 for none.
     p_WH : array (3,)
         Origin of the hand frame in the world.
     port : int
         The next free one is taken if it is in use.
     """
 
-    def __init__(self, model: mujoco.MjModel, curve: Array, radius: float, p_WH: Array, port: int = 8080):
+    def __init__(self, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, p_WH: Array, port: int = 8080):
         self._server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields")
         self._scene = ViserMujocoScene(self._server, model, num_envs=1)
         self._scene.camera_tracking_enabled = False
@@ -64,11 +67,13 @@ class LivePage:
         self._p_WH = p_WH
         self._shown = 0.0
         scene = self._server.scene
-        for name, thickness, opacity in (("line", 0.001, None), ("tube", radius, 0.16)):
-            vertices, faces = tube(p_WH + curve, thickness)
-            scene.add_mesh_simple(
-                f"/curve/{name}", vertices, faces, color=(70, 130, 200), opacity=opacity, side="double"
-            )
+        for k, course in enumerate(drawn):
+            looks = (("line", 0.001, course.line, None), ("tube", radius, course.tube, 0.16))
+            for name, thickness, color, opacity in looks[: 1 if radius == 0.0 else 2]:
+                vertices, faces = tube(p_WH + course.points, thickness)
+                scene.add_mesh_simple(
+                    f"/curve/{k}/{name}", vertices, faces, color=rgb(color), opacity=opacity, side="double"
+                )
         self._arrow = scene.add_arrows(
             "/force", np.zeros((1, 2, 3)), (34, 160, 70), shaft_radius=0.004, head_radius=0.01, head_length=0.02
         )

@@ -4,6 +4,7 @@ FIELD = "#22a046"  # the field and what it leads
 USER = "#eb7814"  # the hand's own force, and where it pushes
 CURVE = "#3c465a"
 TUBE = "#4682c8"
+RIVERS = (TUBE, "#b5417a", "#8a6d1d", "#7a5fc0", "#1f8f98", "#a8453a", "#6b7280")  # one after the other, then again
 
 PUSH = 0.2  # a hand that presses harder than this is pushing [N]
 

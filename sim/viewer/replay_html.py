@@ -16,7 +16,8 @@ import numpy.typing as npt
 import viser
 
 from sim.recording import Channel, Recording
-from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER, rgb
+from sim.viewer.courses import Course, courses
+from sim.viewer.palette import FIELD, PUSH, TUBE, USER, rgb
 from sim.viewer.shapes import Shape, body_shapes, tube
 
 Array = npt.NDArray[np.float64]
@@ -62,8 +63,9 @@ def replay_html(recording: Recording, model: mujoco.MjModel, target: Target = FI
     Parameters
     ----------
     recording : Recording
-        With arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius`` and ``p_WH``, the hand frame's
-        origin in the world; in group ``frames`` the channels t, qpos (nq) and reference (75, or the target's); in group
+        With arrays ``curve`` (m, 3), the points of φ in the hand frame, ``tube_radius``, 0 for none, and ``p_WH``, the
+        hand frame's origin in the world, and where there are rivers their ``river_curves`` (k, m, 3) and
+        ``river_names``; in group ``frames`` the channels t, qpos (nq) and reference (75, or the target's); in group
         ``ticks`` the channels t, p, force and user (3 each, hand frame).
     model : mujoco.MjModel
         The world that was recorded: bodies named ``phantom/…`` and those of the target.
@@ -148,7 +150,8 @@ class _Stage:
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
-        self._draw_curve(recording.array("curve"), drawn_tube(recording))
+        for k, course in enumerate(courses(recording.arrays | recording.texts)):
+            self._draw_course(f"/curve/{k}", course, drawn_tube(recording))
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
@@ -166,16 +169,18 @@ class _Stage:
             f"/forces/{name}", np.zeros((1, 2, 3)), rgb(color), shaft_radius=0.015, head_radius=0.035, head_length=0.07
         )
 
-    def _draw_curve(self, points: Array, radius: float) -> None:
-        line = PHANTOM_AT + MAGNIFICATION * points
+    def _draw_course(self, node: str, course: Course, radius: float) -> None:
+        line = PHANTOM_AT + MAGNIFICATION * course.points
         vertices, faces = tube(line, 0.004, sides=8)
-        self._scene.add_mesh_simple("/curve/line", vertices, faces, color=rgb(CURVE), cast_shadow=False)
+        self._scene.add_mesh_simple(f"{node}/line", vertices, faces, color=rgb(course.line), cast_shadow=False)
+        if radius == 0.0:
+            return
         vertices, faces = tube(line, MAGNIFICATION * radius)
         self._scene.add_mesh_simple(
-            "/curve/tube",
+            f"{node}/tube",
             vertices,
             faces,
-            color=rgb(TUBE),
+            color=rgb(course.tube),
             opacity=0.16,
             side="double",
             cast_shadow=False,

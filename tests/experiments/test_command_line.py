@@ -23,9 +23,9 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 @pytest.mark.parametrize(
     ("flags", "told"),
     [
-        (["--stiffness", "-5"], "-5"),
-        (["--damping", "nan"], "nan"),
-        (["--tube", "0"], "0"),
+        (["--stiffness", "-5"], "--stiffness is -5; expected 0 N/m or more"),
+        (["--damping", "nan"], "--damping is nan"),
+        (["--tube", "0"], "--tube is 0; expected 0.0001 m or more"),
         (["--lap", "0"], "lap"),
         (["--reach", "0.2"], "r_range"),
         (["--radius", "0.3"], "beyond the Phantom's stops"),
@@ -33,9 +33,12 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--seconds", "inf"], "inf"),
         (["--seed", "-1"], "seed is -1"),
         (["--mode", "stretch", "--user", "trace"], "--user relaxed, push or turn"),
-        (["--mode", "stretch", "--rubber-tube", "inf"], "rubber_tube is inf"),
-        (["--mode", "rivers", "--river-tube", "0"], "river_tube is 0"),
-        (["--mode", "rivers", "--river-damping", "-1"], "-1"),
+        (["--mode", "stretch", "--rubber-tube", "inf"], "--rubber-tube is inf"),
+        (["--mode", "stretch", "--rubber", "-1"], "--rubber is -1"),
+        (["--mode", "rivers", "--river-tube", "0"], "--river-tube is 0"),
+        (["--mode", "rivers", "--river-damping", "-1"], "--river-damping is -1"),
+        (["--walls", "--wall-margin", "0"], "--wall-margin is 0"),
+        (["--mode", "lead", "--floor-scale", "0"], "--floor-scale is 0"),
         (["--mode", "lead", "--user", "trace", "--walls"], "leave out --user trace, --walls\n"),
         (["--cutoff", "0"], "cutoff"),
         (["--smoothing", "1000"], "1000"),
@@ -46,6 +49,10 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--clips", "moonwalk"], "squat_dance"),
         (["--clips", "no/such/file.bvh"], "no/such/file.bvh"),
         (["--clips", *["cheer"] * 5], "1 to 4"),
+        (
+            ["--map", "no/map.npz"],
+            "no/map.npz: cannot be read (No such file or directory); expected the .npz file of a",
+        ),
     ],
 )
 def test_a_run_that_cannot_be_is_refused_with_the_numbers(
@@ -54,6 +61,31 @@ def test_a_run_that_cannot_be_is_refused_with_the_numbers(
     out = tmp_path / "out"
     assert told in refused(["run", "--out", str(out), *flags], capsys)
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["arm", "--stiffness", "-1"], "--stiffness is -1"),
+        (["certify", "--stiffness", "-1"], "--stiffness is -1"),
+        (["certify", "--hand-push", "-1"], "--hand-push is -1; expected 0 N or more"),
+        (["certify", "--map", "no/map.npz"], "no/map.npz: cannot be read"),
+        (["certify", "--clip", "jump", "--friction", "0"], "--friction is 0"),
+        (["track", "walk", "--seconds", "-1"], "--seconds is -1"),
+        (["lift", "walk", "--seed", "-1"], "--seed is -1"),
+    ],
+)
+def test_other_commands_name_the_option_and_the_file_too(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert told in refused(arguments, capsys)
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("no folder")
+    said = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
+    assert said.startswith(f"hvf: {tmp_path / 'file'}")
+    assert "Errno" not in said
 
 
 def test_a_folder_that_holds_a_run_is_left_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,15 +1,20 @@
 """The figures show what was recorded, in the units they name."""
 
+import itertools
 import os
 import subprocess
 import sys
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from experiments import figures
+from experiments.changes import RiverChange
 from experiments.figures import (
     POINTS,
+    STYLE,
     deviation_figure,
     draw_figures,
     forces_figure,
@@ -22,7 +27,7 @@ from sim.recording import Recording
 
 ANGLE = np.linspace(0, 2 * np.pi, 61)
 CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
-TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torque": (3,)}
+TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torque": (3,), "river": ()}
 FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": ()}
 
 
@@ -52,6 +57,7 @@ def record(path, n=2000, pushing=True, texts=None, summary=None):
                 "force": np.tile([1.0, 2.0, 2.0], (n, 1)),
                 "user": 2.0 * pushed[:, None] * outwards,
                 "torque": np.tile([0.1, -0.2, 0.3], (n, 1)),
+                "river": 0.0 * t,
             },
         )
         recorder.append(
@@ -119,6 +125,69 @@ def test_what_the_hand_does_and_what_surrounds_the_curve_is_called_as_the_record
         assert not any("where" in str(line.get_label()) for line in path_figure(alone).axes[0].lines)
 
 
+def test_every_river_is_drawn_by_its_name_and_a_distance_is_said_to_be_from_what_it_is_from(tmp_path):
+    texts = {
+        "river_names": "level\nhigh",
+        "river_curves": np.stack([CURVE, CURVE + np.array([0.0, 0.0, 0.01])]),
+        "distance_from": "its river",
+    }
+    with record(tmp_path / "rivers.h5", texts=texts) as rivers:
+        _, right = path_figure(rivers).axes
+        deviation = deviation_figure(rivers).axes[0].get_title()
+    assert [np.max(values(right, name)) for name in ("level", "high")] == pytest.approx([0.0, 10.0])
+    assert line(right, "level").get_color() != line(right, "high").get_color()
+    assert not any(line.get_label() == "curve φ" for line in right.lines)
+    assert deviation == "distance of the hand from its river"
+
+
+def test_a_curve_without_a_tube_has_none_in_the_figures(tmp_path):
+    with record(tmp_path / "led.h5", texts={"tube_radius": 0.0}) as led:
+        assert "tube" not in {line.get_label() for line in path_figure(led).axes[0].lines}
+        assert len(deviation_figure(led).axes[0].lines) == 1
+
+
+def test_names_of_changes_that_follow_each_other_do_not_lie_on_each_other(tmp_path, monkeypatch):
+    changes = [RiverChange(t, "", name) for t, name in ((0.5, "wave"), (0.55, "high"), (0.6, "level"), (1.5, "wave"))]
+    monkeypatch.setattr(figures, "river_changes", lambda recording: tuple(changes))
+    with record(tmp_path / "rivers.h5") as rivers:
+        figure = deviation_figure(rivers)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        boxes = [text.get_window_extent() for text in ax.texts]
+        assert len(boxes) == 4
+        assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+        assert boxes[0].y0 == boxes[3].y0
+
+
+DRAWINGS = (path_figure, deviation_figure, forces_figure, torques_figure, tracking_figure)
+
+
+@pytest.mark.parametrize("draw", DRAWINGS, ids=lambda draw: draw.__name__)
+def test_no_legend_lies_on_data_and_no_text_is_cut(draw, recording):
+    with mpl.rc_context(STYLE):
+        figure = draw(recording)
+        figure.draw_without_rendering()
+    legends = [legend for legend in (*figure.legends, *(ax.get_legend() for ax in figure.axes)) if legend is not None]
+    assert legends
+    boxes = [legend.get_window_extent().shrunk(0.98, 0.98) for legend in legends]
+    assert not any(box.overlaps(ax.get_window_extent()) for box in boxes for ax in figure.axes)
+    drawn = figure.get_tightbbox()
+    assert min(drawn.x0, drawn.y0) >= 0.0
+    width, height = figure.get_size_inches()
+    assert drawn.x1 <= width
+    assert drawn.y1 <= height
+
+
+def test_all_of_the_tube_is_in_view(recording):
+    figure = path_figure(recording)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        (x_low, x_high), (y_low, y_high) = ax.get_xlim(), ax.get_ylim()
+        tube = 1e3 * (CURVE[:, :2] if ax is figure.axes[0] else CURVE[:, ::2])
+        assert x_low < tube[:, 0].min() - 20.0 < tube[:, 0].max() + 20.0 < x_high
+        assert y_low < tube[:, 1].min() - 20.0 < tube[:, 1].max() + 20.0 < y_high
+
+
 def test_where_a_bent_curve_begins_to_be_performed_is_marked(tmp_path):
     with record(tmp_path / "bent.h5", summary={"performance": {"start": 1.25}}) as bent:
         for figure in (deviation_figure(bent), tracking_figure(bent)):
@@ -138,14 +207,19 @@ def test_forces_are_shown_by_component_and_norm(recording):
     assert np.max(values(hand, "norm")) == pytest.approx(2.0)
 
 
-def test_torques_stand_against_the_limits_of_their_motor(recording):
+def test_torques_stand_against_the_limits_of_their_motor(recording, tmp_path):
     axes = torques_figure(recording).axes
     for ax, torque, continuous, peak in zip(axes, (100, -200, 300), (400, 300, 200), (1600, 1200, 800), strict=True):
         assert ax.lines[0].get_ydata()[0] == pytest.approx(torque)
         assert values(ax, "continuous")[0] == pytest.approx(continuous)
-        assert values(ax, "peak")[0] == pytest.approx(peak)
         low, high = ax.get_ylim()
         assert low < torque < high
+        assert f"{continuous} mN m for long, {peak} mN m for a moment" in ax.get_title()
+        # A line that is not in view is not in the legend.
+        assert all(low <= line.get_ydata()[0] <= high for line in ax.lines)
+    with record(tmp_path / "weak.h5", texts={"motor_peak": np.array([0.15, 0.2, 0.25])}) as weak:
+        peaks = [values(ax, "peak")[0] for ax in torques_figure(weak).axes]
+    assert peaks == pytest.approx([150.0, 200.0, 250.0])
 
 
 def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(recording):

@@ -44,6 +44,27 @@ def test_how_far_a_figure_is_from_the_way_on_which_it_came(aside: float, turned:
     assert turn == pytest.approx(np.degrees(turned), abs=0.05)
 
 
+def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_it() -> None:
+    measure = _Retrace()
+    forth = np.arange(0.0, 4.0, 0.01)
+    # The pelvis goes to and fro by 6 cm every 30 cm while it turns by 12°.
+    swing = 2.0 * np.pi * forth / 0.3
+    poses = np.concatenate([
+        poses_along(np.array([s + 0.06 * np.sin(a)]), 0.0, np.radians(12.0) * np.sin(0.5 * a))
+        for s, a in zip(forth, swing, strict=True)
+    ])  # fmt: skip
+    measure.add(forth, poses, -np.inf)
+    measure.add(forth[350:50:-1], poses[350:50:-1], float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance is not None
+    assert turn is not None
+    assert distance < 0.01
+    assert turn < 0.01
+    # Behind where it began there is no way to compare with.
+    measure.add(np.array([-0.1]), poses_along(np.array([-0.1])), float(forth[-1]))
+    assert measure.result() == (distance, turn)
+
+
 def test_how_far_soles_slide_while_they_touch() -> None:
     measure, standing = _Soles(SceneConfig()), rest_pose()
     lowest = _Soles(SceneConfig())

@@ -99,7 +99,8 @@ def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
     path.with_suffix(".npy").rename(path)
     with pytest.raises(SimError, match="is no file of a map"):
         load_map(path)
-    with pytest.raises(OSError, match="missing"):
+    what = r"missing\.npz: cannot be read \(No such file or directory\); expected the \.npz file of a map"
+    with pytest.raises(SimError, match=what):
         load_map(tmp_path / "missing.npz")
 
 

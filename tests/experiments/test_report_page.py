@@ -8,6 +8,7 @@ import pytest
 from experiments import report
 from sim.recorder import Group, Recorder
 from sim.recording import Recording
+from sim.viewer.palette import RIVERS
 
 REPLAY = '<html><body class="a">3 & 4 < 5</body></html>'
 
@@ -36,8 +37,8 @@ def write(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "replay_html", lambda recording, model, target: REPLAY)
     (tmp_path / "path.png").write_bytes(b"\x89PNG not really")
 
-    def write(radius=0.02, lines=("It worked.",)):
-        static = {"curve": 0.05 * np.eye(3), "tube_radius": radius}
+    def write(radius=0.02, lines=("It worked.",), texts=None):
+        static = {"curve": 0.05 * np.eye(3), "tube_radius": radius, **(texts or {})}
         with Recorder(tmp_path / f"{radius}.h5", {}, 42, {"ticks": Group(10, {"t": ()})}, static) as recorder:
             recorder.append("ticks", {"t": np.arange(3000) / 10})
             recorder.close({})
@@ -72,6 +73,18 @@ def test_what_is_not_drawn_to_scale_is_said(write):
 
 def test_what_surrounds_the_curve_is_called_what_it_is(write):
     assert "Light blue: the tube around the curve" in " ".join(" ".join(write(radius=0.004).texts).split())
+
+
+def test_each_river_is_named_in_its_colour(write):
+    rivers = {"river_names": "level\nhi & lo", "river_curves": 0.05 * np.ones((2, 3, 1)) * np.eye(3)}
+    page = write(radius=0.004, texts=rivers)
+    assert "The rivers, each in its tube: level , hi & lo ." in " ".join(" ".join(page.texts).split())
+    styles = page.attributes["style"]
+    assert [f"color:{color}" in styles for color in RIVERS[:3]] == [True, True, False]
+
+
+def test_where_there_is_no_tube_none_is_spoken_of(write):
+    assert "Light blue" not in " ".join(write(radius=0.0).texts)
 
 
 def test_seed_and_versions_are_shown(write):

@@ -37,7 +37,8 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
 ) -> None:
     out = tmp_path / "follow"
-    command = ["run", "--map", str(map_file), "--curve", curve, "--seconds", "10", "--out", str(out)]
+    # With this seed a runner whose feet did not bear a little over the floor would fall.
+    command = ["run", "--map", str(map_file), "--curve", curve, "--seconds", "10", "--seed", "2", "--out", str(out)]
     assert main(command) == 0
     summary = json.loads((out / "summary.json").read_text())
     assert summary["path"]["deviation_rms_mm"] < 1.0

@@ -1,8 +1,10 @@
 """Units of compiled code: a run compiles what it uses, the next process finds it, and every path gives the same."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from controllers.haptic_map.expressive import EXPRESSIVE
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from controllers.state import HandState
 from experiments.robot_arm import robot_arm_map
+from sim import kernel_units
 from sim.kernel_units import law_units, map_units
 from sim.reference import poses_along
 
@@ -74,16 +77,20 @@ from controllers.haptic_map.robot_arm import ROBOT_ARM
 from sim import kernel_units
 kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
 (unit,) = kernel_units._alive
-print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()))
+print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()), kernel_units.__file__)
 """
 
 
-def test_the_next_process_finds_a_unit_compiled(tmp_path):
+def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
+    here, copy = Path(kernel_units.__file__).parent.parent, tmp_path / "copy"
+    for package in ("models", "controllers", "sim"):
+        shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     told = [
         subprocess.run(
-            [sys.executable, "-c", _PROCESS], env=os.environ | {"HVF_CACHE_DIR": str(tmp_path)}, check=True,
-            capture_output=True, text=True,
+            [sys.executable, "-c", _PROCESS], check=True, capture_output=True, text=True, cwd=sources,
+            env=os.environ | {"HVF_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(sources)},
         ).stdout.split()
-        for _ in range(2)
+        for sources in (here, here, copy)
     ]  # fmt: skip
-    assert told == [["0", "1"], ["1", "0"]]
+    assert [row[:2] for row in told] == [["0", "1"], ["1", "0"], ["1", "0"]]
+    assert [Path(row[2]).parent.parent for row in told] == [here, here, copy]

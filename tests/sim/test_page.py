@@ -5,14 +5,17 @@ import numpy as np
 import pytest
 
 from models.scene import P_WH, SceneConfig, world_model
+from sim.viewer.courses import courses
 from sim.viewer.page import LivePage, NullPage
 
-CURVE = 0.05 * np.column_stack([np.cos(np.linspace(0, 6, 30)), np.sin(np.linspace(0, 6, 30)), np.zeros(30)])
+ANGLE = np.linspace(0, 6, 30)
+CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
+DRAWN = courses({"river_names": "one\ntwo", "river_curves": CURVES})
 
 
 @pytest.fixture
 def page():
-    page = LivePage(world_model(SceneConfig()), CURVE, 0.02, P_WH, port=0)
+    page = LivePage(world_model(SceneConfig()), DRAWN, 0.02, P_WH, port=0)
     yield page
     page.close()
 
@@ -37,7 +40,7 @@ def test_showing_a_state_does_not_touch_the_model_that_runs():
     data = mujoco.MjData(model)
     before = model.qpos0.copy(), model.body_pos.copy(), model.geom_rgba.copy()
     NullPage().show(data.qpos, np.zeros(3), np.zeros(3))
-    page = LivePage(model, CURVE, 0.02, P_WH, port=0)
+    page = LivePage(model, DRAWN, 0.02, P_WH, port=0)
     page.show(data.qpos + 0.1, np.zeros(3), np.zeros(3))
     page.close()
     for array, kept in zip((model.qpos0, model.body_pos, model.geom_rgba), before, strict=True):

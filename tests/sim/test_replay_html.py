@@ -16,6 +16,7 @@ from models.scene import P_WH, SceneConfig, world_model
 from sim.recorder import Group, Recorder
 from sim.recording import Recording
 from sim.viewer import replay_html as module
+from sim.viewer.palette import CURVE, FIELD, RIVERS, USER, rgb
 from sim.viewer.replay_html import GHOST_AT, MAGNIFICATION, PHANTOM_AT, drawn_tube, replay_html
 from sim.viewer.shapes import body_shapes, tube
 
@@ -28,7 +29,7 @@ def model():
     return world_model(SceneConfig())
 
 
-def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02):
+def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02, rivers=None):
     """A hand on a circle that presses harder with time; a figure that leans and may travel along x."""
     ticks, frames = np.arange(0, seconds, 1e-3), np.arange(0, seconds, 1e-2)
     root = int(model.joint("figure/root").qposadr[0])
@@ -46,7 +47,7 @@ def record(path, model, seconds=1.0, speed=0.0, still=False, radius=0.02):
         "ticks": Group(1000, {"t": (), "p": (3,), "force": (3,), "user": (3,)}),
         "frames": Group(100, {"t": (), "qpos": (model.nq,), "reference": (75,)}),
     }
-    static = {"curve": CIRCLE, "tube_radius": radius, "p_WH": P_WH}
+    static = {"curve": CIRCLE, "tube_radius": radius, "p_WH": P_WH, **(rivers or {})}
     with Recorder(path, {}, 1, groups, static) as recorder:
         recorder.append("ticks", {"t": ticks, "p": p, "force": force, "user": 0.0 * force})
         recorder.append("frames", {"t": frames, "qpos": qpos, "reference": reference})
@@ -170,6 +171,46 @@ def test_a_hand_that_does_not_move_leaves_no_trail_and_no_nan(tmp_path, model):
     assert not any(name.startswith("/trail/") for name in names)
     for buffer in content["buffers"]:
         assert len(buffer) % 4 or np.all(np.isfinite(np.frombuffer(buffer, np.float32)))
+
+
+def meshes(page: str) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
+    """Vertices and colour of every mesh."""
+    content = decoded(page)
+    found = {}
+    for _, message in content["messages"]:
+        if message["type"] == "MeshMessage":
+            props = message["props"]
+            index = next(v for v in props["vertices"].values() if isinstance(v, int))
+            vertices = np.frombuffer(content["buffers"][index], np.float32).reshape(-1, 3)
+            found[message["name"]] = vertices, tuple(props["color"])
+    return found
+
+
+def test_every_river_is_drawn_with_its_tube_where_it_is_and_in_a_colour_of_its_own(tmp_path, model):
+    curves = np.stack([CIRCLE + np.array([0.0, 0.0, height]) for height in (0.0, 0.01, 0.03)])
+    rivers = {"river_names": "low\nmiddle\nhigh", "river_curves": curves}
+    with record(tmp_path / "run.h5", model, seconds=0.1, rivers=rivers) as recording:
+        drawn = meshes(replay_html(recording, model))
+    assert {name for name in drawn if name.startswith("/curve/")} == {
+        f"/curve/{k}/{part}" for k in range(3) for part in ("line", "tube")
+    }
+    for k, curve in enumerate(curves):
+        for part, radius in (("line", 0.004), ("tube", MAGNIFICATION * 0.02)):
+            vertices, color = drawn[f"/curve/{k}/{part}"]
+            assert color == rgb(RIVERS[k])
+            at = PHANTOM_AT + MAGNIFICATION * curve
+            away = np.linalg.norm(vertices[:, None] - at[None], axis=2).min(axis=1)
+            np.testing.assert_allclose(away, radius, atol=1e-5)
+
+
+def test_one_curve_is_drawn_alone_and_without_a_tube_where_it_has_none(tmp_path, model):
+    with record(tmp_path / "run.h5", model, seconds=0.1, radius=0.0) as recording:
+        drawn = meshes(replay_html(recording, model))
+    assert {name for name in drawn if name.startswith("/curve/")} == {"/curve/0/line"}
+
+
+def test_rivers_in_a_row_differ_in_colour_and_from_hand_and_field():
+    assert len({*RIVERS, FIELD, USER, CURVE}) == len(RIVERS) + 3
 
 
 @pytest.mark.parametrize(("radius", "drawn"), [(0.01, 0.01), (0.25, 0.03)])

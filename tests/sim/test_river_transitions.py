@@ -230,6 +230,24 @@ def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]
         assert soles[..., 2].min() > -0.003
 
 
+@pytest.mark.parametrize(("first", "second"), [("jump", "angry"), ("angry", "jump")])
+def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, second: str) -> None:
+    names = (first, second, "run")
+    made = [(clip.poses, clip.fps) for clip in load_clips(names)[0]]
+    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
+    changed = 0
+    for moment in np.arange(1.2, 4.2, 0.3):
+        poses = _two(rivers, 0, 1, float(moment), False)
+        soles = _soles(poses)
+        velocity = np.diff(poses[:, 2]) / PERIOD
+        # Begun in the air, or over into a flight, the root was thrown by up to 5.9 m/s within a step.
+        assert np.abs(np.diff(velocity)).max() < 0.5
+        assert soles[..., 2].min(axis=1).max() < 0.28  # the jump's own 0.27
+        assert _slide(soles) < 0.03
+        changed += np.abs(pose_difference(poses[-1:], _two(rivers, 0, 0, float(moment), False)[-1:])).max() > 0.3
+    assert changed >= 4
+
+
 @pytest.mark.parametrize("away", [False, True])
 def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(away: bool) -> None:
     made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "cheer", "angry"))[0]]

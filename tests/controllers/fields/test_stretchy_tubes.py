@@ -188,6 +188,23 @@ def test_stretched_then_followed_is_follow_on_the_bent_curve() -> None:
     assert session.edits == 1
 
 
+def test_the_search_goes_over_into_follow_without_a_jump() -> None:
+    session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, 2.0, until=1.0, then=Follow(CIRCLE, 300.0, 4.0), ease=0.8))
+    p, v = CIRCLE.point(1.0) + np.array([0.0, 0.0, 0.003]), np.array([0.01, -0.02, 0.0])
+    full, forces = Follow(CIRCLE, 300.0, 4.0).wrench(HandState.at(p, v)).force, [session.at(p, v=v)]
+    for share in np.linspace(0.0, 1.2, 121):
+        session.time = 1.0 + 0.8 * share
+        forces.append(session.at(p, v=v, after=0.0))
+    eased = np.array(forces)
+    # What it felt before is what it feels at first; at half time half of each, and at last FOLLOW.
+    np.testing.assert_allclose(eased[1], eased[0], atol=1e-12)
+    np.testing.assert_allclose(eased[51], 0.5 * (eased[0] + full), atol=1e-9)
+    np.testing.assert_allclose(eased[101:], np.tile(full, (21, 1)), atol=1e-12)
+    # It grows fastest in the middle, by 15/8 of the mean.
+    steps = np.linalg.norm(np.diff(eased[1:], axis=0), axis=1) / np.linalg.norm(full - eased[0])
+    assert steps.max() < 0.01 * 15.0 / 8.0 + 1e-6
+
+
 def test_an_edit_under_way_when_stretching_ends_is_kept() -> None:
     session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, until=1.0, then=Follow(CIRCLE, 300.0, 4.0)))
     session.at([0.05, 0.0, 0.0], True)

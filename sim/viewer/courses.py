@@ -1,0 +1,41 @@
+"""The curves that are drawn of a run: the one that it has, or every river in a colour of its own."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.viewer.palette import CURVE, RIVERS, TUBE
+
+Array = npt.NDArray[np.float64]
+
+
+class Course(NamedTuple):
+    """A curve as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+        Of the river; of a run's only curve, none.
+    points : array (m, 3)
+        In the hand frame [m].
+    line, tube : str
+        Colours, ``#rrggbb``.
+    """
+
+    name: str
+    points: Array
+    line: str
+    tube: str
+
+
+def courses(static: Mapping[str, npt.ArrayLike | str]) -> tuple[Course, ...]:
+    """What is drawn of a recording's arrays and texts: ``curve``, or ``river_curves`` by their ``river_names``."""
+    if "river_curves" not in static:
+        return (Course("", np.asarray(static["curve"], dtype=np.float64), CURVE, TUBE),)
+    names, curves = str(static["river_names"]).split("\n"), np.asarray(static["river_curves"], dtype=np.float64)
+    return tuple(
+        Course(name, points, RIVERS[k % len(RIVERS)], RIVERS[k % len(RIVERS)])
+        for k, (name, points) in enumerate(zip(names, curves, strict=True))
+    )
