@@ -30,7 +30,7 @@ _UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
 _BLINK = 0.05  # [s] a flight lasts longer
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
-_FLYING_FORWARD = 1.05  # and its largest pace: who is faster than that lands late, for he falls no faster
+_FLYING_FORWARD = 1.0  # and its largest pace: who is faster than its clip lands late, for he falls no faster
 
 
 def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:

@@ -182,7 +182,7 @@ class _Retrace:
         turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
         # A pelvis that sways comes by one place more than once, turned otherwise.
         k = int(np.argmin(np.where(apart < apart.min() + _SAME, np.abs(turn), np.inf)))
-        self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
+        self._distance, self._turn = max(self._distance, float(apart.min())), max(self._turn, abs(float(turn[k])))
 
     def result(self) -> tuple[float | None, float | None]:
         """Largest distance [cm] and turn [degrees]."""

@@ -59,7 +59,7 @@ def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_
     assert distance is not None
     assert turn is not None
     assert distance < 0.01
-    assert turn < 0.01
+    assert turn < 0.1
     # Behind where it began there is no way to compare with.
     measure.add(np.array([-0.1]), poses_along(np.array([-0.1])), float(forth[-1]))
     assert measure.result() == (distance, turn)

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,25 @@ from sim.recording import Recording
 
 pytestmark = pytest.mark.slow
 
+MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("led") / "run"
     run(RunConfig(mode="lead", seconds=19.0), folder, False, 0.0)
     return folder
+
+
+def assert_led_back(summary: dict[str, Any]) -> None:
+    """It stands, comes back within 1 cm and 2°, and its soles slide by less than 3 cm."""
+    lead, figure = summary["lead"], summary["figure"]
+    assert figure["fell_at"] is None
+    assert lead["retrace_cm"] < 1.0
+    assert lead["retrace_deg"] < 1.0
+    assert lead["physical_retrace_cm"] < 1.0
+    assert lead["physical_retrace_deg"] < 2.0
+    assert max(lead["slide_cm"], lead["physical_slide_cm"]) < 3.0
 
 
 def test_straight_back_it_retraces_its_path_within_a_centimetre_and_two_degrees(folder: Path) -> None:
@@ -56,3 +70,29 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
     assert 20.0 < one < np.degrees(0.9) + 1e-6
     assert one < two < np.degrees(1.2) + 1e-6
     assert summary["lead"]["physical_slide_cm"] < 3.0
+
+
+@pytest.mark.parametrize(
+    ("file", "residual"),
+    [
+        ("cmu_amc/02_01.amc", 0.10),
+        ("cmu_amc/02_03.amc", 0.14),
+        ("snu/run.bvh", 0.10),
+        ("deepmimic/humanoid3d_run.txt", 0.14),
+    ],
+)
+def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, residual: float) -> None:
+    if not MOCAP.is_dir():
+        pytest.skip("the motion capture data is not beside the project")
+    run(RunConfig(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert_led_back(summary)
+    assert summary["figure"]["residual_force_rms"] < residual
+
+
+def test_a_run_flies_along_the_s_and_comes_back(tmp_path: Path) -> None:
+    run(RunConfig(mode="lead", clips=("run",), seconds=19.0), tmp_path / "run", False, 0.0)
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert_led_back(summary)
+    assert summary["figure"]["flight_seconds"] > 0.2
+    assert summary["lead"]["turn_deg_per_s"][0] == 0.0
