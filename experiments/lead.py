@@ -27,7 +27,7 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
-_BLINK = 0.05  # [s] a flight lasts longer
+_BLINK, _HOP = 0.05, 0.1  # [s] a flight from foot to foot lasts longer, and one that ends on the foot that began it
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
 _FLYING_FORWARD = 1.0  # and its largest pace: who is faster than its clip lands late, for he falls no faster
@@ -46,7 +46,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
     frames = np.round(phases * steps).astype(int) % steps
     # What closes was made for the floor and is led as it is; a capture's feet have to be held.
-    standing = marks.planted[frames] if made else _without_blinks(marks.settled[:-1], _BLINK * clip.fps)
+    standing = marks.planted[frames] if made else _without_blinks(marks.settled[:-1], clip.fps)
     support = (standing if made else standing[frames]).sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
@@ -72,11 +72,12 @@ def lap_remark(clip: Clip) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def _without_blinks(standing: npt.NDArray[np.bool_], shortest: float) -> npt.NDArray[np.bool_]:
-    """Which feet stand (n, 2), without moments of fewer samples than that in which none does: nobody flies them."""
+def _without_blinks(standing: npt.NDArray[np.bool_], fps: float) -> npt.NDArray[np.bool_]:
+    """Which feet stand (n, 2), without moments too short for a flight, or for a hop, in which none does."""
     filled = standing.copy()
     for start, end in runs(~np.any(standing, axis=1)):
-        if end - start < shortest:
+        hops = (standing[start - 1] & standing[end % len(standing)]).any()
+        if end - start < (_HOP if hops else _BLINK) * fps:
             filled[np.arange(start, end) % len(standing)] |= standing[start - 1]
     return filled
 

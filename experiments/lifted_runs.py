@@ -22,7 +22,7 @@ _CROSSING = 3.6  # [1/s] a push of this much drag times the distance of the curv
 _NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
 _STAY = 3  # laps on the other curve
 
-# A foot that gives way by 2 mm in mid-stance still bears: a runner was taken to fly, and fell with two seeds of five.
+# A foot that gives way by 2 mm in mid-stance still bears: a runner was taken to fly, and fell.
 LIFTED_GAINS = FigureGains(contact_reach=0.004)
 
 

@@ -158,6 +158,6 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
     assert "changed: clip;" in capsys.readouterr().err
     assert main([*clip, "--tolerance.gravity", "9.0", "9.81001"]) == 0
     assert main([*clip, "--friction", "0"]) == 2
-    assert "coefficient of friction is 0" in capsys.readouterr().err
+    assert "--friction is 0; expected more than 0" in capsys.readouterr().err
     assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
     assert "expected a certificate.json" in capsys.readouterr().err
