@@ -31,9 +31,9 @@ _LIFT = 0.2  # λ: height of a step over its length
 _TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
 _ROUND = 3e-3  # [m] a way so short is hardly worth a lift
 _LEVEL = 0.01  # [m] feet that differ by less in height are equally high
-_TOUCHES = 0.05  # [m] height from which a foot does not have to reach what it is asked for
-_SPARE = 5e-3  # [m] by which a foot that is out of reach may stay off
-_FARTHEST = 0.5  # of a limb's length, the way over the floor at which it is given up
+_TOUCHES = 0.12  # [m] height from which a foot does not have to reach what it is asked for
+_SPARE = 2e-2  # [m] by which a foot that is out of reach may stay off
+_FARTHEST, _LOST = 0.5, 1.0  # of a limb's length, the way over the floor from which it is given up, and at which it is
 _BACK = 0.04  # [rad] half of which a knee bends backwards at most, before it is bent as it has to be
 _FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
 _CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
@@ -108,8 +108,10 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
         line[i] = end[i] - sole[i] - pose[i] - hip[i]
     for first in (6, 9):
         longest += np.sqrt(limb[first] ** 2 + limb[first + 1] ** 2 + limb[first + 2] ** 2)
-    away = min(line[0] ** 2 + line[1] ** 2, (_FARTHEST * longest) ** 2)
-    short = max(0.0, -line[2] - np.sqrt(longest**2 - away))
+    way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
+    short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
+    # Whom the figure has left behind it does not stoop for.
+    short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
     x = min(max(1.0 - (sole_height(limb, end) - step[_FLOOR]) / _TOUCHES, 0.0), 1.0)
     return short * short / (short + _SPARE) * x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
