@@ -110,7 +110,6 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
     shown = soles(figure, [led.pose(walker(s)) for s in np.arange(0.0, gait.stride, 0.01)])
     # Within what the physical figure is led with takes for touching (`experiments.led_balance`).
     assert shown[..., 2].min(axis=1).max() < 0.012
-    # The steps are as long as that, and alternate.
     standing = shown[..., 2].min(axis=1) < 0.003
     assert standing.mean() > 0.6
 
