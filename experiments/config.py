@@ -81,7 +81,7 @@ class RunConfig:
         Metres of floor for one of the stylus, where a figure is led; by default such that it goes along the default S
         in five seconds.
     seek : float
-        k_f, with which stretchy tubes draw the hand to the curve [N/m]; on a map from a file it is `lifted_stiffness`.
+        k_f, with which stretchy tubes draw the hand to the curve [N/m]; on a lifted map it is `lifted_stiffness`.
     rubber : float
         k_s of a held or pushed tube [N/m].
     rubber_tube : float

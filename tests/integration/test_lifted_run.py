@@ -49,6 +49,18 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
     assert summary["figure"]["residual_in_flight_max"] == 0.0
 
 
+def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
+    config = RunConfig(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0)
+    summary = run(config, tmp_path / "bent", True, 0.0)
+    assert summary.stretch is not None
+    assert summary.stretch.edits == 3
+    # It fell as soon as it was performed: at full speed from the middle of a step.
+    assert summary.figure.fell_at is None
+    assert summary.performance is not None
+    assert summary.performance.figure.root_error_max_cm < 5.0
+    assert summary.performance.figure.residual_force_rms < 0.25
+
+
 def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
     run(RunConfig(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
