@@ -36,7 +36,16 @@ from sim.kernel_units import map_units
 from sim.native import mj_differentiate_pos
 from sim.settling import approach, let_down, slowness
 from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
-from sim.transition import Transition, carry_on, dwells, make_transition, note_change, pivot_of, set_duration
+from sim.transition import (
+    Transition,
+    carry_on,
+    dwells,
+    make_transition,
+    note_change,
+    pivot_of,
+    plan_depth,
+    set_duration,
+)
 from sim.waiting import leaps, stands, waits_no_longer
 
 Array = npt.NDArray[np.float64]
@@ -60,6 +69,10 @@ class CompiledReference(NamedTuple):
         The haptic map and its state (the lap).
     hand : Array
         Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
+    trail : Array
+        Smoothed position one period ago, and two, shape (2, 3).
+    going : Array
+        Scratch: the hand with the rates at which its smoothed position goes, shape (3, 3).
     orientation, turning : Array
         Smoothed orientation R_H of the stylus (wxyz), shape (4,), and in its own frame ω and α, shape (2, 3).
     started : Array
@@ -82,6 +95,8 @@ class CompiledReference(NamedTuple):
     params: Array
     memory: Array
     hand: Array
+    trail: Array
+    going: Array
     orientation: Array
     turning: Array
     started: Array
@@ -100,9 +115,9 @@ class CompiledReference(NamedTuple):
 
 
 @njit
-def _look_around(reference: CompiledReference) -> None:
-    """Poses of the map along the stylus's motion: now, a period before and a period after; the memory is now's."""
-    hand, period, x = reference.hand, reference.period, reference.scratch_x
+def _look_around(reference: CompiledReference, hand: Array) -> None:
+    """Poses of the map along a motion of the stylus: now, a period before and a period after; the memory is now's."""
+    period, x = reference.period, reference.scratch_x
     x[:3], x[3:] = hand[0], reference.orientation
     evaluate_map(reference.units, reference.kind, reference.params, x, reference.memory, reference.pose)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
@@ -111,6 +126,16 @@ def _look_around(reference: CompiledReference) -> None:
         x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
         reference.scratch_memory[:] = reference.memory
         evaluate_map(reference.units, reference.kind, reference.params, x, reference.scratch_memory, pose)
+
+
+@njit
+def _follow_trail(reference: CompiledReference) -> None:
+    """Rates of the smoothed hand by its own last positions: the filter's come after, where a hand is thrown."""
+    now, trail, going, period = reference.hand[0], reference.trail, reference.going, reference.period
+    for i in range(3):
+        going[0, i] = now[i]
+        going[1, i] = 0.5 * (3.0 * now[i] - 4.0 * trail[0, i] + trail[1, i]) / period
+        going[2, i] = (now[i] - 2.0 * trail[0, i] + trail[1, i]) / period**2
 
 
 @njit
@@ -142,7 +167,7 @@ def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pos
 @njit
 def _show_on(reference: CompiledReference) -> None:
     """Note what is shown: now, a period before and a period after."""
-    _look_around(reference)
+    _look_around(reference, reference.going)
     _carry(reference)
     shown = reference.transition.shown
     shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
@@ -177,12 +202,12 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     """
     transition, memory, period = reference.transition, reference.memory, reference.period
     shown, change = transition.shown, transition.change
-    _look_around(reference)
+    _look_around(reference, reference.going)
     pose = reference.pose
     place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
-    _look_around(reference)
+    _look_around(reference, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
-    set_duration(transition, 0.0)
+    set_duration(transition, 0.0, period)
     way, seconds = np.zeros(3), transition.lasts[0]
     for i in range(2):
         way[i] = stopping_way(change[1, i], change[2, i], seconds)
@@ -191,11 +216,13 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     way[2] = stopping_way(spin, twist, seconds)
     place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
     _, moved = _stand_on_pivot(reference, params)
-    set_duration(transition, moved)
+    set_duration(transition, moved, period)
     # Where the motion stands when a longer change ends.
     foot, _ = _stand_on_pivot(reference, params)
-    _look_around(reference)
+    _look_around(reference, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
+    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    plan_depth(transition)
     transition.since[0] = 0.0
 
 
@@ -257,13 +284,16 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
     if reference.started[0] == 0.0:
         reference.started[0] = 1.0
         hand[0, :] = stylus[:3]
+        reference.trail[0], reference.trail[1] = stylus[:3], stylus[:3]
         reference.orientation[:] = stylus[3:]
         reference.settled[0] = slowness(hand[0], hand[1], reference.clip_seconds)
     else:
+        reference.trail[1], reference.trail[0] = reference.trail[0], hand[0]
         smooth_hand(hand, stylus[:3], reference.smoothing, period)
         smooth_turn(reference.orientation, reference.turning, stylus[3:], reference.smoothing, period)
         approach(reference.settled, slowness(hand[0], hand[1], reference.clip_seconds), period)
     reference.transition.since[0] += period
+    _follow_trail(reference)
     kind, params = base_of(reference.kind, reference.params)
     # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
@@ -273,9 +303,9 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         _change_river(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE])
     elif kind == RIVER_CLIPS:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
-        if lets_go(params, reference.memory, trace[TRACE_RIVER], hand[0], rate):
+        if lets_go(params, reference.memory, trace[TRACE_RIVER], reference.going, rate):
             _stop(reference, params)
-    _look_around(reference)
+    _look_around(reference, hand)
     _carry(reference)
     if reference.clip_seconds > 0.0:
         _settle(reference)
@@ -333,6 +363,7 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
     p, v, a = motion
     period = reference.period
     reference.started[0] = 1.0
+    reference.trail[0] = p - 2.0 * period * v + 2.0 * period**2 * a
     reference.hand[:] = p - period * v + 0.5 * period**2 * a, v - period * a, a
 
 
@@ -393,6 +424,7 @@ def make_reference(
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
         units=map_units([(kind, params)]), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
+        trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs),
         clip_seconds=clip_seconds, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),

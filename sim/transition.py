@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, put_limb, shortfall, step_end
+from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, step_end
 from controllers.haptic_map.inertialization import add_offset, offset_left
+from controllers.haptic_map.stepping_limbs import put_limb, shortfall
 from sim.native import mj_differentiate_pos
 
 Array = npt.NDArray[np.float64]
@@ -18,7 +19,10 @@ _PULL = 6.0  # [m/s²] with which a change moves the root at most: legs that sta
 _ASIDE = 5.0  # [m/s²] and over the ground, where it goes on besides
 _THROW = 20.0  # [m/s²] of the root that a change goes on with at most: a hand that is thrown off races its clip
 _BEND = 5.77  # greatest |ö| T² of an offset of 1 that decays from rest
-_LONGER = 1.75  # times the least blend time that a way aside makes a change last at most
+_LONGER = 1.9  # times the least blend time that a way aside makes a change last at most
+_GIVING = 0.1  # [s] in which legs begin to give way, and cease to
+_FALLS = 0.58  # [m/s²] of depth over T² at which the root, going down by the arc, falls with g
+_STRIDES = 1.2  # [m] two steps, for which a way aside may make a change last
 _SWING = 0.3  # [rad] by which a joint swings on at most
 
 
@@ -33,6 +37,8 @@ class Transition(NamedTuple):
         T of the last change [s], longer where the root has far to go, shape (1,).
     since : Array
         Time since the last change [s], infinite before the first, shape (1,).
+    depth : Array
+        By which the root goes down meanwhile [m], shape (1,).
     change : Array
         Offset of what was shown over what is asked for, with its rates, at the change, shape (3, 57).
     limbs, steps : Array
@@ -54,6 +60,7 @@ class Transition(NamedTuple):
     seconds: float
     lasts: Array
     since: Array
+    depth: Array
     change: Array
     limbs: Array
     steps: Array
@@ -71,8 +78,9 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
     """A transition before the first change, of poses of nq and tangents of nv numbers, with `packed_steppers`."""
     n = len(limbs)
     return Transition(
-        seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), change=np.zeros((3, nv)), limbs=limbs,
-        steps=np.zeros((n, STEP)), ends=np.zeros((n, 7)), rival=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
+        seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), depth=np.zeros(1),
+        change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)), ends=np.zeros((n, 7)),
+        rival=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
         ahead=np.zeros((2, nq)), stands=np.zeros(n), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
     )  # fmt: skip
 
@@ -93,13 +101,15 @@ def pivot_of(transition: Transition) -> tuple[int, int]:
 
 
 @njit
-def set_duration(transition: Transition, aside: float) -> None:
+def set_duration(transition: Transition, aside: float, period: float) -> None:
     """Let a change last long enough for the root's way: up or down, as `note_change` found it, and aside [m]."""
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
         up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
-        # No longer: what flies would fly on.
-        over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds)
+        # No longer: what flies would fly on, and who runs would leave both feet behind.
+        then, next_ = transition.shown[1], transition.shown[2]
+        pace = 0.5 * np.hypot(next_[0] - then[0], next_[1] - then[1]) / period
+        over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds, _STRIDES / max(pace, 1e-9))
         transition.lasts[0] = max(transition.seconds, up, over)
 
 
@@ -116,12 +126,34 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
     offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
     add_offset(pose, transition.offset)
-    low = 0.0
+    x = min(max(at / lasts, 0.0), 1.0)
+    pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
+    y = min(max(min(at, lasts - at) / _GIVING, 0.0), 1.0)
+    share = (y * y * y * (10.0 + y * (6.0 * y - 15.0))) ** 2
     for n in range(limbs.shape[0]):
-        low += shortfall(limbs[n], transition.steps[n], pose, ends[n]) ** 2
-    pose[2] -= np.sqrt(low)
+        put_limb(limbs[n], transition.steps[n], pose, ends[n], share)
+
+
+@njit
+def plan_depth(transition: Transition) -> None:
+    """Let the root go down by what legs are too short when one has stepped and the other is about to; `ahead` is then.
+
+    Deeper than it would fall by its own weight it does not go.
+    """
+    limbs, ends, lasts, pose = transition.limbs, transition.ends, transition.lasts[0], transition.ahead[0]
+    transition.depth[0] = 0.0
+    if transition.seconds == 0.0:
+        return
+    at, depth = 0.5 * lasts, 0.0
     for n in range(limbs.shape[0]):
-        put_limb(limbs[n], pose, ends[n])
+        limb_end(limbs[n], pose, ends[n])
+        step_end(limbs[n], transition.steps[n], at, lasts, ends[n])
+    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
+    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
+    add_offset(pose, transition.offset)
+    for n in range(limbs.shape[0]):
+        depth = max(depth, shortfall(limbs[n], transition.steps[n], pose, ends[n]))
+    transition.depth[0] = min(depth, _FALLS * lasts**2)
 
 
 @njit

@@ -10,7 +10,7 @@ from 0 to 1 in the limb's own half of the blend time, and the other foot stands 
 change and after it is the pivot (`pivot`): the new motion is placed where it has that foot, which steps second, and
 then hardly. Where there is none, the foot that the new motion stands on steps first; else the one that is higher, or
 has the longer way to go. So position, velocity and acceleration of the feet are continuous, a foot that moves does so
-above the ground, and one foot stands. The limb's joints follow (`limbs`).
+above the ground, and one foot stands. The limb's joints follow (`stepping_limbs`).
 
 A limb is a row of `packed_steppers`: `Limb.packed`, then its points as the last segment has them.
 """
@@ -22,8 +22,7 @@ from numba import njit
 
 from controllers.haptic_map.footing import packed_soles
 from controllers.haptic_map.inertialization import offset_left, stopping_way
-from controllers.haptic_map.limbs import LIMB, Limb, place_limb
-from controllers.haptic_map.vectors import cross, dot, product, turned_back, vector_at
+from controllers.haptic_map.limbs import LIMB, Limb
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
 
@@ -31,16 +30,12 @@ _LIFT = 0.2  # λ: height of a step over its length
 _TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
 _ROUND = 3e-3  # [m] a way so short is hardly worth a lift
 _LEVEL = 0.01  # [m] feet that differ by less in height are equally high
-_TOUCHES = 0.12  # [m] height from which a foot does not have to reach what it is asked for
-_SPARE = 2e-2  # [m] by which a foot that is out of reach may stay off
-_FARTHEST, _LOST = 0.5, 1.0  # of a limb's length, the way over the floor from which it is given up, and at which it is
-_BACK = 0.04  # [rad] half of which a knee bends backwards at most, before it is bent as it has to be
 _FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
 _CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
 _SOONEST = 0.05  # [s] in which a foot that falls comes to rest at least
 # A row of `steps`: when the step begins, place and orientation where the old motion comes to rest, and the offsets
 # from there with their rates, (3, 3) each; the time to get there; and the height of the floor.
-_BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, _FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28
+_BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28
 
 
 def packed_steppers(limbs: Sequence[Limb]) -> Array:
@@ -77,54 +72,6 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
         )
     x, y, z = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
     end[0], end[1], end[2] = end[0] + x, end[1] + y, end[2] + z
-
-
-@njit
-def _bend_forwards(limb: Array, rotations: Array) -> None:
-    """Take back what a limb's middle joint is bent backwards, all but a little: `place_limb` takes it for forwards.
-
-    An angle α < 0 becomes α / (1 + (α/a)²), which leaves α = 0 with two derivatives alike.
-    """
-    q = rotations[int(limb[1])]
-    a, b, axis = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12)
-    m = turned_back((q[0], q[1], q[2], q[3]), a)
-    angle = np.arctan2(dot(m, cross(b, axis)), dot(m, b) - dot(m, axis) * dot(b, axis))
-    if angle < 0.0:
-        # Beyond −π/2 it is bent forwards by more than half a turn.
-        wanted = angle / (1.0 + (angle / _BACK) ** 2) if angle > -0.5 * np.pi else -angle
-        half = 0.5 * (wanted - angle)
-        sine = np.sin(half)
-        q[0], q[1], q[2], q[3] = product(
-            (q[0], q[1], q[2], q[3]), (np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2])
-        )
-
-
-@njit
-def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
-    """How much lower the root must be for a limb to reach its end, `end` (7,), where that is near the floor [m]."""
-    line, hip = np.empty(3), rotate(pose[3], pose[4], pose[5], pose[6], limb[3], limb[4], limb[5])
-    sole, longest = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17]), 0.0
-    for i in range(3):
-        line[i] = end[i] - sole[i] - pose[i] - hip[i]
-    for first in (6, 9):
-        longest += np.sqrt(limb[first] ** 2 + limb[first + 1] ** 2 + limb[first + 2] ** 2)
-    way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
-    short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
-    # Whom the figure has left behind it does not stoop for.
-    short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
-    x = min(max(1.0 - (sole_height(limb, end) - step[_FLOOR]) / _TOUCHES, 0.0), 1.0)
-    return short * short / (short + _SPARE) * x * x * x * (10.0 + x * (6.0 * x - 15.0))
-
-
-@njit
-def put_limb(limb: Array, pose: Pose, end: Array) -> None:
-    """Correct the joints of a limb such that its end is where `end` (7,) says."""
-    rotations = pose[3:].reshape(-1, 4)
-    _bend_forwards(limb, rotations)
-    # Once from a limb that is straight leaves up to two centimetres.
-    for _ in range(2):
-        rotations[int(limb[2])] = end[3:]
-        place_limb(limb, rotations, np.empty((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
 
 
 @njit
@@ -219,7 +166,7 @@ def plan_steps(
         # Nor farther than a leg in full swing can be caught.
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _CAUGHT / max(speed, 1e-9), _SOONEST))
-        step[_STOP], step[_FLOOR] = stop, ground
+        step[_STOP], step[FLOOR] = stop, ground
         _come_to_rest(ends[:, :3], period, stop, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
         w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
         for j in range(3):
@@ -250,7 +197,7 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     if x >= 1.0:
         return
     share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    left, floor = np.empty(3), min(step[_FLOOR], sole_height(limb, end))
+    left, floor = np.empty(3), min(step[FLOOR], sole_height(limb, end))
     # What the old motion still carries it counts too: a foot in mid-swing would scrape.
     way = step[_AWAY] ** 2 + step[_AWAY + 1] ** 2
     offset_left(step[_AWAY:_TURNED].reshape(3, 3), stop, min(s, stop), left)

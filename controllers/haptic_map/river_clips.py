@@ -34,6 +34,7 @@ RIVER, PHASE, STILL, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3
 # Parameters: a header, offsets of the packed curves and of the phases of rest, both, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip
+_SOON = 0.03  # [s] by which it is foreseen that it will be
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
 
@@ -94,12 +95,29 @@ def phase_rate(params: Array, memory: Array, later: Array, period: float) -> flo
 
 
 @njit
-def lets_go(params: Array, memory: Array, river: float, x: Array, rate: float) -> bool:
-    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays, or races it."""
-    curve, found = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2))
+def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
+    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays, or races it.
+
+    A hand (3, 3), with its rates, that is thrown off is not followed until it does: it counts where it will be soon.
+    Half way to the curve's centre of curvature its pace is no pace of the river's, too.
+    """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
-    return abs(rate) > _RACES or branches(params, curve, x[0], x[1], x[2], params[_TUBE], found) == 0
+    curve, found, x, v = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2)), np.empty(3), np.empty(3)
+    outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[_TUBE], found) == 0
+    if outside or abs(rate) > _RACES:
+        return True
+    for i in range(3):
+        x[i] = hand[0, i] + _SOON * hand[1, i] + 0.5 * _SOON**2 * hand[2, i]
+        v[i] = hand[1, i] + _SOON * hand[2, i]
+    phase = _phase_near(params, curve, x, memory[PHASE])
+    there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    bend, gain, slope, square = curve_acceleration(params, curve, phase), 0.0, 0.0, 0.0
+    for i in range(3):
+        gain += v[i] * along[i]
+        slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
+        square += along[i] ** 2
+    return slope < 0.5 * square or abs(gain) > _RACES * slope
 
 
 @njit

@@ -107,21 +107,25 @@ def test_no_river_and_none_that_there_is_not_take_over() -> None:
 def test_a_hand_outside_the_tube_is_let_go_once_and_has_no_frame_then() -> None:
     params, memory = MAP.compiled().params, _memory(0, 1.0)
     inside, outside = CURVES[0].point(1.0) * 1.3, CURVES[0].point(1.0) * 1.5
-    assert [lets_go(params, memory, river, p, 1.0) for river in (-1.0, 0.0) for p in (inside, outside)] == [0, 1, 0, 0]
-    # One that races along in the tube plays no clip either, whichever way.
-    assert [lets_go(params, memory, river, inside, rate) for river in (-1.0, 0.0) for rate in (3.0, -3.0)] == [
-        1,
-        1,
-        0,
-        0,
-    ]
+    along = CURVES[0].velocity(1.0)
+
+    def _goes(p: np.ndarray, rate: float, gain: float = 0.0, river: float = -1.0) -> bool:
+        """Whether a hand at p that goes at a rate of the river's pace, and gains so much of it a second, is let go."""
+        return lets_go(params, memory, river, np.stack([p, rate * along, gain * along]), rate)
+
+    assert [_goes(p, 1.0, 0.0, river) for river in (-1.0, 0.0) for p in (inside, outside)] == [0, 1, 0, 0]
+    # One that races along in the tube plays no clip either, whichever way, nor one that soon will.
+    assert [_goes(inside, rate, 0.0, river) for river in (-1.0, 0.0) for rate in (3.0, -3.0)] == [1, 1, 0, 0]
+    assert [_goes(inside, 1.0, gain) for gain in (10.0, 100.0, -20.0, -200.0)] == [0, 1, 0, 1]
+    # Near the centre of the curve's bend its pace is no pace.
+    assert [_goes(CURVES[0].point(1.0) * share, 0.0) for share in (0.8, 0.9)] == [0, 0]
     stop_clip(params, memory, 0.25)
     stopped = MAP.pose(_stylus(outside), memory)
     np.testing.assert_array_equal(MAP.pose(_stylus(CURVES[0].point(3.0)), memory), stopped)
     np.testing.assert_array_equal(MAP.jacobian(_stylus(outside), memory), 0.0)
     expected = MAP.pose(_stylus(CURVES[0].point(1.25)), _memory(0, 1.25))
     np.testing.assert_allclose(stopped, expected, atol=1e-9)
-    assert not lets_go(params, memory, -1.0, outside, 1.0)
+    assert not _goes(outside, 1.0)
     # Its own river takes it from none.
     assert takes_over(params, memory, 0.0)
     change_clip(memory, 0.0, 3.0)
