@@ -66,6 +66,13 @@ def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+def test_a_robot_arm_compiles_nothing_in_the_process_of_its_run(tmp_path: Path) -> None:
+    process = _process(_TELLS + _RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    assert "The stylus ran" in process.stdout
+    assert _compiled(process) == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls"), ("--mode", "rivers", "--map", "rivers")],
