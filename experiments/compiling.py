@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
 from controllers.fields.program import LAW_KERNELS
@@ -61,10 +62,12 @@ def _compile(config: Config) -> None:
         servo, world, _ = wire_arm(config, parts.update)
     else:
         from experiments.clips import load_clips
+        from experiments.run import default_poses
         from experiments.wiring import wire
 
         session = wire(config, load_clips(config.clips)[0], ready=parts.update)
         servo, world = session.servo, session.world
+        default_poses(session)(np.empty((0, 3)), np.empty(0), np.empty(0))
     Loop(servo, world).run(servo.plant.period * servo.figure_ticks)
     for part in parts:
         _mark(part).touch()

@@ -7,16 +7,19 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.clip_arrays import clip_arrays
 from controllers.haptic_map.composite import Composite
-from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.cylindrical import Cylindrical, correction_shape
 from controllers.haptic_map.footsteps import packed_steppers
 from controllers.haptic_map.joint_limits import MARGIN
 from controllers.haptic_map.limbs import Limb
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.config import RunConfig
+from experiments.kept import kept_array
 from experiments.modes import default_rivers
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
 from models.mocap.clip import Clip
+from sim.compiled import CACHE_FOLDER
 
 Array = npt.NDArray[np.float64]
 
@@ -46,7 +49,7 @@ def clip_map(
     legs = figure_legs(figure)
     if config.map == "cylindrical":
         corners = [motions[i % len(motions)] for i in range(4)]
-        return Cylindrical(corners, radii, (-config.reach, config.reach), legs)
+        return _cylindrical(corners, radii, (-config.reach, config.reach), legs)
     if config.map == "rivers":
         if config.mode != "rivers" or config.crossing == "sum":
             raise ParameterError(
@@ -58,6 +61,20 @@ def clip_map(
     lower, red, blue = (motions[i % len(motions)] for i in range(3))
     upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
     return Composite(lower, red, blue, sorted(upper), radii, legs)
+
+
+def _cylindrical(
+    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...]
+) -> Cylindrical:
+    """The map of four clips; its corrections, once found, are kept beside the compiled code."""
+
+    def find() -> Array:
+        return Cylindrical(clips, radii, heights, legs).corrections
+
+    # Where the clips blend is not among what they depend on.
+    made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
+    corrections = kept_array(CACHE_FOLDER, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    return Cylindrical(clips, radii, heights, legs, corrections)
 
 
 def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:

@@ -12,7 +12,6 @@ from controllers.fields.instructions import Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
 from controllers.state import HandState, Wrench
-from experiments.ballistics import clip_ballistics
 from experiments.config import RunConfig
 from experiments.modes import Field, law
 from models.mocap.clip import Clip
@@ -65,6 +64,8 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
     ModelError
         If the map's poses are not the figure's.
     """
+    from experiments.ballistics import clip_ballistics  # statistics take long to import, for a run without a governor
+
     clip = animation_along(haptic_map, curve, river)
     share = np.linspace(0.0, 1.0, clip.n_frames)
     # |φ̇| when a pass takes as long as the clips do.

@@ -34,7 +34,7 @@ def kept_array(
     made_of : iterable of arrays
         Everything that the result depends on.
     shape : tuple of int
-        Of the result.
+        Of the result; the first may be −1, for any number of rows.
     find : callable
         What makes it.
     """
@@ -43,9 +43,11 @@ def kept_array(
         content = path.read_bytes()
     except OSError:
         content = b""
-    kept = np.frombuffer(content[_SIZE:]) if len(content) == _SIZE + 8 * int(np.prod(shape)) else None
-    if kept is not None and _digest([kept]) == content[:_SIZE]:
-        return kept.reshape(shape).copy()
+    rows, rest = divmod(len(content) - _SIZE, 8 * int(np.prod(shape[1:])))
+    if rest == 0 and rows >= 0 and shape[0] in (-1, rows):
+        kept = np.frombuffer(content[_SIZE:])
+        if _digest([kept]) == content[:_SIZE]:
+            return kept.reshape(shape).copy()
     found = np.ascontiguousarray(find(), dtype=np.float64)
     with suppress(OSError):
         _write(path, _digest([found.ravel()]) + found.tobytes())

@@ -24,6 +24,7 @@ MOMENTS = 5  # of the figure, evenly over the second half of the run
 SPACING = 1.25  # between them [m]
 GHOST_AT = np.array([-0.75, 0.0])  # of the animation, behind the physical figure [m]
 GREEN, GHOST = (0.13, 0.63, 0.27, 1.0), (0.3, 0.55, 0.85, 0.4)
+OPACITY = 0.45  # of tubes
 MOST_GEOMS = 20_000
 
 
@@ -103,9 +104,9 @@ def _camera(lookat: Array, distance: float, azimuth: float, elevation: float) ->
     return camera
 
 
-def _rgba(color: str, opacity: float) -> tuple[float, float, float, float]:
+def _rgba(color: str) -> tuple[float, float, float, float]:
     red, green, blue = rgb(color)
-    return red / 255, green / 255, blue / 255, opacity
+    return red / 255, green / 255, blue / 255, 1.0
 
 
 def _device(recording: Recording, stage: _Stage) -> npt.NDArray[np.uint8]:
@@ -116,18 +117,22 @@ def _device(recording: Recording, stage: _Stage) -> npt.NDArray[np.uint8]:
     frame = int(np.argmin(np.abs(recording.channel("frames", "t")[:] - t)))
     stage.clear(_camera(P_WH + np.array([0.06, 0.0, 0.0]), 0.75, 62.0, -20.0), table=True)
     stage.add(recording.channel("frames", "qpos")[frame], figure=False)
-    radius = float(recording.array("tube_radius")) / 3.0
-    for course in courses(recording.arrays | recording.texts):
+    drawn = courses(recording.arrays | recording.texts)
+    for course in drawn:
         for start, end in itertools.pairwise(P_WH + course.points):
-            stage.line(start, end, 0.0012, _rgba(course.line, 1.0), arrow=False)
-            if radius > 0.0:
-                stage.line(start, end, radius, _rgba(course.tube, 0.22), arrow=False)
+            stage.line(start, end, 0.0012, _rgba(course.line), arrow=False)
     path = P_WH + p[max(0, tick - 600) : tick + 1 : 20]
     for start, end in itertools.pairwise(path):
         stage.line(start, end, 0.0018, GREEN, arrow=False)
     if np.linalg.norm(force[tick]) > 0.0:
         stage.line(P_WH + p[tick], P_WH + p[tick] + 0.03 * force[tick], 0.005, GREEN, arrow=True)
-    return stage.render()
+    bare, radius = stage.render().astype(np.float64), float(recording.array("tube_radius")) / 3.0
+    if radius > 0.0:
+        for course in drawn:
+            for start, end in itertools.pairwise(P_WH + course.points):
+                stage.line(start, end, radius, _rgba(course.tube), arrow=False)
+    # Many transparent rods one in the other would be striped.
+    return np.rint((1.0 - OPACITY) * bare + OPACITY * stage.render()).astype(np.uint8)
 
 
 def _figures(recording: Recording, stage: _Stage) -> npt.NDArray[np.uint8]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.fields.algebra import smooth_step
+from controllers.easing import smooth_step
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder

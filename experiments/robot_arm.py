@@ -15,7 +15,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.energy_tank import river_power
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
-from controllers.haptic_map.robot_arm import RobotArm
+from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.robot_arm import ROBOT_ARM, RobotArm
 from controllers.safety import ForceLimiter
 from experiments.budget import fastest, tank_for
 from experiments.compiling import compile_once, compiled_parts
@@ -34,7 +35,7 @@ from sim.loop import Loop, groups, tick_channels
 from sim.plant import make_hand, make_plant
 from sim.recorder import Group, Recorder
 from sim.recording import Recording
-from sim.reference import make_reference
+from sim.reference import check_reference, make_reference, poses_along
 from sim.robot import REPORT_SATURATED, RobotWorld, robot_state
 from sim.servo import Field, FrameLog, Servo, TickLog
 from sim.users.arm import Arm
@@ -99,7 +100,15 @@ class ArmSummary:
 def robot_arm_map() -> RobotArm:
     """The default map: the stylus leads the tool in front of the arm, 1.5 times as far as it moves itself."""
     arm = arm_model()
-    return RobotArm(arm_lengths(arm), arm_limits(arm), HOME, ORIENTATION, SCALE, REACH, TURN, float(ARM_ANGLE))
+    return RobotArm(
+        arm_lengths(arm), arm_limits(arm), HOME, ORIENTATION, SCALE, REACH, TURN, float(ARM_ANGLE), _evaluated
+    )
+
+
+def _evaluated(compiled: CompiledMap, points: Array) -> Array:
+    poses = np.empty((len(points), len(ARM_JOINTS)))
+    poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
+    return poses
 
 
 def tilted_circle(radius: float, lap: float) -> Trajectory:
@@ -131,7 +140,7 @@ def wire_arm(
     for name in ("lap", "radius"):
         if not (np.isfinite(getattr(config, name)) and getattr(config, name) > 0.0):
             raise ParameterError(f"{name} is {getattr(config, name)}; expected a positive, finite number")
-    world, haptic_map = RobotWorld(config.scene), robot_arm_map()
+    world = RobotWorld(config.scene)
     curve = tilted_circle(config.radius, config.lap)
     program = Follow(curve, config.stiffness, config.damping, config.tube).program()
     period = config.scene.servo_period
@@ -143,10 +152,12 @@ def wire_arm(
     world.reset(start)
     stylus = np.empty(4)
     mujoco.mju_mat2Quat(stylus, world.data.site(PHANTOM + "tip").xmat)
-    world.put_arm(haptic_map.pose(np.concatenate([start, stylus])))
     port = phantom_port(world.model, world.data, period, config.cutoff)
-    compiled = haptic_map.compiled()
-    ready(compiled_parts("arm", compiled, program.ops))
+    check_reference(period * config.arm_ticks, config.smoothing, 0.0)
+    # The map looks at its domain with compiled code, when everything else has been checked.
+    ready(compiled_parts("arm", CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), program.ops))
+    compiled = robot_arm_map().compiled()
+    world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
     servo = Servo(
         plant=make_plant(world),
         port=port,

@@ -43,7 +43,7 @@ from sim.reference import make_reference, poses_along, reference_along
 from sim.servo import FrameLog, TickLog
 from sim.users.intent import Grab, Push, Turn
 from sim.viewer.courses import courses
-from sim.viewer.page import LivePage, NullPage, Page
+from sim.viewer.page import NullPage, Page
 
 Array = npt.NDArray[np.float64]
 
@@ -183,6 +183,8 @@ def _simulate(session: Session, recorder: Recorder, console: Console, started: f
 
 
 def _live_page(session: Session) -> Page:
+    from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
+
     static = session.static()
     return LivePage(session.world.model, courses(static), float(np.asarray(static["tube_radius"])), P_WH)
 

@@ -46,6 +46,7 @@ from models.scene import FIGURE
 from sim.devices.phantom_port import PhantomPort, phantom_port, sense_in_motion
 from sim.figure import Figure, FigureGains
 from sim.kernel_units import law_units
+from sim.map_derivative import map_derivative
 from sim.plant import make_hand, make_plant
 from sim.reference import begin_in_motion, check_reference, make_reference, poses_along
 from sim.servo import Field as CompiledField
@@ -85,6 +86,7 @@ def wire(
         raise ParameterError(
             f"figure_ticks is {config.figure_ticks}; expected 1 or more servo ticks between two updates"
         )
+    config.scene.substeps()  # the rates, by which the others are measured
     least = 2 * config.figure_ticks * config.scene.servo_period
     if not least <= config.seconds < np.inf:
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
@@ -163,7 +165,7 @@ def wire(
     orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
     if moves:
         v_H = begin.velocity
-        velocity = haptic_map.jacobian(argument[0])[:, :3] @ v_H
+        velocity = map_derivative(haptic_map, argument[0])[:, :3] @ v_H
         begin_in_motion(reference, np.array(begin))
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(begin.point, poses[0], orientation, v_H, velocity)

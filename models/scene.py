@@ -53,8 +53,8 @@ class SceneConfig:
         """
         if not (0.0 < self.physics_step <= self.servo_period <= 0.1):
             raise ModelError(
-                f"physics step {self.physics_step} s and servo period {self.servo_period} s: "
-                "expected 0 < step ≤ period ≤ 0.1 s"
+                f"servo_period is {self.servo_period} s and physics_step {self.physics_step} s; "
+                "expected 0 < physics_step ≤ servo_period ≤ 0.1 s"
             )
         ratio = self.servo_period / self.physics_step
         if abs(ratio - round(ratio)) > 1e-6:

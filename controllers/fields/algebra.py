@@ -7,19 +7,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
 WEIGHT_SIZE = 6  # kind, whether 1 − s is meant, four numbers
-
-
-@njit
-def smooth_step(x: float) -> float:
-    """C² step: 0 up to x = 0, 6x⁵ − 15x⁴ + 10x³, and 1 from x = 1."""
-    x = np.maximum(0.0, np.minimum(1.0, x))
-    return x * x * x * (x * (6.0 * x - 15.0) + 10.0)
 
 
 @njit

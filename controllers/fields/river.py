@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from numba import njit
-from scipy.integrate import solve_ivp
 
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
@@ -138,6 +137,8 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_st
     ControllerError
         If the integration fails.
     """
+    from scipy.integrate import solve_ivp  # the servo integrates nothing, and imports this file
+
     wanted = np.asarray(times, dtype=float)
     solution = solve_ivp(
         flow, (wanted[0], wanted[-1]), np.asarray(start, dtype=float), "DOP853", wanted,

@@ -14,6 +14,7 @@ of a millimetre sideways in a fiftieth of a second asks the body for more than t
 import numpy as np
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.haptic_map.splines import round_lap
 from controllers.state import Array
 
@@ -42,7 +43,7 @@ def draw_in(r: float, z: float, sites: Array, slopes: Array, place: Array, chang
         share = np.sqrt(x * x + y * y) / core
         if share >= 1.0:
             continue
-        s = share * share * share * (share * (6.0 * share - 15.0) + 10.0)
+        s = smooth_step(share)
         # S' over the share, so that at the site nothing is divided by zero.
         g = 30.0 * share * (1.0 - share) * (1.0 - share)
         place[0], place[1] = sites[i, 0] + s * x, sites[i, 1] + s * y

@@ -14,7 +14,7 @@ from controllers.haptic_map.clearance import cleared
 from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.inbetween import ROOT, correction, interpolation, packed_table, table_channels
+from controllers.haptic_map.inbetween import FOOT, ROOT, correction, interpolation, packed_table, table_channels
 from controllers.haptic_map.limb_ends import with_ends
 from controllers.haptic_map.limbs import Limb
 from controllers.state import Array
@@ -63,6 +63,11 @@ def _mixtures(steps: int) -> tuple[Array, Array]:
     return places, np.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], axis=-1)
 
 
+def correction_shape(limbs: int) -> tuple[int, int]:
+    """Shape of a map's corrections at one place of the lap: how many mixtures it has, and channels of so many limbs."""
+    return _NODES**2, ROOT + FOOT * limbs
+
+
 class Cylindrical(AnimationMap):
     r"""Four clips round a cylinder about the z axis of H.
 
@@ -86,11 +91,15 @@ class Cylindrical(AnimationMap):
         Intervals [m] over which the clips blend; r_min > 0.
     limbs : sequence of Limb
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+    corrections : Array, shape (n, k, 2 + 4 limbs), optional
+        What a map of the same clips and limbs has as its `corrections`, which then need not be found again.
 
     Attributes
     ----------
     mixtures : Array, shape (k, 4)
         Weights of the clips at the nodes of the table.
+    corrections : Array, shape (n, k, 2 + 4 limbs)
+        Of the ends at the mixtures, at equal steps of the lap; none without limbs.
     drifts : Array, shape (4, 3)
         ξ of each clip.
 
@@ -106,6 +115,7 @@ class Cylindrical(AnimationMap):
         r_range: tuple[float, float],
         z_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
+        corrections: Array | None = None,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -117,20 +127,23 @@ class Cylindrical(AnimationMap):
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
+        self.corrections: Array = np.empty((0, len(self.mixtures), ROOT))
         if limbs:
-            rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
-            channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
-            found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
-            share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
-            shares = np.einsum("ai,bj->abij", share, share).reshape(_BETWEEN**2, _NODES**2)
-            between = _mixtures(_BETWEEN)[1]
-            self._correct(cleared(found, channels, self.drifts, limbs, self.mixtures, between, shares))
+            self._correct(self._found(limbs) if corrections is None else corrections)
+
+    def _found(self, limbs: Sequence[Limb]) -> Array:
+        rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
+        channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
+        found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
+        share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
+        shares = np.einsum("ai,bj->abij", share, share).reshape(_BETWEEN**2, _NODES**2)
+        return cleared(found, channels, self.drifts, limbs, self.mixtures, _mixtures(_BETWEEN)[1], shares)
 
     def _correct(self, values: Array) -> None:
         table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))
         blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
         self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
-        self._corrections = values
+        self.corrections = values
 
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
@@ -150,7 +163,7 @@ class Cylindrical(AnimationMap):
             At equal steps of the lap [m], in the frame of the lap's drift.
         """
         other = copy(self)
-        values = self._corrections.copy()
+        values = self.corrections.copy()
         rows = len(values)
         values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
         other._correct(values)
@@ -160,7 +173,7 @@ class Cylindrical(AnimationMap):
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         arrays = {"domain": np.array([self.r_range, self.z_range])}
         if self.limbs:
-            arrays["corrections"] = self._corrections
+            arrays["corrections"] = self.corrections
         return arrays | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
@@ -173,7 +186,7 @@ class Cylindrical(AnimationMap):
             If an array is missing, or they make no map.
         """
         (r_low, r_high), (z_low, z_high) = kept(arrays, "domain", (2, 2)).tolist()
-        made = Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), kept_limbs(arrays))
-        if made.limbs:
-            made._correct(kept(arrays, "corrections", (None, *made._corrections.shape[1:])))
-        return made
+        limbs, corrections = kept_limbs(arrays), None
+        if limbs:
+            corrections = kept(arrays, "corrections", (None, *correction_shape(len(limbs))))
+        return Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), limbs, corrections)

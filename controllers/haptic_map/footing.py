@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.haptic_map.limbs import Limb
 from controllers.rotations import multiply, rotate
@@ -56,8 +57,7 @@ def packed_soles(limbs: Sequence[Limb]) -> Array:
 @njit
 def _step_down(x: float, low: float, high: float) -> float:
     """C² step from 1 at `low` to 0 at `high`."""
-    x = min(max((high - x) / (high - low), 0.0), 1.0)
-    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return smooth_step((high - x) / (high - low))
 
 
 @njit

@@ -9,7 +9,9 @@ it coasts out of the one and into the other, and eases between; rotations take t
 is changed by it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numba import njit
@@ -26,6 +28,13 @@ WIDEST_STEP = 0.5 * np.pi  # [rad] between two frames
 _TURN = 2.0 * np.pi
 _COAST = 0.4  # [rad] of θ over which an open clip coasts out and in, at most the gap
 _KNOTS, _START, _FIRST_KNOT, _FIRST_ROW, _HEADER = range(5)
+
+
+@njit
+def _hermite(u: float, width: float) -> tuple[float, float, float, float]:
+    """Weights of value and slope at the left end of an interval, and at the right, at u in [0, 1]."""
+    v = 1.0 - u
+    return v * v * (1.0 + 2.0 * u), width * u * v * v, u * u * (3.0 - 2.0 * u), -width * u * u * v
 
 
 @njit
@@ -58,8 +67,7 @@ def interpolate_frames(clips: Array, clip: int, angle: float, value: Array, slop
     width = clips[knots + low + 1] - clips[knots + low]
     u = (angle - clips[knots + low]) / width
     v = 1.0 - u
-    y0, y1 = v * v * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u)
-    m0, m1 = width * u * v * v, -width * u * u * v
+    y0, m0, y1, m1 = _hermite(u, width)
     d, d0, d1 = 6.0 * u * v / width, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
     first = rows + 2 * channels * low
     a, da = clips[first : first + channels], clips[first + channels : first + 2 * channels]
@@ -68,6 +76,17 @@ def interpolate_frames(clips: Array, clip: int, angle: float, value: Array, slop
     for k in range(channels):
         value[k] = y0 * a[k] + m0 * da[k] + y1 * b[k] + m1 * db[k]
         slope[k] = d * (b[k] - a[k]) + d0 * da[k] + d1 * db[k]
+
+
+def frames_at(spline: tuple[Array, Array, Array], angles: Array) -> Array:
+    """Channels (n, channels) of one clip's `lap_spline` at angles θ (n,) in [0, 2π]: `interpolate_frames` in NumPy."""
+    knots, values, slopes = spline
+    around = np.where(angles < knots[0], angles + _TURN, angles)
+    low = np.clip(np.searchsorted(knots, around, "right") - 1, 0, len(knots) - 2)
+    width = knots[low + 1] - knots[low]
+    weights = cast(Callable[[Array, Array], tuple[Array, ...]], _hermite.py_func)
+    y0, m0, y1, m1 = (weight[:, None] for weight in weights((around - knots[low]) / width, width))
+    return y0 * values[low] + m0 * slopes[low] + y1 * values[low + 1] + m1 * slopes[low + 1]
 
 
 def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array:

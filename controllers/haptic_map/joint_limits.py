@@ -13,6 +13,7 @@ far is no limb's pose, and is at least continuous. Within the limits nothing is 
 import numpy as np
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.haptic_map.saturation import clamped
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.state import Array, Quat
@@ -26,7 +27,7 @@ _LOW, _HIGH = 0.15, 0.35  # height of the end [m] between which A rises
 def _step(x: float) -> tuple[float, float]:
     """C² step from 0 to 1 on [0, 1], and its derivative."""
     x = min(max(x, 0.0), 1.0)
-    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * (x * (1.0 - x)) ** 2
+    return smooth_step(x), 30.0 * (x * (1.0 - x)) ** 2
 
 
 @njit

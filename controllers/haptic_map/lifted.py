@@ -20,6 +20,7 @@ from controllers.haptic_map.frames import (
     PlacedClip,
     checked_angles,
     closing_gap,
+    frames_at,
     interpolate_frames,
     lap_spline,
     packed_frames,
@@ -296,7 +297,7 @@ class Lifted(ClipMap):
             drifts.ravel(),
             packed_frames(splines),
             packed_neighbours(self.sites, (low[0] - half, high[0] + half), (low[1] - half, high[1] + half)),
-            self._packed_pairs(packed_frames(splines), channels[0].shape[1], lags, limbs),
+            self._packed_pairs(splines, lags, limbs),
             self._packed_soles(channels, limbs),
         ]
         at = _FIGURE + np.cumsum([block.size for block in blocks[:-1]])
@@ -310,13 +311,11 @@ class Lifted(ClipMap):
             [floor], *(grounds(clip[:, None], limbs) for clip in channels), packed_soles(limbs),
         ])  # fmt: skip
 
-    def _packed_pairs(self, frames: Array, size: int, lags: Array, limbs: Sequence[Limb]) -> Array:
+    def _packed_pairs(self, splines: list[tuple[Array, Array, Array]], lags: Array, limbs: Sequence[Limb]) -> Array:
         rows = int(np.clip(max(len(clip.poses) for clip in self._placed), 64, _ROWS)) if limbs else 1
         phases = np.arange(rows) * 2.0 * np.pi / rows
-        channels, last = np.empty((rows, len(self._placed), size)), size - END * len(limbs)
-        for i in range(len(self._placed)):
-            for phase, value in zip(phases, channels[:, i], strict=True):
-                interpolate_frames(frames, i, phase, value, np.empty_like(value))
+        channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
+        last = channels.shape[2] - END * len(limbs)
         rotations = channels[..., 3:last].reshape(rows, len(self._placed), -1, 4)
         rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
         channels[..., 3:last] = rotations.reshape(rows, len(self._placed), -1)
@@ -330,11 +329,8 @@ class Lifted(ClipMap):
         if not self._drifts[:, 2].any() or not limbs:
             return np.zeros((_LAGS, len(limbs)))
         phases = np.arange(_LAGS) * 2.0 * np.pi / _LAGS
-        channels = np.empty((_LAGS, len(self._placed), 3 + 4 * rotations))
-        for i, clip in enumerate(self._placed):
-            packed = packed_frames([lap_spline(clip.angles, clip.remainder, rotations, clip.closed)])
-            for phase, value in zip(phases, channels[:, i], strict=True):
-                interpolate_frames(packed, 0, phase, value, np.empty_like(value))
+        splines = [lap_spline(clip.angles, clip.remainder, rotations, clip.closed) for clip in self._placed]
+        channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
         return np.stack([end_lag(end_poses(channels, limb)[0], self._drifts) for limb in limbs], axis=1)
 
 

@@ -17,7 +17,7 @@ and the angles of shoulder and wrist are those of R_03 and R_04ᵀ R_T. The redu
 so that a closed path of the tool is a closed path of the joints. h_* follows the same steps.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -175,6 +175,9 @@ class RobotArm(HapticMap):
         Likewise of the stylus's rotation from upright [rad].
     arm_angle : float
         ψ [rad].
+    evaluate : callable, optional
+        How the arm's domain is checked: h of this map at stylus poses (n, 7), shape (n, 7), by compiled code that is
+        there already. By default Python calls the kernel, which is then compiled.
 
     Raises
     ------
@@ -193,6 +196,7 @@ class RobotArm(HapticMap):
         reach: tuple[float, float],
         turn: tuple[float, float],
         arm_angle: float,
+        evaluate: Callable[[CompiledMap, Array], Array] | None = None,
     ) -> None:
         q = np.asarray(orientation, dtype=float)
         numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
@@ -203,7 +207,7 @@ class RobotArm(HapticMap):
             raise ParameterError(
                 f"scale {scale}, reach {reach} m, turn {turn} rad; expected positive numbers, intervals that increase"
             )
-        self._check_domain(np.asarray(limits, dtype=float))
+        self._check_domain(np.asarray(limits, dtype=float), evaluate or self._evaluated)
 
     @property
     def nq(self) -> int:
@@ -235,22 +239,24 @@ class RobotArm(HapticMap):
         robot_arm_map(self._params, _stylus(x), np.zeros(0), np.empty(JOINTS), jacobian)
         return jacobian
 
-    def _check_domain(self, limits: Array) -> None:
+    def _evaluated(self, compiled: CompiledMap, points: Array) -> Array:
+        return np.array([self.pose(x) for x in points])
+
+    def _check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array]) -> None:
         """Refuse a domain in whose ball and cone the arm does not work, on a grid of directions and sizes."""
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
-        for place in _FAR * directions:
-            for turn in _NEARLY_BACK * directions:
-                x = np.concatenate([place, exponential(*turn)])
-                q = self.pose(x)
-                straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
-                if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
-                    raise ParameterError(
-                        f"the arm cannot follow a stylus at {np.round(1e3 * place)} mm turned by "
-                        f"{np.round(np.degrees(turn))}°: joint angles {np.round(np.degrees(q))}°; expected "
-                        f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
-                        f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
-                    )
+        edge = [(place, turn) for place in _FAR * directions for turn in _NEARLY_BACK * directions]
+        points = np.array([np.concatenate([place, exponential.py_func(*turn)]) for place, turn in edge])
+        for (place, turn), q in zip(edge, evaluate(self.compiled(), points), strict=True):
+            straight = np.abs(q[[1, 3, 5]]).min() < _LEAST_BEND
+            if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
+                raise ParameterError(
+                    f"the arm cannot follow a stylus at {np.round(1e3 * place)} mm turned by "
+                    f"{np.round(np.degrees(turn))}°: joint angles {np.round(np.degrees(q))}°; expected "
+                    f"them within {np.round(np.degrees(limits)).tolist()} and the joints 2, 4, 6 bent by "
+                    f"{np.degrees(_LEAST_BEND):.0f}° or more; take a smaller scale, reach or turn, or another home"
+                )
 
 
 def _stylus(x: Array) -> Array:

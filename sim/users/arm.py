@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.easing import smooth_step
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn, grab_table, push_table, turn_table
 
@@ -90,7 +91,7 @@ def arm_force(
 def _least_jerk(s: float) -> tuple[float, float]:
     """σ(s) = 10 s³ − 15 s⁴ + 6 s⁵ and σ′(s), at rest outside [0, 1]."""
     s = min(max(s, 0.0), 1.0)
-    return s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * s * s * (1.0 - s) * (1.0 - s)
+    return smooth_step(s), 30.0 * s * s * (1.0 - s) * (1.0 - s)
 
 
 @njit

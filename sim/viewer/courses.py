@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sim.viewer.palette import CURVE, RIVERS, TUBE
+from sim.viewer.palette import CURVE, TUBE, river_colors
 
 Array = npt.NDArray[np.float64]
 
@@ -35,7 +35,5 @@ def courses(static: Mapping[str, npt.ArrayLike | str]) -> tuple[Course, ...]:
     if "river_curves" not in static:
         return (Course("", np.asarray(static["curve"], dtype=np.float64), CURVE, TUBE),)
     names, curves = str(static["river_names"]).split("\n"), np.asarray(static["river_curves"], dtype=np.float64)
-    return tuple(
-        Course(name, points, RIVERS[k % len(RIVERS)], RIVERS[k % len(RIVERS)])
-        for k, (name, points) in enumerate(zip(names, curves, strict=True))
-    )
+    drawn = zip(names, curves, river_colors(len(names)), strict=True)
+    return tuple(Course(name, points, color, color) for name, points, color in drawn)

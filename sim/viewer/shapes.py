@@ -10,6 +10,8 @@ from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
 Array = npt.NDArray[np.float64]
 
+_LEAST_STEP = 1e-12  # [m] from one point to the next, that has a direction
+_LEAST_NORMAL = 1e-6  # of what is left of a unit normal
 _FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for looking at
 
 
@@ -88,13 +90,15 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDAr
     tangents = np.gradient(points, axis=0)
     if closed:
         tangents[0] = tangents[-1] = points[1] - points[-2]
-    # Where a path turns back on itself it has no direction, and the ring collapses.
-    tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
-    normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
+    tangents = _directions(tangents)
+    normal = np.zeros(3)
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     rings = np.empty((len(points), sides, 3))
     for ring, point, tangent in zip(rings, points, tangents, strict=True):
         normal = normal - (normal @ tangent) * tangent
+        if np.linalg.norm(normal) < _LEAST_NORMAL:
+            # There is none yet, or a corner has turned the path to where it was.
+            normal = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
         normal /= np.linalg.norm(normal)
         ring[:] = point + radius * (
             np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * np.cross(tangent, normal)
@@ -104,3 +108,13 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDAr
     c, d = first[1:], np.roll(first, -1, axis=1)[1:]
     faces = np.concatenate([np.stack([a, b, d], axis=-1).reshape(-1, 3), np.stack([a, d, c], axis=-1).reshape(-1, 3)])
     return rings.reshape(-1, 3), faces
+
+
+def _directions(tangents: Array) -> Array:
+    """Unit tangents (n, 3); where a path rests or turns back on itself, the last one before, or else the first."""
+    lengths = np.linalg.norm(tangents, axis=1)
+    moves = np.flatnonzero(lengths > _LEAST_STEP)
+    if len(moves) == 0:
+        return np.tile([1.0, 0.0, 0.0], (len(tangents), 1))
+    last = np.maximum(np.searchsorted(moves, np.arange(len(tangents)), "right") - 1, 0)
+    return tangents[moves[last]] / lengths[moves[last], None]

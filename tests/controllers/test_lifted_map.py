@@ -6,7 +6,7 @@ from clips_for_maps import LEG, difference, stylus, swinging
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.frames import closing_gap
+from controllers.haptic_map.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
 from controllers.haptic_map.lifted import Lifted
 from sim.kernel_units import map_units
 
@@ -53,6 +53,17 @@ def worst_at_frames(lifted):
 
 def test_every_frame_of_every_clip_is_exact_on_its_curve():
     assert worst_at_frames(MAP) < 1e-9
+
+
+@pytest.mark.parametrize("i", range(4))
+def test_channels_at_many_angles_are_those_of_the_kernel_to_the_last_bit(i):
+    clip = MAP._placed[i]
+    spline = lap_spline(clip.angles, clip.remainder, 4, clip.closed)
+    angles = np.concatenate([np.linspace(0.0, TURN, 200), np.mod(spline[0], TURN), [np.nextafter(TURN, 0.0)]])
+    packed, value, slope = packed_frames([spline]), *np.empty((2, clip.poses.shape[1]))
+    for angle, row in zip(angles, frames_at(spline, angles), strict=True):
+        interpolate_frames(packed, 0, angle, value, slope)
+        np.testing.assert_array_equal(row, value)
 
 
 def test_the_compiled_entry_gives_the_same_to_the_last_bit():

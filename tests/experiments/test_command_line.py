@@ -44,6 +44,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--smoothing", "1000"], "1000"),
         (["--physics-step", "0.0003"], "does not divide"),
         (["--servo-period", "-0.001"], "-0.001"),
+        (["--servo-period", "nan"], "servo_period is nan s and physics_step 0.000125 s; expected 0 < physics_step"),
         (["--stature", "9"], "stature"),
         (["--mass", "1"], "mass"),
         (["--clips", "moonwalk"], "squat_dance"),

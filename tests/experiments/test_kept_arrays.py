@@ -56,6 +56,16 @@ def test_whatever_is_changed_in_a_file_it_is_made_again(keep):
         assert path.read_bytes() == good
 
 
+def test_rows_need_not_be_told_but_whole_ones_must_be_there(tmp_path):
+    def keep(values, shape):
+        return kept_array(tmp_path, "table", MADE_OF, shape, lambda: values)
+
+    np.testing.assert_array_equal(keep(VALUES, (-1, *SHAPE[1:])), VALUES)
+    np.testing.assert_array_equal(keep(2.0 * VALUES, (-1, *SHAPE[1:])), VALUES)
+    np.testing.assert_array_equal(keep(2.0 * VALUES[:2], (2, *SHAPE[1:])), 2.0 * VALUES[:2])
+    np.testing.assert_array_equal(keep(np.ones((3, 5)), (-1, 5)), np.ones((3, 5)))
+
+
 @pytest.mark.parametrize(
     "other",
     [

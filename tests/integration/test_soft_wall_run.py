@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.walls import meet
+from experiments.wall_trials import meet
 
 
 @pytest.mark.slow

@@ -73,10 +73,10 @@ def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
     ("period", "step", "told"),
     [
         (1e-3, 3e-4, "does not divide"),
-        (1e-3, 2e-3, "expected 0 < step"),
-        (1e-3, 0.0, "expected 0 < step"),
-        (-1.0, 1e-3, "expected 0 < step"),
-        (float("nan"), 1e-3, "expected 0 < step"),
+        (1e-3, 2e-3, "expected 0 < physics_step"),
+        (1e-3, 0.0, "expected 0 < physics_step"),
+        (-1.0, 1e-3, "expected 0 < physics_step"),
+        (float("nan"), 1e-3, "expected 0 < physics_step"),
     ],
 )
 def test_rates_that_do_not_fit_are_refused(period: float, step: float, told: str) -> None:

@@ -21,6 +21,7 @@ from controllers.state import HandState
 from experiments.robot_arm import robot_arm_map
 from sim import kernel_units
 from sim.kernel_units import law_units, map_units
+from sim.map_derivative import map_derivative
 from sim.reference import poses_along
 
 ARM = robot_arm_map()
@@ -47,6 +48,12 @@ def test_a_map_by_its_address_is_the_map_of_python_to_the_last_bit():
     poses = np.empty((20, ARM.nq))
     poses_along(compiled.kind, compiled.params, compiled.memory, points, poses)
     np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
+
+
+def test_a_derivative_by_its_kernel_s_address_is_that_of_python_to_the_last_bit():
+    for place in np.random.default_rng(2).uniform(-0.05, 0.05, (5, 3)):
+        x = np.append(place, [1.0, 0.0, 0.0, 0.0])
+        np.testing.assert_array_equal(map_derivative(ARM, x), ARM.jacobian(x))
 
 
 def test_a_field_by_addresses_is_the_field_by_names_to_the_last_bit():

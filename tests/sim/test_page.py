@@ -6,7 +6,8 @@ import pytest
 
 from models.scene import P_WH, SceneConfig, world_model
 from sim.viewer.courses import courses
-from sim.viewer.page import LivePage, NullPage
+from sim.viewer.live_page import LivePage
+from sim.viewer.page import NullPage
 
 ANGLE = np.linspace(0, 6, 30)
 CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])

@@ -16,7 +16,7 @@ from models.scene import P_WH, SceneConfig, world_model
 from sim.recorder import Group, Recorder
 from sim.recording import Recording
 from sim.viewer import replay_html as module
-from sim.viewer.palette import CURVE, FIELD, RIVERS, USER, rgb
+from sim.viewer.palette import CURVE, FIELD, RIVERS, USER, rgb, river_colors
 from sim.viewer.replay_html import GHOST_AT, MAGNIFICATION, PHANTOM_AT, drawn_tube, replay_html
 from sim.viewer.shapes import body_shapes, tube
 
@@ -209,8 +209,15 @@ def test_one_curve_is_drawn_alone_and_without_a_tube_where_it_has_none(tmp_path,
     assert {name for name in drawn if name.startswith("/curve/")} == {"/curve/0/line"}
 
 
-def test_rivers_in_a_row_differ_in_colour_and_from_hand_and_field():
-    assert len({*RIVERS, FIELD, USER, CURVE}) == len(RIVERS) + 3
+def test_rivers_differ_in_colour_however_many_and_from_hand_and_field():
+    assert river_colors(3) == RIVERS[:3]
+    for n in (len(RIVERS), 8, 30):
+        colors = [*river_colors(n), FIELD, USER, CURVE]
+        seen = np.array([rgb(color) for color in colors], dtype=float)
+        apart = np.linalg.norm(seen[:, None] - seen[None], axis=2) + 1e3 * np.eye(len(colors))
+        assert apart.min() > 25.0
+        # Seen on white, in the page and in figures.
+        assert (np.linalg.norm(seen - 255.0, axis=1) > 100.0).all()
 
 
 @pytest.mark.parametrize(("radius", "drawn"), [(0.01, 0.01), (0.25, 0.03)])
@@ -281,6 +288,26 @@ def test_a_tube_lies_at_its_radius_and_faces_outwards():
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     outwards = (a + b + c) / 3 - (axis[faces[:, 0]] + axis[faces[:, 1]] + axis[faces[:, 2]]) / 3
     assert np.all(np.sum(np.cross(b - a, c - a) * outwards, axis=1) > 0)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.concatenate([np.zeros((3, 3)), np.column_stack([np.arange(4.0), np.zeros((4, 2))])]),
+        np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 1, 0]]),
+        np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0], [0, 0, 1]]),
+        np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, 1], [2, 0, 2], [2, 1, 2], [2, 2, 2], [3, 2, 2]]),
+        np.ones((4, 3)),
+    ],
+    ids=["rests at first", "rests", "turns back", "corners", "never moves"],
+)
+@pytest.mark.filterwarnings("error")
+def test_a_tube_about_a_path_that_rests_or_turns_sharply_is_whole(points):
+    vertices, _ = tube(points, 0.1, sides=6)
+    rings = vertices.reshape(len(points), 6, 3) - points[:, None]
+    np.testing.assert_allclose(np.linalg.norm(rings, axis=2), 0.1, atol=1e-12)
+    # No ring is flat.
+    assert all(np.linalg.svd(ring, compute_uv=False)[1] > 0.1 for ring in rings)
 
 
 def test_a_closed_tube_has_no_gap():

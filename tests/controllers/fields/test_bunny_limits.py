@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra import smooth_step
+from controllers.easing import smooth_step
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import mismatch
