@@ -60,22 +60,30 @@ def measure_motion(clip: Clip) -> MotionMeasure:
     spans = find_flights(touched.supported, clip.fps)
     return MotionMeasure(
         limits=float(np.maximum(low - turns, turns - high).clip(min=0.0).max()),
-        slide=_slide(clip),
+        slide=largest_slide(soles(clip.poses)),
         penetration=float(max(0.0, -touched.clearance.min())),
         ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
     )
 
 
-def _slide(clip: Clip) -> float:
+def soles(poses: Array) -> Array:
+    """Lowest points of the contact spheres of the default figure's feet [m], shape (n, 75) → (n, 8, 3)."""
     model = figure_model()
-    data = mujoco.MjData(model)
-    geoms = [int(model.geom(name).id) for name in FOOT_CONTACTS]
-    came_down, worst = np.full((len(geoms), 2), np.nan), 0.0
-    for pose in clip.poses:
-        data.qpos = pose
+    data, geoms = mujoco.MjData(model), [int(model.geom(name).id) for name in FOOT_CONTACTS]
+    points = np.empty((len(poses), len(geoms), 3))
+    for pose, row in zip(poses, points, strict=True):
+        data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
-        places = data.geom_xpos[geoms]
-        touches = places[:, 2] - CONTACT_RADIUS < TOUCH
+        row[:] = data.geom_xpos[geoms]
+    points[..., 2] -= CONTACT_RADIUS
+    return points
+
+
+def largest_slide(points: Array) -> float:
+    """Largest distance over the floor of one of `soles` from where it came down, while it is within 3 mm of it [m]."""
+    came_down, worst = np.full((points.shape[1], 2), np.nan), 0.0
+    for places in points:
+        touches = places[:, 2] < TOUCH
         fresh = touches & np.isnan(came_down[:, 0])
         came_down[fresh] = places[fresh, :2]
         came_down[~touches] = np.nan

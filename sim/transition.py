@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.haptic_map.footsteps import STEP, limb_end, pivot, plan_steps, step_end
 from controllers.haptic_map.inertialization import add_offset, offset_left
 from controllers.haptic_map.stepping_limbs import put_limb, shortfall
@@ -128,8 +129,7 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     add_offset(pose, transition.offset)
     x = min(max(at / lasts, 0.0), 1.0)
     pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
-    y = min(max(min(at, lasts - at) / _GIVING, 0.0), 1.0)
-    share = (y * y * y * (10.0 + y * (6.0 * y - 15.0))) ** 2
+    share = smooth_step(min(at, lasts - at) / _GIVING) ** 2
     for n in range(limbs.shape[0]):
         put_limb(limbs[n], transition.steps[n], pose, ends[n], share)
 

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.haptic_map.footing import packed_soles
 from controllers.haptic_map.inertialization import offset_left, stopping_way
 from controllers.haptic_map.limbs import LIMB, Limb
@@ -196,7 +197,7 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     x = min(max((s - step[_BEGIN]) / (0.5 * seconds), 0.0), 1.0)
     if x >= 1.0:
         return
-    share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    share = smooth_step(x)
     left, floor = np.empty(3), min(step[FLOOR], sole_height(limb, end))
     # What the old motion still carries it counts too: a foot in mid-swing would scrape.
     way = step[_AWAY] ** 2 + step[_AWAY + 1] ** 2

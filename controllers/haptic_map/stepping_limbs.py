@@ -15,6 +15,7 @@ begins and ends: there the limb is as its motion has it.
 import numpy as np
 from numba import njit
 
+from controllers.easing import smooth_step
 from controllers.haptic_map.footsteps import FLOOR, sole_height
 from controllers.haptic_map.limbs import place_limb
 from controllers.haptic_map.vectors import cross, dot, product, turned_back, vector_at
@@ -71,8 +72,7 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
     # Whom the figure has left behind it does not stoop for.
     short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
-    x = min(max(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES, 0.0), 1.0)
-    return short * x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES)
 
 
 @njit
@@ -103,7 +103,7 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
 
     Half a turn off no way round is the shorter one: the joint would flip. So nothing is left of that turn there.
     """
-    x = min(max((sole_height(limb, end) - step[FLOOR]) / _SWUNG, 0.0), 1.0)
+    swings = smooth_step((sole_height(limb, end) - step[FLOOR]) / _SWUNG)
     w, a, b, c = rotations[0]
     for joint in (limb[0], limb[1]):
         r = rotations[int(joint)]
@@ -116,7 +116,7 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
     wide = np.pi - _TWIST
     u = (angle - _TWIST) / wide
     kept = (1.0 - u) ** 2 * ((1.0 + 2.0 * u) * _TWIST + u * wide) + u * u * (1.0 - u) * wide
-    share = 1.0 + x * x * (3.0 - 2.0 * x) * (kept / angle - 1.0)
+    share = 1.0 + swings * (kept / angle - 1.0)
     before = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
     end[3:] = multiply(w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2]))
     after = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])

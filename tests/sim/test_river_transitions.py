@@ -10,9 +10,19 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from experiments.balance import nearest_supported
+from experiments.change_trials import (
+    BLEND,
+    LAP,
+    PERIOD,
+    drawn_changes,
+    measured_change,
+    played_change,
+    rivers_that_play,
+)
 from experiments.clips import load_clips
 from experiments.figure_maps import figure_legs, packed_legs
 from experiments.hands import stylus_path
+from experiments.in_betweens import soles
 from experiments.modes import river_bundle
 from experiments.rests import with_rests
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
@@ -21,7 +31,6 @@ from sim.reference import make_reference, reference_along
 from sim.transition import DWELL
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "river_clips.csv"
-PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4
 FIGURE = figure_model()
 CURVES = [river.curve for river in river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, 0.015).rivers]
 CHANGES = ((1.4, 1), (2.9, 2), (4.3, 0), (5.8, 2))
@@ -177,89 +186,39 @@ def test_a_river_that_has_the_hand_for_a_moment_changes_no_clip(clips_of_rivers)
     assert np.abs(_in_turns(clips_of_rivers, 0.06, BLEND) - alone).max() > 0.1
 
 
-def _soles(poses: np.ndarray) -> np.ndarray:
-    """Lowest points of the feet's contact spheres, shape (n, 8, 3)."""
-    data, ids = mujoco.MjData(FIGURE), [FIGURE.geom(name).id for name in FOOT_CONTACTS]
-    points = np.empty((len(poses), len(ids), 3))
-    for pose, row in zip(poses, points, strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(FIGURE, data)
-        row[:] = data.geom_xpos[ids]
-    points[..., 2] -= FIGURE.geom_size[ids, 0]
-    return points
-
-
-def _slide(soles: np.ndarray) -> float:
-    """Largest distance of a point from where it came within 3 mm of the floor, while it is there."""
-    worst = 0.0
-    for point in np.moveaxis(soles, 1, 0):
-        since = None
-        for place in point:
-            since = None if place[2] >= 0.003 else place[:2] if since is None else since
-            worst = worst if since is None else max(worst, float(np.linalg.norm(place[:2] - since)))
-    return worst
-
-
-def _two(clips: RiverClips, first: int, second: int, moment: float, away: bool) -> np.ndarray:
-    """Poses of a hand that goes from one river to another, or is thrown away, at a moment; until 0.8 s later."""
-    t = np.arange(round((moment + 0.8) / PERIOD)) * PERIOD
-    s = np.clip((t - moment) / 0.3 + (0.0 if away else 0.5), 0.0, 1.0)[:, None]
-    s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    there = CURVES[first].point(t % LAP)
-    points = there + s * ([0.1, 0.0, 0.1] if away else CURVES[second].point(t % LAP) - there)
-    traces = np.zeros((len(t), TRACE_SIZE))
-    traces[:, TRACE_PHASE] = t % LAP
-    traces[:, TRACE_RIVER] = np.where(t < moment, first, -1.0 if away else second)
-    # A run that begins on another river than the first goes over at once, long before the moment.
-    reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, BLEND, packed_legs(FIGURE))
-    poses = np.empty((len(t), 75))
-    reference_along(reference, stylus_path(points), traces, poses)
-    return poses[round(moment / PERIOD) :]
-
-
 @pytest.mark.parametrize("clips", [("squat_dance", "walk", "angry"), ("walk", "run", "squat_dance")])
 def test_no_foot_that_touches_slides_into_a_walk_or_a_run(clips: tuple[str, ...]) -> None:
-    made = [(clip.poses, clip.fps) for clip in load_clips(clips)[0]]
-    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
-    draw = np.random.default_rng(3 if clips[0] == "squat_dance" else 2)
-    for _ in range(18):
-        first, second = draw.permutation(3)[:2]
-        soles = _soles(_two(rivers, int(first), int(second), 1.2 + 3.0 * draw.random(), False))
+    rivers = rivers_that_play(clips)
+    for change in drawn_changes(rivers, 18, np.random.default_rng(3 if clips[0] == "squat_dance" else 2), False):
         # Where a kick went over into a walk that changes feet within the change it was 22 cm.
-        assert _slide(soles) < 0.03
-        assert soles[..., 2].min() > -0.003
+        assert change.slide < 0.03
+        assert change.depth < 0.003
 
 
 @pytest.mark.parametrize(("first", "second"), [("jump", "angry"), ("angry", "jump")])
 def test_a_change_waits_for_a_leap_to_land_and_for_one_to_begin(first: str, second: str) -> None:
     names = (first, second, "run")
-    made = [(clip.poses, clip.fps) for clip in load_clips(names)[0]]
-    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
+    rivers = rivers_that_play(names)
     changed = 0
     for moment in np.arange(1.2, 4.2, 0.3):
-        poses = _two(rivers, 0, 1, float(moment), False)
-        soles = _soles(poses)
-        velocity = np.diff(poses[:, 2]) / PERIOD
+        poses = played_change(rivers, 0, 1, moment)
+        change = measured_change(poses)
         # Begun in the air, or over into a flight, the root was thrown by up to 5.9 m/s within a step.
-        assert np.abs(np.diff(velocity)).max() < 0.5
-        assert soles[..., 2].min(axis=1).max() < 0.28  # the jump's own 0.27
-        assert _slide(soles) < 0.03
-        changed += np.abs(pose_difference(poses[-1:], _two(rivers, 0, 0, float(moment), False)[-1:])).max() > 0.3
+        assert change.up < 0.3
+        assert change.height < 0.28  # the jump's own 0.27
+        assert change.slide < 0.03
+        changed += np.abs(pose_difference(poses[-1:], played_change(rivers, 0, 0, moment)[-1:])).max() > 0.3
     assert changed >= 4
 
 
-@pytest.mark.parametrize("away", [False, True])
-def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(away: bool) -> None:
-    made = [(clip.poses, clip.fps) for clip in load_clips(("squat_dance", "cheer", "angry"))[0]]
-    clips = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
-    draw = np.random.default_rng(3)
-    for _ in range(12):
-        first, second = draw.permutation(3)[:2]
-        soles = _soles(_two(clips, int(first), int(second), 1.2 + 3.0 * draw.random(), away))
+@pytest.mark.parametrize("stops", [False, True])
+def test_one_foot_stands_through_every_change_and_stop_and_none_slides_or_goes_through_the_floor(stops: bool) -> None:
+    clips = rivers_that_play(("squat_dance", "cheer", "angry"))
+    for change in drawn_changes(clips, 12, np.random.default_rng(3), stops):
         # Without a foot that stands and phases of rest it was 6 cm, and 50 cm below the floor.
-        assert soles[..., 2].min(axis=1).max() < 0.015
-        assert soles[..., 2].min() > -0.003
-        assert _slide(soles) < 0.03
+        assert change.height < 0.015
+        assert change.depth < 0.003
+        assert change.slide < 0.03
 
 
 def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
@@ -267,20 +226,13 @@ def test_a_figure_that_stops_can_stand_there(clips_of_rivers) -> None:
     for clips, balanced in ((with_rests(clips_of_rivers, FIGURE), True), (clips_of_rivers, False)):
         missing = []
         for moment in (1.3, 1.45, 1.6, 1.75):
-            pose = _two(clips, 0, 0, moment, True)[-1:]
+            pose = played_change(clips, 0, None, moment)[-1:]
             data.qpos[:] = pose[0]
             mujoco.mj_kinematics(FIGURE, data)
             mujoco.mj_comPos(FIGURE, data)
             centre = data.subtree_com[1, :2]
-            missing.append(np.linalg.norm(nearest_supported(centre, _soles(pose)[0], 0.9) - centre))
+            missing.append(np.linalg.norm(nearest_supported(centre, soles(pose)[0], 0.9) - centre))
         assert (max(missing) < 1e-3) == balanced
-
-
-def _leaps(poses: np.ndarray) -> tuple[float, float, float]:
-    """Largest changes of velocity from one update to the next: root over the ground, and up [m/s], joints [rad/s]."""
-    rates = pose_difference(poses[:-1], poses[1:]) / PERIOD
-    leaps = np.abs(np.diff(rates, axis=0))
-    return leaps[:, :2].max(), leaps[:, 2].max(), leaps[:, 6:].max()
 
 
 @pytest.mark.parametrize(
@@ -298,25 +250,22 @@ def _leaps(poses: np.ndarray) -> tuple[float, float, float]:
     ],
 )
 def test_no_velocity_leaps_in_a_change(clips: tuple[str, ...], first: int, second: int, moment: float) -> None:
-    made = [(clip.poses, clip.fps) for clip in load_clips(clips)[0]]
-    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
-    poses = _two(rivers, first, second, moment, False)
-    over, up, joint = _leaps(poses)
-    assert over < 0.4
-    assert up < 0.2
-    assert joint < 30.0
-    assert _slide(_soles(poses)) < 0.03
+    rivers = rivers_that_play(clips)
+    change = measured_change(played_change(rivers, first, second, moment))
+    assert change.over < 0.4
+    assert change.up < 0.2
+    assert change.joint < 30.0
+    assert change.slide < 0.03
 
 
 @pytest.mark.parametrize(("first", "moment"), [(0, 3.984633), (0, 2.025926), (1, 4.134903), (1, 4.142741)])
 def test_a_hand_that_is_thrown_off_does_not_throw_the_figure(first: int, moment: float) -> None:
-    made = [(clip.poses, clip.fps) for clip in load_clips(("run", "jump", "walk"))[0]]
-    rivers = with_rests(RiverClips(CURVES, made, 0.015, figure_legs(FIGURE)), FIGURE)
-    over, up, joint = _leaps(_two(rivers, first, 2, moment, True))
+    rivers = rivers_that_play(("run", "jump", "walk"))
+    stop = measured_change(played_change(rivers, first, None, moment))
     # Followed until it raced the clip twice over the root leapt by up to 3.7 m/s, and joints by 114 rad/s.
-    assert over < 1.0
-    assert up < 0.5
-    assert joint < 20.0
+    assert stop.over < 1.0
+    assert stop.up < 0.5
+    assert stop.joint < 20.0
 
 
 def test_transitions_are_as_they_ever_were(clips_of_rivers) -> None:
