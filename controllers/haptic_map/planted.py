@@ -7,7 +7,9 @@ swings, and g, which is the other way round, both C² and never above 0 together
 - Its own clock (`led`) advances at the pace g, so that it rests in a stance to the last bit.
 - Place and heading are p = p̄ − c, with the slip c' = h p̄' − κ g c. Forwards round the lap this holds a foot where it
   landed, backwards where it will leave; the average of both is taken.
-- It is turned about its length until its breadth is level: on one corner a foot turns and creeps.
+- It is turned about its length until its breadth is level: on one corner a foot turns and creeps. Of the slope β of
+  its length β³/(β² + β_0²) remains, so that what rolls from heel to toes lies flat in between. Within a hundredth of a
+  second a body's weight does not change ends: its foot lags behind by a degree, and stood on neither.
 - Its height is lessened by what it is in the stance, and by the median of that in the swing, which goes on smoothly
   from one stance to the next. In a swing it is h_0 over the floor at least.
 
@@ -37,6 +39,7 @@ _CLEAR = 0.01  # h_0, how high a foot swings at least [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap
 _NARROW = 0.02  # [m] an end of less breadth has no level
 _LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which on its level counts less, and nothing
+_FLAT = 0.05  # β_0 [rad]
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 
 
@@ -96,7 +99,10 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
 
 
 def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
-    """Orientations of an end (n, 4), turned about its length by a share (n,) of what its breadth is out of level."""
+    """Orientations of an end (n, 4), laid on the floor by a share (n,): its breadth, and its length if it nearly is.
+
+    See the module's text.
+    """
     _, sizes, axes = np.linalg.svd(limb.points - limb.points.mean(axis=0))
     if len(sizes) < 2 or sizes[1] < _NARROW:
         return quaternions
@@ -106,7 +112,12 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
     tilt -= np.pi * np.round(tilt / np.pi)
     # What is upright has no level.
     lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
-    levelled = (Rotation.from_rotvec(-(share * lies * tilt)[:, None] * length) * turn).as_quat(scalar_first=True)
+    slope = np.arctan2(length[:, 2], np.hypot(length[:, 0], length[:, 1]))
+    across = np.cross(length, [0.0, 0.0, 1.0])
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    down = slope * _FLAT**2 / (slope**2 + _FLAT**2)
+    rolls, lays = ((-share * lies * angle)[:, None] * axis for angle, axis in ((tilt, length), (down, across)))
+    levelled = (Rotation.from_rotvec(lays) * Rotation.from_rotvec(rolls) * turn).as_quat(scalar_first=True)
     same = np.sum(levelled * quaternions, axis=1, keepdims=True) >= 0.0
     return np.where(same, levelled, -levelled)
 
