@@ -32,7 +32,7 @@ from controllers.state import Array
 
 _SWINGS = 0.35  # share of a swing at each end in which g rises
 _STANDS = 0.01  # and of a stance in which h does: feet land and leave with a little speed of their own
-_RESTS = 0.15  # of a stance, in which its height comes to rest
+_RESTS, _LONGEST_REST = 0.15, 0.03  # of a stance, and at most [s], in which its height comes to rest
 _LIFTS = 0.12  # of a swing, in which a foot comes to be clear of the floor
 _SMOOTH = 0.0025  # [m]
 _CLEAR = 0.01  # h_0, how high a foot swings at least [m]
@@ -43,17 +43,22 @@ _FLAT = 0.05  # β_0 [rad]
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 
 
-def window(mask: Mask, rise: float) -> Array:
-    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C²."""
+def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
+    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C².
+
+    At most so many samples `longest` of each run.
+    """
     n, result = len(mask), np.zeros(len(mask))
     for start, end in runs(mask):
         samples = np.arange(start, end)
         edge = np.minimum(samples - start + 0.5, end - samples - 0.5)
-        result[samples % n] = smooth_step(edge / (rise * (end - start)))
+        result[samples % n] = smooth_step(edge / min(rise * (end - start), longest))
     return np.ones(n) if mask.all() else result
 
 
-def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float) -> tuple[Array, Array]:
+def planted_ends(
+    channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float, duration: float
+) -> tuple[Array, Array]:
     """Orientation and channels of a limb's end that stands where it stands; see `limb_ends.end_channels`.
 
     Parameters
@@ -66,6 +71,8 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
     stands : array of bool, shape (n,)
     radius : float
         How high its points are that stand [m].
+    duration : float
+        Of the lap [s].
 
     Returns
     -------
@@ -93,7 +100,7 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
-    low = (1.0 - window(stands, _RESTS)) * _above(0.0, heights - level)
+    low = (1.0 - window(stands, _RESTS, _LONGEST_REST * n / duration)) * _above(0.0, heights - level)
     ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
     return quaternions, ends
 
@@ -146,6 +153,7 @@ def with_planted_ends(
     limbs: Sequence[Limb],
     stands: Mask,
     radius: float,
+    duration: float,
     stride: float,
     sway: Array,
 ) -> Array:
@@ -164,6 +172,8 @@ def with_planted_ends(
         Which of them stand.
     radius : float
         How high over the floor their points are then [m].
+    duration : float
+        Of the lap [s].
     stride : float
         Way of a lap [m]; shorter than the clip's, each step is shorter by the same share.
     sway : Array, shape (m, 2)
@@ -174,7 +184,7 @@ def with_planted_ends(
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
     for j, limb in enumerate(limbs):
         at, column = first + END * j, 3 + 4 * limb.joints[2]
-        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius)
+        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
         result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
         short.append(shortfall(result, stride, limb, at))
     # By the same all the time: a root that bobbed for its legs would weigh more and less.

@@ -110,7 +110,7 @@ def test_a_sole_that_rolls_from_heel_to_toes_lies_flat_in_between(figure) -> Non
     column, stands = 3 + 4 * foot.joints[2], np.arange(n) < n // 2
     pitched = Rotation.from_rotvec(np.outer(slope, [0.0, 1.0, 0.0]))
     channels[:, column : column + 4] = pitched.as_quat(scalar_first=True)
-    quaternions, _ = planted_ends(channels, np.array([1.3, 0.0, 0.0]), foot, stands, 0.02)
+    quaternions, _ = planted_ends(channels, np.array([1.3, 0.0, 0.0]), foot, stands, 0.02, 1.0)
     held = -np.arcsin(Rotation.from_quat(quaternions, scalar_first=True).as_matrix()[:, 2, 0])
     middle = slice(n // 20, n // 2 - n // 20)
     assert np.all(np.diff(held[middle]) > 0.0)
