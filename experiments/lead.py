@@ -79,7 +79,7 @@ def stances(marks: Contacts, fps: float) -> npt.NDArray[np.bool_]:
     """Which feet of a capture stand, shape (n − 1, 2), of n frames whose last is the first of the next lap.
 
     A foot that is up for less than a swing lasts stood all the time, and so did one of two that are up for less than a
-    flight lasts, or while either rests: a foot that sinks into the floor and rises from it again is none that settles.
+    flight lasts. One that goes on to rest, when no foot has settled, has not left the floor: it had sunk into it.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
@@ -88,11 +88,13 @@ def stances(marks: Contacts, fps: float) -> npt.NDArray[np.bool_]:
             if end - start < _SWING * fps:
                 stands[np.arange(start, end) % n, foot] = True
     for start, end in runs(~np.any(stands, axis=1)):
-        samples = np.arange(start, end) % n
-        if rests[samples].any(axis=1).all():
-            stands[samples] = rests[samples]
-        elif end - start < _BLINK * fps:
-            stands[samples] = stands[start - 1]
+        for sample in range(start, end):
+            stands[sample % n] = stands[sample % n - 1] & rests[sample % n]
+            if not stands[sample % n].any():
+                break
+    for start, end in runs(~np.any(stands, axis=1)):
+        if end - start < _BLINK * fps:
+            stands[np.arange(start, end) % n] = stands[start - 1]
     return stands
 
 
