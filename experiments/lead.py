@@ -13,7 +13,7 @@ from controllers.haptic_map.limbs import Limb
 from experiments.config import RunConfig
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
-from models.mocap.contacts import contacts
+from models.mocap.contacts import Contacts, contacts
 from models.mocap.laps import CLOSES, lap_of
 from sim.users.arm import Arm
 
@@ -27,10 +27,12 @@ _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
-_BLINK, _HOP = 0.05, 0.1  # [s] a flight from foot to foot lasts longer, and one that ends on the foot that began it
+_BLINK, _SWING = 0.05, 0.15  # [s] a flight from foot to foot lasts longer, and a foot swings for longer, or hops
 # Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
 _FLYING_LATERAL = 1.2
-_FLYING_FORWARD = 1.0  # and its largest pace: who is faster than its clip lands late, for he falls no faster
+# And its largest pace: who is faster than its clip lands late, for he falls no faster. So is that of a run that steps:
+# its limbs swing as fast as they do in the run, and if they swing faster, motors of the leg that stands give in.
+_RUNNING_FORWARD = 1.0
 
 
 def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
@@ -46,7 +48,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
     frames = np.round(phases * steps).astype(int) % steps
     # What closes was made for the floor and is led as it is; a capture's feet have to be held.
-    standing = marks.planted[frames] if made else _without_blinks(marks.settled[:-1], clip.fps)
+    standing = marks.planted[frames] if made else stances(marks, clip.fps)
     support = (standing if made else standing[frames]).sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
@@ -54,7 +56,8 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
     if not led.flies:
         support = np.maximum(support, 1)
-    return led, Gait(led.stride, led.pace * led.stride / led.duration, np.roll(support, -first), led.reach)
+    speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
+    return led, Gait(led.stride, speed, np.roll(support, -first), led.reach, grounded)
 
 
 def lap_remark(clip: Clip) -> tuple[str, ...]:
@@ -72,14 +75,27 @@ def lap_remark(clip: Clip) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def _without_blinks(standing: npt.NDArray[np.bool_], fps: float) -> npt.NDArray[np.bool_]:
-    """Which feet stand (n, 2), without moments too short for a flight, or for a hop, in which none does."""
-    filled = standing.copy()
-    for start, end in runs(~np.any(standing, axis=1)):
-        hops = (standing[start - 1] & standing[end % len(standing)]).any()
-        if end - start < (_HOP if hops else _BLINK) * fps:
-            filled[np.arange(start, end) % len(standing)] |= standing[start - 1]
-    return filled
+def stances(marks: Contacts, fps: float) -> npt.NDArray[np.bool_]:
+    """Which feet of a capture stand, shape (n − 1, 2), of n frames whose last is the first of the next lap.
+
+    A foot that is up for less than a swing lasts stood all the time, and so did one of two that are up for less than a
+    flight lasts. One that goes on to rest, when no foot has settled, has not left the floor: it had sunk into it.
+    """
+    stands, rests = marks.settled[:-1], marks.planted[:-1]
+    n = len(stands)
+    for foot in range(stands.shape[1]):
+        for start, end in runs(~stands[:, foot]):
+            if end - start < _SWING * fps:
+                stands[np.arange(start, end) % n, foot] = True
+    for start, end in runs(~np.any(stands, axis=1)):
+        for sample in range(start, end):
+            stands[sample % n] = stands[sample % n - 1] & rests[sample % n]
+            if not stands[sample % n].any():
+                break
+    for start, end in runs(~np.any(stands, axis=1)):
+        if end - start < _BLINK * fps:
+            stands[np.arange(start, end) % n] = stands[start - 1]
+    return stands
 
 
 def gait_remark(name: str, led: Led) -> tuple[str, ...]:
@@ -145,8 +161,9 @@ def law(config: RunConfig, gait: Gait) -> Leading:
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
     scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
-    flying = {"lateral": _FLYING_LATERAL, "forward": _FLYING_FORWARD} if gait.flies else {}
-    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, **flying)
+    flying = {"lateral": _FLYING_LATERAL} if gait.flies else {}
+    running = {"forward": _RUNNING_FORWARD} if gait.flies or gait.grounded else {}
+    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, **flying, **running)
 
 
 def leading_hand(field: Leading, period: float = 0.01) -> Arm:

@@ -19,7 +19,7 @@ IntArray = npt.NDArray[np.int64]
 
 TOUCH = 0.003  # [m] a sole's point that is lower touches
 BLOCK_FRAMES = 2000
-_SAME = 0.001  # [m] so near to each other places are one
+_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] that count as much, in looking for the place where it was
 _REMEMBERED = 6000  # places of the way forward, one for each centimetre
 
 
@@ -180,9 +180,9 @@ class _Retrace:
         share = np.clip(((place[1:3] - start[:, 1:3]) * step[:, 1:3]).sum(axis=1) / length, 0.0, 1.0)
         apart = np.linalg.norm(start[:, 1:3] + share[:, None] * step[:, 1:3] - place[1:3], axis=1)
         turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
-        # A pelvis that sways comes by one place more than once, turned otherwise.
-        k = int(np.argmin(np.where(apart < apart.min() + _SAME, np.abs(turn), np.inf)))
-        self._distance, self._turn = max(self._distance, float(apart.min())), max(self._turn, abs(float(turn[k])))
+        # A pelvis that sways comes by one place more than once, or turns on the spot.
+        k = int(np.argmin(np.hypot(apart / _FAR, turn / _TURNED)))
+        self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
 
     def result(self) -> tuple[float | None, float | None]:
         """Largest distance [cm] and turn [degrees]."""

@@ -15,8 +15,8 @@ Array = npt.NDArray[np.float64]
 # A foot that bears what it is not held to turns about itself: the plan gives it load, and lifts it. So on a led figure,
 # which may stop anywhere, a point bears nothing from half the height on at which it is let go.
 _WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005)
-# Who flies, or flew, changes feet within a hundredth of a second, and then would stand on none.
-_FLYING = _WALKING._replace(reference_reach=0.012)
+# Who flies changes feet within a hundredth of a second, and then would stand on none; who flew takes a little longer.
+_FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace(reference_reach=0.01)
 
 _ROWS = 192  # of a lap
 _ROUNDS = 6
@@ -26,7 +26,7 @@ _SHARE = 0.6  # of the support, about its middle, in which the zero-moment point
 
 def led_gains(led: Led) -> FigureGains:
     """Of the physical figure that is led with a clip."""
-    return _FLYING if led.flies or led.grounds else _WALKING
+    return _FLYING if led.flies else _STEPPING if led.grounds else _WALKING
 
 
 def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:

@@ -85,6 +85,8 @@ class Gait:
         Feet that bear at equal steps of the lap, from s = 0 on: 0, 1 or 2.
     reach : float
         How far ahead of the figure, or behind it, a foot is on the path, at most [m].
+    grounded : bool
+        Whether it is a run of which no flight is left: its limbs swing as fast already as they do in a run.
 
     Raises
     ------
@@ -96,6 +98,7 @@ class Gait:
     speed: float
     support: npt.NDArray[np.int64]
     reach: float
+    grounded: bool = False
 
     def __post_init__(self) -> None:
         checked("stride", self.stride, "m", least=0.01)

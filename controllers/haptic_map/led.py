@@ -289,7 +289,7 @@ class Led(HapticMap):
             else:
                 # Nobody leaps who steps.
                 steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
-                held = (channels, drift[0], limbs, stands, capture.radius)
+                held = (channels, drift[0], limbs, stands, capture.radius, self.duration)
                 forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]
                 low = grounded(forms[0], signs, steps, limbs, stands, sway)
                 if low is not None:

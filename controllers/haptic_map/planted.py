@@ -7,7 +7,9 @@ swings, and g, which is the other way round, both C² and never above 0 together
 - Its own clock (`led`) advances at the pace g, so that it rests in a stance to the last bit.
 - Place and heading are p = p̄ − c, with the slip c' = h p̄' − κ g c. Forwards round the lap this holds a foot where it
   landed, backwards where it will leave; the average of both is taken.
-- It is turned about its length until its breadth is level: on one corner a foot turns and creeps.
+- It is turned about its length until its breadth is level: on one corner a foot turns and creeps. Of the slope β of
+  its length β³/(β² + β_0²) remains, so that what rolls from heel to toes lies flat in between. Within a hundredth of a
+  second a body's weight does not change ends: its foot lags behind by a degree, and stood on neither.
 - Its height is lessened by what it is in the stance, and by the median of that in the swing, which goes on smoothly
   from one stance to the next. In a swing it is h_0 over the floor at least.
 
@@ -30,27 +32,33 @@ from controllers.state import Array
 
 _SWINGS = 0.35  # share of a swing at each end in which g rises
 _STANDS = 0.01  # and of a stance in which h does: feet land and leave with a little speed of their own
-_RESTS = 0.15  # of a stance, in which its height comes to rest
+_RESTS, _LONGEST_REST = 0.15, 0.03  # of a stance, and at most [s], in which its height comes to rest
 _LIFTS = 0.12  # of a swing, in which a foot comes to be clear of the floor
 _SMOOTH = 0.0025  # [m]
 _CLEAR = 0.01  # h_0, how high a foot swings at least [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap
 _NARROW = 0.02  # [m] an end of less breadth has no level
 _LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which on its level counts less, and nothing
+_FLAT = 0.05  # β_0 [rad]
 _SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
 
 
-def window(mask: Mask, rise: float) -> Array:
-    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C²."""
+def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
+    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C².
+
+    At most so many samples `longest` of each run.
+    """
     n, result = len(mask), np.zeros(len(mask))
     for start, end in runs(mask):
         samples = np.arange(start, end)
         edge = np.minimum(samples - start + 0.5, end - samples - 0.5)
-        result[samples % n] = smooth_step(edge / (rise * (end - start)))
+        result[samples % n] = smooth_step(edge / min(rise * (end - start), longest))
     return np.ones(n) if mask.all() else result
 
 
-def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float) -> tuple[Array, Array]:
+def planted_ends(
+    channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float, duration: float
+) -> tuple[Array, Array]:
     """Orientation and channels of a limb's end that stands where it stands; see `limb_ends.end_channels`.
 
     Parameters
@@ -63,6 +71,8 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
     stands : array of bool, shape (n,)
     radius : float
         How high its points are that stand [m].
+    duration : float
+        Of the lap [s].
 
     Returns
     -------
@@ -90,13 +100,16 @@ def planted_ends(channels: Array, drift: Array, limb: Limb, stands: Mask, radius
         ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
         quaternions = yawed(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
-    low = (1.0 - window(stands, _RESTS)) * _above(0.0, heights - level)
+    low = (1.0 - window(stands, _RESTS, _LONGEST_REST * n / duration)) * _above(0.0, heights - level)
     ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
     return quaternions, ends
 
 
 def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
-    """Orientations of an end (n, 4), turned about its length by a share (n,) of what its breadth is out of level."""
+    """Orientations of an end (n, 4), laid on the floor by a share (n,): its breadth, and its length if it nearly is.
+
+    See the module's text.
+    """
     _, sizes, axes = np.linalg.svd(limb.points - limb.points.mean(axis=0))
     if len(sizes) < 2 or sizes[1] < _NARROW:
         return quaternions
@@ -106,7 +119,12 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
     tilt -= np.pi * np.round(tilt / np.pi)
     # What is upright has no level.
     lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
-    levelled = (Rotation.from_rotvec(-(share * lies * tilt)[:, None] * length) * turn).as_quat(scalar_first=True)
+    slope = np.arctan2(length[:, 2], np.hypot(length[:, 0], length[:, 1]))
+    across = np.cross(length, [0.0, 0.0, 1.0])
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    down = slope * _FLAT**2 / (slope**2 + _FLAT**2)
+    rolls, lays = ((-share * lies * angle)[:, None] * axis for angle, axis in ((tilt, length), (down, across)))
+    levelled = (Rotation.from_rotvec(lays) * Rotation.from_rotvec(rolls) * turn).as_quat(scalar_first=True)
     same = np.sum(levelled * quaternions, axis=1, keepdims=True) >= 0.0
     return np.where(same, levelled, -levelled)
 
@@ -135,6 +153,7 @@ def with_planted_ends(
     limbs: Sequence[Limb],
     stands: Mask,
     radius: float,
+    duration: float,
     stride: float,
     sway: Array,
 ) -> Array:
@@ -153,6 +172,8 @@ def with_planted_ends(
         Which of them stand.
     radius : float
         How high over the floor their points are then [m].
+    duration : float
+        Of the lap [s].
     stride : float
         Way of a lap [m]; shorter than the clip's, each step is shorter by the same share.
     sway : Array, shape (m, 2)
@@ -163,7 +184,7 @@ def with_planted_ends(
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
     for j, limb in enumerate(limbs):
         at, column = first + END * j, 3 + 4 * limb.joints[2]
-        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius)
+        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
         result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
         short.append(shortfall(result, stride, limb, at))
     # By the same all the time: a root that bobbed for its legs would weigh more and less.

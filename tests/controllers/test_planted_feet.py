@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 from controllers.curves.walked_path import STEP, lay_row, path_front, straight_path
 from controllers.haptic_map.captures import Capture
 from controllers.haptic_map.led import Led
-from controllers.haptic_map.planted import levels, window
+from controllers.haptic_map.planted import levels, planted_ends, window
+from experiments.config import RunConfig
 from experiments.figure_maps import figure_legs
-from experiments.lead import led_map
+from experiments.lead import law, led_map
 from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, load_clip
@@ -23,6 +24,7 @@ ANKLE = slice(7 + 4 * JOINTS.index("left_ankle"), 11 + 4 * JOINTS.index("left_an
 CAPTURES = (
     "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "cmu_amc/16_09.amc", "deepmimic/humanoid3d_walk.txt",
     "deepmimic/humanoid3d_run.txt", "snu/walk.bvh", "snu/run.bvh", "xia/strutting_01_000.bvh", "xia/angry_13_000.bvh",
+    "xia/dme_example.bvh",
 )  # fmt: skip
 
 
@@ -99,10 +101,32 @@ def test_a_foot_that_stands_lies_level(figure) -> None:
     assert np.abs(np.diff(toes[flat][..., 2], axis=1)).max() < 0.0015
 
 
+def test_a_sole_that_rolls_from_heel_to_toes_lies_flat_in_between(figure) -> None:
+    n, foot = 400, figure_legs(figure)[0]
+    # In the first half of the lap it rolls from 17° up to 17° down at an even pace, in the second half back.
+    slope = 0.3 * np.interp(np.arange(n) / n, [0.0, 0.5, 1.0], [-1.0, 1.0, -1.0])
+    channels = np.zeros((n, 3 + 4 * 18))
+    channels[:, 2], channels[:, 3::4] = 0.9, 1.0
+    column, stands = 3 + 4 * foot.joints[2], np.arange(n) < n // 2
+    pitched = Rotation.from_rotvec(np.outer(slope, [0.0, 1.0, 0.0]))
+    channels[:, column : column + 4] = pitched.as_quat(scalar_first=True)
+    quaternions, _ = planted_ends(channels, np.array([1.3, 0.0, 0.0]), foot, stands, 0.02, 1.0)
+    held = -np.arcsin(Rotation.from_quat(quaternions, scalar_first=True).as_matrix()[:, 2, 0])
+    middle = slice(n // 20, n // 2 - n // 20)
+    assert np.all(np.diff(held[middle]) > 0.0)
+    assert np.abs(held - slope).max() < 0.03
+    # Two millimetres over the length of a foot.
+    assert np.sum(np.abs(held[stands]) < 0.01) > 2.5 * np.sum(np.abs(slope[stands]) < 0.01)
+    swings = window(~stands, 0.35) == 1.0
+    np.testing.assert_allclose(held[swings], slope[swings], atol=1e-12)
+
+
 def test_a_capture_that_flies_steps_instead(figure) -> None:
     clip = skating("run")
     led, gait = led_map(clip, figure_legs(figure), 0)
-    assert (led.flies, led.grounds, gait.flies) == (False, True, False)
+    assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
+    # Its limbs swing as fast already as they do in the run.
+    assert law(RunConfig(mode="lead"), gait).forward == 1.0
     # Of its six steps the lap that repeats itself best has two.
     assert led.stride == pytest.approx(2 * Capture.step)
     assert 0.4 < led.pace < 0.8

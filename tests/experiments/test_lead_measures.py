@@ -65,6 +65,25 @@ def test_a_way_back_is_compared_with_the_place_and_the_heading_that_are_next_to_
     assert measure.result() == (distance, turn)
 
 
+def test_a_figure_that_turns_on_the_spot_is_compared_with_the_heading_that_it_had() -> None:
+    # For 10 cm of its path the pelvis goes on by 1 mm only, and turns by 40°; coming back it is 2 mm behind.
+    forth = np.arange(0.0, 2.0, 0.01)
+    still = np.clip(forth - 1.0, 0.0, 0.1)
+    poses = np.concatenate([
+        poses_along(np.array([s - 0.99 * d]), 0.0, np.radians(400.0) * d) for s, d in zip(forth, still, strict=True)
+    ])  # fmt: skip
+    measure = _Retrace()
+    measure.add(forth, poses, -np.inf)
+    back = slice(180, 20, -1)
+    behind = poses[back] - 0.002 * np.eye(1, poses.shape[1])
+    measure.add(forth[back], behind, float(forth[-1]))
+    distance, turn = measure.result()
+    assert distance is not None
+    assert turn is not None
+    assert 0.1 < distance < 0.25
+    assert turn < 0.5
+
+
 def test_how_far_soles_slide_while_they_touch() -> None:
     measure, standing = _Soles(SceneConfig()), rest_pose()
     lowest = _Soles(SceneConfig())

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments import lead
 from experiments.config import RunConfig
 from experiments.run import run
 from sim.recording import Recording
@@ -79,6 +80,7 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
         ("cmu_amc/02_03.amc", 0.14),
         ("snu/run.bvh", 0.10),
         ("deepmimic/humanoid3d_run.txt", 0.14),
+        ("xia/dme_example.bvh", 0.17),
     ],
 )
 def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, residual: float) -> None:
@@ -88,6 +90,16 @@ def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, 
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)
     assert summary["figure"]["residual_force_rms"] < residual
+
+
+def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not MOCAP.is_dir():
+        pytest.skip("the motion capture data is not beside the project")
+    # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
+    monkeypatch.setattr(lead, "_BEND", 0.4 * np.pi)
+    clip = str(MOCAP / "deepmimic/humanoid3d_run.txt")
+    run(RunConfig(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
+    assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))
 
 
 def test_a_run_flies_along_the_s_and_comes_back(tmp_path: Path) -> None:
