@@ -54,10 +54,10 @@ class Change(NamedTuple):
     joint: float
 
 
-def measured_change(poses: Array) -> Change:
-    """Measure a change in its poses, one each period, shape (n, 75)."""
+def measured_change(poses: Array, period: float = PERIOD) -> Change:
+    """Measure a change in its poses, one each period [s], shape (n, 75)."""
     points = soles(poses)
-    leaps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / PERIOD, axis=0))
+    leaps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / period, axis=0))
     return Change(
         slide=largest_slide(points),
         height=float(points[..., 2].min(axis=1).max()),
@@ -76,10 +76,10 @@ def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
     return with_rests(RiverClips([river.curve for river in rivers], clips, _TUBE, figure_legs(figure)), figure)
 
 
-def played_change(rivers: RiverClips, first: int, second: int | None, moment: float) -> Array:
+def played_change(rivers: RiverClips, first: int, second: int | None, moment: float, period: float = PERIOD) -> Array:
     """Poses from the moment [s] at which a hand on one river is had by another, or by none and is thrown off."""
     figure = figure_model()
-    t = np.arange(round((moment + _AFTER) / PERIOD)) * PERIOD
+    t = np.arange(round((moment + _AFTER) / period)) * period
     s = np.clip((t - moment) / _GLIDE + (0.0 if second is None else 0.5), 0.0, 1.0)[:, None]
     s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     there = rivers.curves[first].point(t % LAP)
@@ -88,10 +88,10 @@ def played_change(rivers: RiverClips, first: int, second: int | None, moment: fl
     traces[:, TRACE_PHASE] = t % LAP
     # A run that begins on another river than the first goes over at once, long before the moment.
     traces[:, TRACE_RIVER] = np.where(t < moment, first, -1.0 if second is None else second)
-    reference = make_reference(figure, rivers.compiled(), PERIOD, 6.0, BLEND, packed_legs(figure))
+    reference = make_reference(figure, rivers.compiled(), period, 6.0, BLEND, packed_legs(figure))
     poses = np.empty((len(t), figure.nq))
     reference_along(reference, stylus_path(there + s * away), traces, poses)
-    return poses[round(moment / PERIOD) :]
+    return poses[round(moment / period) :]
 
 
 def drawn_changes(rivers: RiverClips, count: int, rng: np.random.Generator, stops: bool) -> list[Change]:

@@ -107,8 +107,8 @@ class RunConfig:
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
     figure_ticks : int
-        Servo ticks between two updates of the figure; 0: 8, but 2 on a map from a file and of a figure that is led,
-        whose clips are played as they are: a foot lands between two updates.
+        Servo ticks between two updates of the figure; 0: 8, but 2 on a map from a file, on the map of rivers and of a
+        figure that is led, whose clips are played as they are: a foot lands between two updates.
     scene : SceneConfig
         Figure's size, servo period and physics step.
     pushes : tuple of Push
@@ -171,7 +171,7 @@ class RunConfig:
             clips = ("walk",) if self.mode == "lead" else MAP_CLIPS.get(self.map, FIGURE_CLIPS)
             object.__setattr__(self, "clips", clips)
         if self.figure_ticks == 0:
-            lands = self.mode == "lead" or self.map.endswith(MAP_SUFFIX)
+            lands = self.mode == "lead" or self.map == "rivers" or self.map.endswith(MAP_SUFFIX)
             object.__setattr__(self, "figure_ticks", 2 if lands else 8)
 
     @property

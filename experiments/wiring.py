@@ -153,8 +153,8 @@ def wire(
     if bends and not isinstance(blended, Led):
         held = curve.duration if isinstance(blended, Lifted) else blended.lap_seconds
     reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs, held)
-    # A walk at full speed cannot begin from rest.
-    moves = isinstance(blended, Lifted) and not bends
+    # A walk at full speed cannot begin from rest: where clips are played as they are, so does the figure.
+    moves = isinstance(blended, Lifted | RiverClips) and not bends
     begin = beginning(curve, np.random.default_rng(config.seed), moves)
     poses = np.empty((1, haptic_map.nq))
     walker = memory[TRACE_SIZE + ARGUMENT :][:7]

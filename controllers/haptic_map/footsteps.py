@@ -33,6 +33,7 @@ _ROUND = 3e-3  # [m] a way so short is hardly worth a lift
 _LEVEL = 0.01  # [m] feet that differ by less in height are equally high
 _FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
 _CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
+_THROW, _TWIRL = 20.0, 100.0  # [m/s²], [rad/s²] with which it goes on to do so at most
 _SOONEST = 0.05  # [s] in which a foot that falls comes to rest at least
 # A row of `steps`: when the step begins, place and orientation where the old motion comes to rest, and the offsets
 # from there with their rates, (3, 3) each; the time to get there; and the height of the floor.
@@ -76,11 +77,15 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
 
 
 @njit
-def _come_to_rest(values: Array, period: float, seconds: float, rest: Array, change: Array) -> None:
-    """Where a motion with samples (3, 3) now, a period before and after comes to rest; offset from there and rates."""
+def _come_to_rest(values: Array, period: float, seconds: float, most: float, rest: Array, change: Array) -> None:
+    """Where a motion with samples (3, 3) now, a period before and after comes to rest; offset from there and rates.
+
+    Of its acceleration no more is taken than `most`: what is thrown does not go on to be.
+    """
     for i in range(3):
         change[1, i] = 0.5 * (values[2, i] - values[1, i]) / period
-        change[2, i] = (values[2, i] - 2.0 * values[0, i] + values[1, i]) / period**2
+        gain = (values[2, i] - 2.0 * values[0, i] + values[1, i]) / period**2
+        change[2, i] = min(max(gain, -most), most)
         change[0, i] = -stopping_way(change[1, i], change[2, i], seconds)
         rest[i] = values[0, i] - change[0, i]
 
@@ -168,18 +173,18 @@ def plan_steps(
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _CAUGHT / max(speed, 1e-9), _SOONEST))
         step[_STOP], step[FLOOR] = stop, ground
-        _come_to_rest(ends[:, :3], period, stop, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
+        _come_to_rest(ends[:, :3], period, stop, _THROW, step[_PLACE:_TURN], step[_AWAY:_TURNED].reshape(3, 3))
         w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
         change = step[_TURNED:_STOP].reshape(3, 3)
-        _come_to_rest(turns, period, stop, way, change)
+        _come_to_rest(turns, period, stop, _TWIRL, way, change)
         step[_TURN:_AWAY] = multiply(w, x, y, z, *exponential(way[0], way[1], way[2]))
         # Seen from where it rests, exactly: rotations do not add.
         w, x, y, z = step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
-        _come_to_rest(turns, period, stop, way, change)
+        _come_to_rest(turns, period, stop, _TWIRL, way, change)
         change[0] = turns[0]
         limb_end(limbs[n], asked, ends[1])
         urgency[n] = np.floor(height / _LEVEL) + np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])

@@ -17,7 +17,7 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.haptic_map.footsteps import FLOOR, sole_height
-from controllers.haptic_map.limbs import place_limb
+from controllers.haptic_map.limbs import LIMB, place_limb
 from controllers.haptic_map.vectors import cross, dot, product, turned_back, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
@@ -25,6 +25,9 @@ from controllers.state import Array, Pose
 _TOUCHES = 0.12  # [m] height from which a foot does not have to reach what it is asked for
 _EASE = 0.95  # of its length, that a limb is long at ease
 _BENT, _GIVES = 0.01, 0.1  # of its length, by which a limb stays short of straight, and from where on it gives way
+_ROLL, _LEVER = 0.7, 0.15  # [rad] by which a sole rolls over its edge at most, [m] of height won by a radian
+_AHEAD, _EDGE = 0.1, 0.02  # [m] by which the first joint is ahead where it does; over which its edge is rounded
+_FINE = 2e-3  # [m]
 _FOLDED = 0.55  # of its length, a distance from which on it is folded no further
 _TWIST, _SWUNG = 1.8, 0.15  # [rad], [m] from which on a foot so high goes with its leg
 _FARTHEST, _LOST = 0.5, 1.0  # of a limb's length, the way over the floor from which it is given up, and at which it is
@@ -76,16 +79,47 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
 
 
 @njit
+def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
+    """Roll a sole by an angle over its edge in a direction over the floor, (2,): that stays where it is, and as low."""
+    low = sole_height(limb, end)
+    point, total = np.zeros(2), 0.0
+    for k in range(LIMB, limb.shape[0], 3):
+        x, y, _ = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
+        weight = np.exp((x * along[0] + y * along[1]) / _EDGE)
+        total += weight
+        point[0], point[1] = point[0] + weight * x, point[1] + weight * y
+    away = (point[0] * along[0] + point[1] * along[1]) / total
+    w, x, y, z = exponential(-angle * along[1], angle * along[0], 0.0)
+    end[3], end[4], end[5], end[6] = multiply(w, x, y, z, end[3], end[4], end[5], end[6])
+    for i in range(2):
+        end[i] += (1.0 - np.cos(angle)) * away * along[i]
+    end[2] += low - sole_height(limb, end)
+
+
+@njit
 def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
-    """Bring an end that a limb hardly reaches nearer to it, by a share that is 0 or up to 1: no knee snaps straight."""
-    line = np.empty(3)
+    """Bring an end that a limb hardly reaches nearer to it, by a share that is 0 or up to 1: no knee snaps straight.
+
+    It rolls over its edge first, such that a foot goes on to bear, and then it is drawn.
+    """
+    line, along = np.empty(3), np.empty(2)
     longest = _leg(limb, pose, end, line)
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     room = max(_GIVES * share * longest, 1e-9)
     over = (distance - (1.0 - _BENT * share) * longest) / room + 1.0
     if over > 0.0:
         # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
-        back = room * over * (1.0 - 1.0 / np.cbrt(1.0 + over**3)) / distance
+        back = room * over * (1.0 - 1.0 / np.cbrt(1.0 + over**3))
+        way = np.sqrt(line[0] ** 2 + line[1] ** 2) + 1e-9
+        for i in range(2):
+            along[i] = -line[i] / way
+        _roll(limb, end, along, smooth_step(way / _AHEAD) * _ROLL * np.tanh(back / (_ROLL * _LEVER)))
+        wanted = distance - back
+        _leg(limb, pose, end, line)
+        distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
+        # Rounded at zero, as far as it may be too near.
+        back = distance - wanted
+        back = 0.5 * (back + np.sqrt(back**2 + _FINE**2) - _FINE) / distance
         for i in range(3):
             end[i] -= back * line[i]
     # Nor folds up: what comes too near to the first joint goes by below it.
