@@ -74,8 +74,12 @@ def test_the_device_knows_its_velocity_from_the_first_tick():
 
 def test_the_filter_of_the_stylus_is_where_the_motion_is_at_its_first_update():
     lap, period = Trajectory.circle(0.05, 2.0), 0.008
-    reference = SimpleNamespace(period=period, smoothing=0.7, started=np.zeros(1), hand=np.zeros((3, 3)))
+    reference = SimpleNamespace(
+        period=period, smoothing=0.7, started=np.zeros(1), hand=np.zeros((3, 3)), trail=np.zeros((2, 3))
+    )
     begin_in_motion(reference, np.array([lap.point(0.0), lap.velocity(0.0), lap.acceleration(0.0)]))
+    # And comes from where it would have been.
+    np.testing.assert_allclose(reference.trail[0], lap.point(-2.0 * period), atol=2e-6)
     stylus = np.append(lap.point(0.0), [1.0, 0.0, 0.0, 0.0])
     smooth_hand(reference.hand, stylus[:3], reference.smoothing, period)
     np.testing.assert_allclose(reference.hand, [lap.point(0.0), lap.velocity(0.0), lap.acceleration(0.0)], atol=1e-12)
