@@ -31,7 +31,8 @@ from sim.compiled import entry_point
 from sim.devices.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.kernel_units import law_units
 from sim.plant import Hand, Plant, advance
-from sim.reference import CompiledReference, update_reference
+from sim.reference import update_reference
+from sim.reference_state import CompiledReference
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
