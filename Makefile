@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint format bench fuzz clean
+.PHONY: setup demo test test-all lint format bench gate fuzz clean
 
 setup: $(READY)
 
@@ -34,6 +34,10 @@ format: $(READY)
 
 bench: $(READY)
 	$(BIN)/hvf bench
+
+# Short runs of the commit REF and of this tree, compared bit for bit: for changes that move code and no number.
+gate: $(READY)
+	$(BIN)/python tests/gate/compare.py $(REF)
 
 fuzz: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'

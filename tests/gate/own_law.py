@@ -1,0 +1,36 @@
+"""A run with a law in plain Python, for the gate: ``python tests/gate/own_law.py FOLDER`` writes its recording."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra import Weight
+from controllers.fields.follow import Follow
+from controllers.fields.python_law import PythonLaw
+from controllers.state import HandState
+from experiments.config import RunConfig
+from experiments.own_law import loop_with
+from sim.loop import groups, record_into
+from sim.recorder import Recorder
+
+
+def wall(hand: HandState) -> np.ndarray:
+    depth = -0.001 - hand.p[2]
+    return np.array([0.0, 0.0, max(0.0, 500.0 * depth - 3.0 * hand.v[2])]) if depth > 0.0 else np.zeros(3)
+
+
+def main(out: Path) -> None:
+    river = Follow(Trajectory.circle(0.0477, 4.0), k_r=300.0, b_d=4.0)
+    field = (river.program() + PythonLaw(wall).program().gated(Weight.speed(0.0, 0.01))).limited(6.0)
+    config = RunConfig(clips=("cheer", "angry"), seconds=1.0)
+    session, loop = loop_with(config, field, lambda ticks, frames, n: record(ticks, frames, n))
+    out.mkdir(parents=True)
+    with Recorder(out / "run.h5", {}, 1, groups(session.servo), {}) as recorder:
+        record = record_into(recorder, session.servo, session.world)
+        loop.run(config.seconds)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
