@@ -15,14 +15,14 @@ from typing import Annotated  # noqa: E402
 
 import tyro  # noqa: E402
 
-from controllers.certificates.hand import NO_HANDS, HandRange  # noqa: E402
+from controllers.certificates.flight.tolerance import BallisticTolerance, Judging  # noqa: E402
+from controllers.certificates.loop.hand import NO_HANDS, HandRange  # noqa: E402
 from controllers.certificates.report import Certificate, ChangedInputs  # noqa: E402
-from controllers.certificates.tolerance import BallisticTolerance, Judging  # noqa: E402
 from controllers.errors import ControllerError  # noqa: E402
-from controllers.haptic_map.room import Room  # noqa: E402
-from experiments.config import ArmConfig, RunConfig  # noqa: E402
-from experiments.json_text import json_text  # noqa: E402
-from experiments.options import above, at_least, check_numbers  # noqa: E402
+from controllers.haptic_map.lifting.room import Room  # noqa: E402
+from experiments.config.options import above, at_least, check_numbers  # noqa: E402
+from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
+from experiments.files.json_text import json_text  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -61,8 +61,8 @@ class Demo:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.demo import demo_config
         from experiments.run import run
+        from experiments.setups.demo import demo_config
 
         run(demo_config(), self.out, self.overwrite, _STARTED)
         return 0
@@ -159,12 +159,12 @@ class Certify:
         """The field, and the clips that are certified with it; gains alone have none."""
         if self.run is None and self.config.mode != "lead" and not self.config.map.endswith(".npz"):
             return self.config, ()
-        from experiments.certified_clips import run_and_clips
+        from experiments.certify.certified_clips import run_and_clips
 
         return run_and_clips(self.run, self.config)
 
     def _made(self) -> Certificate:
-        from experiments.certify import certify_clip_into, certify_into
+        from experiments.certify.certify import certify_clip_into, certify_into
 
         if self.clip is not None:
             folder = self.out or Path(f"runs/certificate-{Path(self.clip).stem}")
@@ -174,10 +174,10 @@ class Certify:
         return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
 
     def _checked(self, file: Path) -> Certificate | None:
-        from experiments.certified_field import certificate_inputs, clip_inputs, verify_certificate
+        from experiments.certify.certified_field import certificate_inputs, clip_inputs, verify_certificate
 
         if self.clip is not None:
-            from experiments.clips import load_clips
+            from experiments.setups.clips import load_clips
 
             inputs = clip_inputs(load_clips([self.clip])[0][0], self._judging())
         else:
@@ -203,7 +203,7 @@ class Repair:
 
     def __call__(self) -> int:
         """Repair, and say what was changed."""
-        from experiments.repair import repair_file
+        from experiments.certify.repair import repair_file
 
         for line in repair_file(self.source, self.target, self.overwrite).lines():
             print(line)
@@ -222,7 +222,7 @@ class TeleArm:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.robot_arm import run_arm
+        from experiments.setups.robot_arm import run_arm
 
         run_arm(self.config, self.out, self.overwrite)
         return 0
@@ -248,7 +248,7 @@ class Lift:
 
     def __call__(self) -> int:
         """Lift, and say what came of it."""
-        from experiments.lift import lift_into
+        from experiments.lifting.lift import lift_into
 
         report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
         print(json_text(report.to_json()) if self.json else "\n".join(report.lines()))
@@ -281,7 +281,7 @@ class Picture:
 
     def __call__(self) -> int:
         """Render."""
-        from experiments.picture import draw_picture
+        from experiments.results.picture import draw_picture
 
         draw_picture(self.folder, self.target)
         return 0
@@ -307,7 +307,7 @@ class Bench:
 
     def __call__(self) -> int:
         """Measure."""
-        from experiments.benchmarks import bench
+        from experiments.studies.benchmarks import bench
 
         bench()
         return 0

@@ -12,8 +12,8 @@ from controllers.fields.program import LAW_KERNELS
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import kinds_of
 from controllers.state import IntArray
-from experiments.config import ArmConfig, RunConfig
-from sim.compiled import CACHE_FOLDER
+from experiments.config.run_config import ArmConfig, RunConfig
+from sim.compilation.compiled import CACHE_FOLDER
 
 Config = RunConfig | ArmConfig
 
@@ -53,17 +53,17 @@ def _mark(part: str) -> Path:
 
 
 def _compile(config: Config) -> None:
-    from sim.loop import Loop
+    from sim.loop.loop import Loop
 
     parts: set[str] = set()
     if isinstance(config, ArmConfig):
-        from experiments.robot_arm import wire_arm
+        from experiments.setups.robot_arm import wire_arm
 
         servo, world, _ = wire_arm(config, parts.update)
     else:
-        from experiments.clips import load_clips
         from experiments.run import default_poses
-        from experiments.wiring import wire
+        from experiments.setups.clips import load_clips
+        from experiments.setups.wiring import wire
 
         session = wire(config, load_clips(config.clips)[0], ready=parts.update)
         servo, world = session.servo, session.world

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.config import RunConfig
-from experiments.map_files import map_digest
+from experiments.config.run_config import RunConfig
+from experiments.files.map_files import map_digest
 from experiments.run import RECORDING, clips_of, config_of
-from experiments.wiring import wire
+from experiments.setups.wiring import wire
 from sim.errors import SimError
-from sim.loop import Loop, tick_channels
-from sim.recording import Recording
-from sim.servo import FrameLog, TickLog
+from sim.loop.loop import Loop, tick_channels
+from sim.loop.servo import FrameLog, TickLog
+from sim.recording.recording import Recording
 
 
 class _Comparison:

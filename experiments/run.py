@@ -15,32 +15,32 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.leading import Leading
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.clips import load_clips
 from experiments.compiling import compile_once
-from experiments.config import STRETCHING, RunConfig
-from experiments.figure_maps import packed_legs
-from experiments.hands import handled, stylus_path
-from experiments.json_text import json_text
-from experiments.lead import walker_argument
-from experiments.lead_measures import lead_summary
-from experiments.measures import BLOCK_FRAMES, summarise, trace_summary
-from experiments.session import Session
-from experiments.stretch import CURVE_FILE, save_curve, stretch_summary
-from experiments.stretch_measures import editing_summary, performance_summary
-from experiments.summary import RunSummary
-from experiments.summary_parts import SpeedSummary
-from experiments.wiring import wire
+from experiments.config.run_config import STRETCHING, RunConfig
+from experiments.files.json_text import json_text
+from experiments.results.lead_measures import lead_summary
+from experiments.results.measures import BLOCK_FRAMES, summarise, trace_summary
+from experiments.results.stretch_measures import editing_summary, performance_summary
+from experiments.results.summary import RunSummary
+from experiments.results.summary_parts import SpeedSummary
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import packed_legs
+from experiments.setups.hands import handled, stylus_path
+from experiments.setups.lead import walker_argument
+from experiments.setups.session import Session
+from experiments.setups.stretch import CURVE_FILE, save_curve, stretch_summary
+from experiments.setups.wiring import wire
 from models.mocap.clip import Clip
-from models.mocap.own_bvh import write_bvh_blocks
+from models.mocap.readers.own_bvh import write_bvh_blocks
 from models.scene import P_WH, SceneConfig, world_model
-from sim.clock import RealTime
 from sim.errors import SimError
-from sim.loop import BLOCK_SECONDS, Loop, groups, record_into
-from sim.memory import peak_memory_mb
-from sim.recorder import Recorder
-from sim.recording import Recording
-from sim.reference import make_reference, poses_along, reference_along
-from sim.servo import FrameLog, TickLog
+from sim.loop.clock import RealTime
+from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into
+from sim.loop.memory import peak_memory_mb
+from sim.loop.servo import FrameLog, TickLog
+from sim.recording.recorder import Recorder
+from sim.recording.recording import Recording
+from sim.reference.reference import make_reference, poses_along, reference_along
 from sim.users.intent import Grab, Push, Turn
 from sim.viewer.courses import courses
 from sim.viewer.page import NullPage, Page
@@ -268,10 +268,10 @@ def _write_animations(out: Path, session: Session) -> None:
 
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording, also of a run that was cut short."""
-    from experiments.figures import draw_figures
-    from experiments.lead_figure import draw_lead
-    from experiments.report import write_report
-    from experiments.stretch_figure import draw_stretch
+    from experiments.results.figures import draw_figures
+    from experiments.results.lead_figure import draw_lead
+    from experiments.results.report import write_report
+    from experiments.results.stretch_figure import draw_stretch
 
     with Recording(folder / RECORDING) as recording:
         config = config_of(recording)

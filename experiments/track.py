@@ -4,11 +4,11 @@ from dataclasses import asdict
 
 from rich.console import Console
 
-from experiments.clips import load_clips
-from experiments.json_text import json_text
+from experiments.files.json_text import json_text
+from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
-from sim.compiled import is_cached
-from sim.tracking import track
+from sim.body.tracking import track
+from sim.compilation.compiled import is_cached
 
 
 def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:

@@ -7,10 +7,11 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked, one_of
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import BUNNY, Program, checked, leave_trace, one_of, wrench_of
+from controllers.fields.instructions import BUNNY, Program, leave_trace, wrench_of
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 
 _LONGEST_TICK = 0.05  # [s] a bunny that waits does not leap after a pause

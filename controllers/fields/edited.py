@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import checked, one_of
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_at
-from controllers.fields.instructions import RECORDED, Program, checked, one_of, wrench_of
+from controllers.fields.instructions import RECORDED, Program, wrench_of
 from controllers.fields.river import River, river_flow
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, Array, HandState, Wrench

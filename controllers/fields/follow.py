@@ -6,9 +6,10 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
-from controllers.fields.instructions import FOLLOW, Program, checked, leave_trace, wrench_of
+from controllers.fields.instructions import FOLLOW, Program, leave_trace, wrench_of
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
 

@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
-from controllers.fields.instructions import GOVERNOR, Program, checked, leave_trace, wrench_of
+from controllers.fields.instructions import GOVERNOR, Program, leave_trace, wrench_of
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
 
@@ -60,7 +61,7 @@ class Governor:
         φ, in the hand frame H.
     speeds : array_like, shape (m, 2)
         v_min and v_max [m/s] at m phases equally spaced from the curve's start to its end, linear between them, as
-        of `River.speeds`; what comes of `controllers.certificates.rate_bounds.RateBounds.stylus_speed`.
+        of `River.speeds`; what comes of `controllers.certificates.flight.rate_bounds.RateBounds.stylus_speed`.
     drag : float
         b [N s/m].
     epsilon : float

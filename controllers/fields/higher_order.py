@@ -8,21 +8,14 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked, one_of
 from controllers.curves.branches import BRANCHES, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, curve_point, curve_velocity
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import (
-    HIGHER_ORDER,
-    TRACE_RIVER,
-    Program,
-    checked,
-    leave_trace,
-    one_of,
-    wrench_of,
-)
+from controllers.fields.instructions import HIGHER_ORDER, TRACE_RIVER, Program, leave_trace, wrench_of
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 

@@ -10,18 +10,16 @@ last is the number of the river that has the hand, in a field of higher order: â
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.errors import ParameterError
 from controllers.fields.algebra import Weight
 from controllers.state import Array, HandState, IntArray, Wrench
-
-if TYPE_CHECKING:
-    from controllers.fields.python_law import PythonLaw
 
 FOLLOW, BUNNY, EXTERNAL, ADD, HIGHER_ORDER, RECORDED, GATE, BLEND, LIMIT, STRETCHY = range(10)
 LEADING, GOVERNOR, SOFT_WALL, ORIENTATION = 10, 11, 12, 13
@@ -33,6 +31,8 @@ _GROWTH = {ADD: -1, BLEND: -1, GATE: 0, LIMIT: 0}
 TRACE_PHASE, TRACE_POINT, TRACE_DISTANCE, TRACE_ROW, TRACE_ATTRACTOR, TRACE_RIVER, TRACE_SIZE = 0, 1, 4, 5, 6, 7, 8
 
 Kernel = Callable[[Array, int, int, Array, int, Array, Array], None]
+PythonFunction = Callable[[HandState], npt.ArrayLike]
+"""From the measured hand to the force F_H [N], called at every tick."""
 
 
 @njit
@@ -59,7 +59,7 @@ class Program:
         Gains and packed curves; never written.
     memory : Array
         Initial memory. Evaluation writes into a copy of it (`fresh_memory`), one copy for every run.
-    python_laws : tuple of PythonLaw
+    python_laws : tuple of PythonFunction
         What is to fill in the `external_slots`, one for each.
 
     Raises
@@ -72,7 +72,7 @@ class Program:
     ops: IntArray
     params: Array
     memory: Array
-    python_laws: "tuple[PythonLaw, ...]" = ()
+    python_laws: tuple[PythonFunction, ...] = ()
 
     def __post_init__(self) -> None:
         depth = np.cumsum([_GROWTH.get(int(opcode), 1) for opcode in self.ops[:, 0]])
@@ -92,7 +92,7 @@ class Program:
         params: Sequence[float] | Array,
         memory: Sequence[float],
         curve: Trajectory | None = None,
-        python_laws: "tuple[PythonLaw, ...]" = (),
+        python_laws: tuple[PythonFunction, ...] = (),
     ) -> "Program":
         """One law of force: its opcode, parameters, initial memory and curve."""
         blob = np.zeros(0) if curve is None else curve.packed()
@@ -155,19 +155,3 @@ def wrench_of(kernel: Kernel, program: Program, hand: HandState) -> Wrench:
     _, params_at, memory_at, curve_at = (int(i) for i in program.ops[0])
     kernel(program.params, params_at, curve_at, program.fresh_memory(), memory_at, hand.vector(), wrench)
     return Wrench(wrench[:3], wrench[3:])
-
-
-def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bool = False) -> float:
-    """Gain or length that must be finite (or may be infinite) and not below `least`."""
-    if np.isnan(value) or value < least or (np.isinf(value) and not infinite):
-        raise ParameterError(
-            f"{name} must be {'' if infinite else 'finite and '}at least {least:g} {unit}, got {value}"
-        )
-    return float(value)
-
-
-def one_of(name: str, value: str, names: tuple[str, ...]) -> str:
-    """Name that must be one of those known."""
-    if value not in names:
-        raise ParameterError(f"{name} must be one of {', '.join(names)}, got {value!r}")
-    return value

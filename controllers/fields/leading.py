@@ -1,6 +1,6 @@
 r"""LEADING: the stylus leads a walking figure, and feels how far it can be followed (Donald & Henle 2000, section 8).
 
-The figure walks on its own path A(s) (`controllers.curves.walked_path`): s is how far along it the figure is, and
+The figure walks on its own path A(s) (`controllers.walking.walked_path`): s is how far along it the figure is, and
 everything about the figure is a function of s. So going back is s growing less, and poses come back as they were.
 """
 
@@ -10,7 +10,20 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from controllers.curves.walked_path import (
+from controllers.checks import checked
+from controllers.errors import ParameterError
+from controllers.fields.instructions import (
+    LEADING,
+    TRACE_ATTRACTOR,
+    TRACE_DISTANCE,
+    TRACE_PHASE,
+    TRACE_POINT,
+    Program,
+    wrench_of,
+)
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.walking.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
+from controllers.walking.walked_path import (
     GRAVITY,
     PATH_BEND,
     PATH_HEADING,
@@ -26,19 +39,6 @@ from controllers.curves.walked_path import (
     path_value,
     straight_path,
 )
-from controllers.errors import ParameterError
-from controllers.fields.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
-from controllers.fields.instructions import (
-    LEADING,
-    TRACE_ATTRACTOR,
-    TRACE_DISTANCE,
-    TRACE_PHASE,
-    TRACE_POINT,
-    Program,
-    checked,
-    wrench_of,
-)
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 
 # Memory: the walker as the seven numbers that a haptic map takes [s, u, 0, 1, 0, 0, 0], its speed, the place on the
 # path that is nearest to the stylus, when the last tick was, the bend with which the path is laid, the sum of which
@@ -172,7 +172,7 @@ def _walk(params: Array, at: int, memory: Array, slot: int, dt: float) -> None:
 
 @njit
 def _decide_flight(params: Array, at: int, memory: Array, slot: int) -> None:
-    """How far the figure stays on the ground, by its place in the lap and its pace (see `controllers.fields.gait`)."""
+    """How far the figure stays on the ground, by its place in the lap and its pace (see `controllers.walking.gait`)."""
     first, lap = at + _SHARES + int(params[at + _PHASES]), memory[slot + ARGUMENT] / params[at + _STRIDE]
     share = share_of_stance(params, first, int(params[at + _STANCES]), lap)
     decide_flight(memory, slot + FLIGHT, share, memory[slot + SPEED], params[at + _TAKE_OFF], params[at + _LANDING])
@@ -233,7 +233,7 @@ class Leading:
     that is laid, so backwards the hand is guided along it.
 
     Nobody flies slowly: a gait with flights begins on the ground, and at each stance decides by its pace whether it
-    flies the next one (`controllers.fields.gait`).
+    flies the next one (`controllers.walking.gait`).
 
     The figure follows with bounded acceleration and speed. In front the path is laid towards the stylus, bent by at
     most κ_max, Ω/ṡ and a/ṡ² times the share of its support: 1 on two feet, less on one, 0 on none. On the path that

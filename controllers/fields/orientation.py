@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import ORIENTATION, Program, checked, leave_trace, wrench_of
+from controllers.fields.instructions import ORIENTATION, Program, leave_trace, wrench_of
 from controllers.fields.window import window
 from controllers.rotations import logarithm, multiply
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array, HandState, Wrench

@@ -1,7 +1,7 @@
 """The evaluation of a field: one compiled chain over its instructions, whatever it is composed of.
 
 Every law has a kernel with the same arguments. `evaluate` calls them by name; `evaluate_units` by their address, so
-that the servo compiles only the laws of its field (see `sim.kernel_units`).
+that the servo compiles only the laws of its field (see `sim.compilation.kernel_units`).
 """
 
 from collections.abc import Callable

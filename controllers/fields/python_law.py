@@ -1,12 +1,10 @@
 """A law of force in plain Python, wherever a compiled one can stand."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from controllers.fields.instructions import EXTERNAL, Program
+from controllers.fields.instructions import EXTERNAL, Program, PythonFunction
 from controllers.state import HandState, Wrench
 
 
@@ -24,11 +22,11 @@ class PythonLaw:
         affair.
     """
 
-    function: Callable[[HandState], npt.ArrayLike]
+    function: PythonFunction
 
     def program(self) -> Program:
         """Compiled form of the field: a slot for the function's force."""
-        return Program.law(EXTERNAL, [], [0.0] * 6, python_laws=(self,))
+        return Program.law(EXTERNAL, [], [0.0] * 6, python_laws=(self.function,))
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force at one hand state; calls the function."""

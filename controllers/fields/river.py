@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.admissible import checked_speeds
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import Program, checked
+from controllers.fields.instructions import Program
 from controllers.fields.window import window
 from controllers.state import Array, HandState, Wrench
 

@@ -19,8 +19,9 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked
 from controllers.errors import ParameterError
-from controllers.fields.instructions import SOFT_WALL, Program, checked
+from controllers.fields.instructions import SOFT_WALL, Program
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.rotations import logarithm, rotation_vector_rate

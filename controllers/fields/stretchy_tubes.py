@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.deformation import (
     ANCHOR,
@@ -25,7 +26,7 @@ from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow, follow_wrench
-from controllers.fields.instructions import STRETCHY, TRACE_SIZE, Program, checked, leave_trace
+from controllers.fields.instructions import STRETCHY, TRACE_SIZE, Program, leave_trace
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
 
 CLICK_DISTANCE = 1e-3  # [m] a press that carries the stylus less far is a click and no edit

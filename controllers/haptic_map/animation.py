@@ -5,13 +5,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from controllers.blending.blend import packed_blend
+from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.blending import packed_blend
-from controllers.haptic_map.combination import fresh_lap
-from controllers.haptic_map.limbs import Limb
-from controllers.haptic_map.loops import Loop, checked_clip, closed_loop
-from controllers.haptic_map.strides import in_step
+from controllers.legs.limbs import Limb
+from controllers.motion.loops import Loop, checked_clip, closed_loop
+from controllers.motion.strides import in_step
 from controllers.state import Array, Pose
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numba import njit
 
+from controllers.blending.blend import blend
+from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
+from controllers.curves.cylinder import blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.blending import blend
-from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
-from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder
-from controllers.haptic_map.limbs import Limb
+from controllers.legs.limbs import Limb
 from controllers.state import Array
 
 COMPOSITE = 2

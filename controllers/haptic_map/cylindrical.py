@@ -6,17 +6,17 @@ from copy import copy
 import numpy as np
 from numba import njit
 
+from controllers.blending.alignment import aligned_channels
+from controllers.blending.blend import blend_corrected
+from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
+from controllers.curves.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
-from controllers.haptic_map.alignment import aligned_channels
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.blending import blend_corrected
-from controllers.haptic_map.clearance import cleared
-from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
-from controllers.haptic_map.cylinder import blend_weight, checked_interval, cylinder, eased
-from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.inbetween import FOOT, ROOT, correction, interpolation, packed_table, table_channels
-from controllers.haptic_map.limb_ends import with_ends
-from controllers.haptic_map.limbs import Limb
+from controllers.legs.clearance import cleared
+from controllers.legs.footfalls import foot_corrections
+from controllers.legs.limb_ends import with_ends
+from controllers.legs.limbs import Limb
+from controllers.motion.inbetween import FOOT, ROOT, correction, interpolation, packed_table, table_channels
 from controllers.state import Array
 
 CYLINDRICAL = 1

@@ -1,7 +1,7 @@
 """The evaluation of a haptic map, of whatever kind, in the compiled tick.
 
 Every kind has a kernel with the same arguments, which is called by its address: so nothing is compiled that is not
-used. Where the addresses come from is not this package's affair (see `sim.kernel_units`).
+used. Where the addresses come from is not this package's affair (see `sim.compilation.kernel_units`).
 """
 
 import numpy as np

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from controllers.curves.cylinder import blend_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.cylinder import blend_weight
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 from controllers.state import Array, Pose
 

@@ -2,7 +2,7 @@ r"""The led figure: a clip that walks straight on walks on a path instead, and i
 
 .. math:: X_{root}(s) = A(s)\,\rho(s/\ell), \qquad X_{foot}(s) = A(s + \ell\,\lambda(s/\ell))\,\rho_{foot}(s/\ell)
 
-A(s) ∈ SE(2) is the figure's path (`controllers.curves.walked_path`), ℓ the length of the clip's lap, ρ what is left of
+A(s) ∈ SE(2) is the figure's path (`controllers.walking.walked_path`), ℓ the length of the clip's lap, ρ what is left of
 a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓλ rests, and advances while it swings
 (`limbs`): so a foot that stands stays where it is, however path and pelvis turn over it. The legs follow. Bends are
 walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s), and
@@ -17,7 +17,19 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.curves.walked_path import (
+from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.errors import ParameterError
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
+from controllers.legs.grounded import Mask, grounded, hastened, runs
+from controllers.legs.limb_ends import end_channels, end_lag, end_poses
+from controllers.legs.limbs import END, LIMB, Limb, place_limb
+from controllers.legs.planted import with_planted_ends
+from controllers.legs.reaching import reached
+from controllers.motion.captures import Capture, lap_signs, low_passed
+from controllers.motion.loops import checked_clip, closed_loop, turned, yawed
+from controllers.rotations import multiply, relative
+from controllers.state import Array, Pose
+from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,
     PATH_X,
@@ -27,18 +39,6 @@ from controllers.curves.walked_path import (
     path_value,
     straight_path,
 )
-from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.captures import Capture, lap_signs, low_passed
-from controllers.haptic_map.grounded import Mask, grounded, hastened, runs
-from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses
-from controllers.haptic_map.limbs import END, LIMB, Limb, place_limb
-from controllers.haptic_map.loops import checked_clip, closed_loop, turned, yawed
-from controllers.haptic_map.planted import with_planted_ends
-from controllers.haptic_map.reaching import reached
-from controllers.haptic_map.splines import basis, basis_slope, control_points
-from controllers.rotations import multiply, relative
-from controllers.state import Array, Pose
 
 LED = 7
 _STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(9)

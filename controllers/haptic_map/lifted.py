@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numba import njit
 
+from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
+from controllers.blending.combination import combine, figure_channels, fresh_lap, packed_figure
+from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
+from controllers.curves.cylinder import cylinder
+from controllers.curves.splines import basis, basis_slope, control_points, round_lap
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
-from controllers.haptic_map.combination import combine, figure_channels, fresh_lap, packed_figure
-from controllers.haptic_map.cores import draw_in
-from controllers.haptic_map.cylinder import cylinder
-from controllers.haptic_map.floor import SOFTNESS
-from controllers.haptic_map.footing import fresh_footing, packed_soles
-from controllers.haptic_map.frames import (
+from controllers.haptic_map.lifting.cores import draw_in
+from controllers.haptic_map.lifting.frames import (
     CLOSES,
     PlacedClip,
     checked_angles,
@@ -25,15 +25,15 @@ from controllers.haptic_map.frames import (
     lap_spline,
     packed_frames,
 )
-from controllers.haptic_map.lap import MEMORY
-from controllers.haptic_map.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
-from controllers.haptic_map.limbs import END, Limb
-from controllers.haptic_map.loops import checked_clip
-from controllers.haptic_map.neighbours import SITE, near_clips, near_weights, packed_neighbours
-from controllers.haptic_map.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
-from controllers.haptic_map.saturation import clamped
-from controllers.haptic_map.sites import box, checked_sites
-from controllers.haptic_map.splines import basis, basis_slope, control_points, round_lap
+from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
+from controllers.haptic_map.lifting.sites import box, checked_sites
+from controllers.legs.floor import SOFTNESS
+from controllers.legs.footing import fresh_footing, packed_soles
+from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
+from controllers.legs.limbs import END, Limb
+from controllers.motion.lap import MEMORY
+from controllers.motion.loops import checked_clip
+from controllers.saturation import clamped
 from controllers.state import Array, IntArray
 
 LIFTED = 3

@@ -7,6 +7,8 @@ from copy import copy
 import numpy as np
 from numba import njit
 
+from controllers.blending.blend import blend
+from controllers.blending.combination import fresh_lap
 from controllers.curves.branches import BRANCHES, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import (
@@ -21,10 +23,8 @@ from controllers.curves.trajectory import (
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.blending import blend
-from controllers.haptic_map.combination import fresh_lap
-from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
-from controllers.haptic_map.limbs import Limb
+from controllers.legs.limbs import Limb
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
 from controllers.state import Array, Pose
 

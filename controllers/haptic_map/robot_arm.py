@@ -26,9 +26,9 @@ from numba import njit
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
-from controllers.haptic_map.saturation import saturate_vector
-from controllers.haptic_map.vectors import Quaternion, Vector, cross, product, turned, turned_back
+from controllers.motion.vectors import Quaternion, Vector, cross, product, turned, turned_back
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
+from controllers.saturation import saturate_vector
 from controllers.state import Array, Pose
 
 ROBOT_ARM = 4

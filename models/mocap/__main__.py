@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from models.mocap import choreography, flights, gait
-from models.mocap.own_bvh import write_bvh
+from models.mocap.authoring import choreography, flights, gait
+from models.mocap.readers.own_bvh import write_bvh
 
 CLIPS = choreography.CLIPS | gait.CLIPS | flights.CLIPS
 

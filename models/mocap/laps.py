@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from models.mocap import quaternions
 from models.mocap.clip import Clip
-from models.mocap.contacts import contacts
+from models.mocap.dynamics.contacts import contacts
 
 Array = npt.NDArray[np.float64]
 

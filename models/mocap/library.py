@@ -5,15 +5,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from models.errors import ModelError
-from models.mocap.asf_amc import read_amc
-from models.mocap.bvh import read_bvh
 from models.mocap.clip import Clip
-from models.mocap.deepmimic import read_deepmimic
-from models.mocap.motion_file import MotionFileError, numbered_lines
-from models.mocap.own_bvh import own_clip, write_bvh
-from models.mocap.retarget import RetargetReport, retarget
-from models.mocap.skeleton_roles import roles_of
-from models.mocap.source_motion import SourceMotion
+from models.mocap.readers.asf_amc import read_amc
+from models.mocap.readers.bvh import read_bvh
+from models.mocap.readers.deepmimic import read_deepmimic
+from models.mocap.readers.motion_file import MotionFileError, numbered_lines
+from models.mocap.readers.own_bvh import own_clip, write_bvh
+from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.retarget import RetargetReport, retarget
+from models.mocap.retargeting.skeleton_roles import roles_of
 
 _CLIPS = files("models.mocap") / "clips"
 

@@ -4,7 +4,7 @@ from typing import Self
 
 from controllers.state import HandState, Vec3
 from sim.devices.base import DeviceError, checked_force
-from sim.recording import Recording
+from sim.recording.recording import Recording
 
 
 class ReplayDevice:
@@ -13,7 +13,7 @@ class ReplayDevice:
     Parameters
     ----------
     recording : Recording
-        With the channels of `sim.loop.groups`; stays open while the device is used.
+        With the channels of `sim.loop.loop.groups`; stays open while the device is used.
 
     Raises
     ------

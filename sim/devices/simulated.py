@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import HandState, Vec3
-from sim.compiled import entry_point
+from sim.compilation.compiled import entry_point
 from sim.devices.base import DeviceError, checked_force
-from sim.devices.phantom_port import PhantomPort, actuate, phantom_port, sense
-from sim.plant import Hand, Plant, advance, hand_torques, make_hand, make_plant
 from sim.users.arm import Arm
-from sim.world import World
+from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense
+from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand, make_plant
+from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from sim.recording import Channel, Recording
+from sim.recording.recording import Channel, Recording
 from sim.viewer.courses import Course, courses
 from sim.viewer.palette import FIELD, PUSH, TUBE, USER, rgb
 from sim.viewer.shapes import Shape, body_shapes, tube

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from controllers.state import HandState
-from experiments.clips import load_clips
-from experiments.config import RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.run import config_dict
-from experiments.wiring import wire
+from experiments.setups.clips import load_clips
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from sim.devices.base import Device, DeviceError
 from sim.devices.replay import ReplayDevice
 from sim.devices.simulated import SimulatedPhantom
-from sim.loop import Loop, groups, record_into
-from sim.recorder import Recorder
-from sim.recording import Recording
+from sim.loop.loop import Loop, groups, record_into
+from sim.recording.recorder import Recorder
+from sim.recording.recording import Recording
 from sim.users.arm import Arm
-from sim.world import World
+from sim.world.world import World
 
 TICKS = 40
 MakeDevice = Callable[[], Device]

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.haptic_map.limbs import Limb
+from controllers.legs.limbs import Limb
 
 JOINTS = 3
 # The three joints as a leg: hip, knee that flexes about y, ankle.

@@ -6,7 +6,7 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.captures import Capture, lap_signs, low_passed
+from controllers.motion.captures import Capture, lap_signs, low_passed
 
 N, DURATION = 256, 1.25
 

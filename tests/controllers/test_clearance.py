@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_footfalls import LEGS, REST, STILL, N, bump, clip, kicking
 
-from controllers.haptic_map.clearance import cleared
-from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.inbetween import FOOT, ROOT, interpolation
+from controllers.legs.clearance import cleared
+from controllers.legs.footfalls import foot_corrections
+from controllers.motion.inbetween import FOOT, ROOT, interpolation
 
 TOUCH = 0.003
 # Which of the feet is the lower one when both kick changes soon with the mixture.

@@ -5,9 +5,9 @@ import pytest
 from clips_for_maps import matrices, swinging, wxyz
 from scipy.spatial.transform import Rotation
 
+from controllers.blending.alignment import aligned_channels
 from controllers.errors import ParameterError
-from controllers.haptic_map.alignment import aligned_channels
-from controllers.haptic_map.loops import checked_clip, closed_loop, plane_exponential, turned, yawed
+from controllers.motion.loops import checked_clip, closed_loop, plane_exponential, turned, yawed
 
 
 def _loop(poses, fps=30.0):

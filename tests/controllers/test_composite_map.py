@@ -8,8 +8,8 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.limbs import Limb
-from sim.kernel_units import map_units
+from controllers.legs.limbs import Limb
+from sim.compilation.kernel_units import map_units
 
 R = (0.03, 0.07)
 LOWER, RED, BLUE = (

@@ -6,8 +6,8 @@ from clips_for_maps import stylus
 from test_lifted_map import MAP
 from test_lifted_weights import wandering
 
-from controllers.haptic_map.cores import _WIDEST, core_points, draw_in
-from controllers.haptic_map.splines import basis, round_lap
+from controllers.curves.splines import basis, round_lap
+from controllers.haptic_map.lifting.cores import _WIDEST, core_points, draw_in
 
 TURN = 2.0 * np.pi
 

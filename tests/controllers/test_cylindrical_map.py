@@ -8,13 +8,13 @@ from clips_for_maps import JOINTS, LEG, difference, matrices, stylus, swinging
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controllers.curves.cylinder import eased
 from controllers.errors import ParameterError
-from controllers.haptic_map.cylinder import eased
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAPS
-from controllers.haptic_map.mean import mean_rotation
-from sim.kernel_units import map_units
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
+from controllers.motion.mean import mean_rotation
+from sim.compilation.kernel_units import map_units
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from controllers.energy_tank import TANK_ENERGY, TANK_SCALE, EnergyTank, guard_energy, river_power, spring_store
 from controllers.errors import ParameterError
+from controllers.safety.energy_tank import TANK_ENERGY, TANK_SCALE, EnergyTank, guard_energy, river_power, spring_store
 
 TANK = EnergyTank(1e-3, power=0.02, capacity=0.05)
 

@@ -12,7 +12,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, base_of, stylus_turn, yielded
-from sim.kernel_units import map_units
+from sim.compilation.kernel_units import map_units
 
 CLIPS = [(swinging(seed, travel=0.4 * seed, turns=0.2), 30.0) for seed in range(4)]
 BASE = Cylindrical(CLIPS, (0.03, 0.07), (-0.02, 0.02))

@@ -5,7 +5,7 @@ import pytest
 from clips_for_maps import LEG, matrices, wxyz
 from scipy.spatial.transform import Rotation
 
-from controllers.haptic_map.floor import keep_above
+from controllers.legs.floor import keep_above
 
 SOLE = LEG.points - LEG.points.mean(axis=0)
 FLOOR = 0.02

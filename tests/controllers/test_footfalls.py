@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from clips_for_maps import LEG
 
-from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.inbetween import FOOT, ROOT
-from controllers.haptic_map.limbs import Limb
-from controllers.haptic_map.loops import plane_exponential, turned
+from controllers.legs.footfalls import foot_corrections
+from controllers.legs.limbs import Limb
+from controllers.motion.inbetween import FOOT, ROOT
+from controllers.motion.loops import plane_exponential, turned
 
 N = 400
 S = np.arange(N) / N

@@ -6,9 +6,9 @@ from clips_for_maps import LEG, difference, matrices, stylus, swinging, wxyz
 from scipy.spatial.transform import Rotation
 from test_lifted_map import ring
 
-from controllers.haptic_map.footing import fresh_footing, go_on, keep_footing, mixed
-from controllers.haptic_map.lap import MEMORY
 from controllers.haptic_map.lifted import Lifted
+from controllers.legs.footing import fresh_footing, go_on, keep_footing, mixed
+from controllers.motion.lap import MEMORY
 
 SOLE = LEG.points - LEG.points.mean(axis=0)
 FLAT = -float(SOLE[:, 2].min())  # height of the centre of a sole that lies flat

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from figure_soles import slide, soles
 
-from controllers.haptic_map.grounded import runs
 from controllers.haptic_map.led import Led
-from experiments.figure_maps import figure_legs
-from experiments.lead import led_map
+from controllers.legs.grounded import runs
+from experiments.setups.figure_maps import figure_legs
+from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
-from models.mocap.contacts import contacts
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 
 
@@ -41,7 +41,7 @@ def test_no_flight_is_left_and_feet_do_not_slide(figure, run):
     flown, held = (soles(figure, [led.pose(walker(s, u)) for s in places]) for u in (0.0, 1.0))
     lowest = held[..., 2].min(axis=1)
     assert flown[..., 2].min(axis=1).max() > 0.03
-    # By less than which the physical figure's contact points count as on the floor (`sim.figure_state`).
+    # By less than which the physical figure's contact points count as on the floor (`sim.body.figure_state`).
     assert lowest.max() < 0.005
     assert lowest.min() > -0.005
     assert slide(held) < 0.01

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.inbetween import correction, packed_table
+from controllers.motion.inbetween import correction, packed_table
 
 ROWS, NODES = 40, 5
 VALUES = np.random.default_rng(4).normal(size=(ROWS, NODES, NODES, 6))

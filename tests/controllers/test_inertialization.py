@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.inertialization import add_offset, offset_left, stopping_way
+from controllers.motion.inertialization import add_offset, offset_left, stopping_way
 
 T = 0.4
 RNG = np.random.default_rng(11)

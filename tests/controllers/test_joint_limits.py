@@ -11,7 +11,7 @@ from test_limbs import foot
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.joint_limits import MARGIN, hold_joint, in_the_air
+from controllers.legs.joint_limits import MARGIN, hold_joint, in_the_air
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 CLIPS = [(swinging(seed, amplitude=0.3) + 0.2 * (np.arange(19) == 2), 30.0) for seed in (1, 2, 3, 5)]

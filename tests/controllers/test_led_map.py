@@ -5,14 +5,14 @@ import pytest
 from clips_for_maps import LEG, difference, swinging
 from figure_soles import slide, soles
 
-from controllers.curves.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
-from experiments.figure_maps import figure_legs
-from experiments.lead import led_map
+from controllers.walking.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
+from experiments.setups.figure_maps import figure_legs
+from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
-from models.mocap.contacts import contacts
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 
 

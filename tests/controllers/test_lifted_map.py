@@ -6,9 +6,9 @@ from clips_for_maps import LEG, difference, stylus, swinging
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
-from controllers.haptic_map.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
 from controllers.haptic_map.lifted import Lifted
-from sim.kernel_units import map_units
+from controllers.haptic_map.lifting.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
+from sim.compilation.kernel_units import map_units
 
 ROWS = 48
 TURN = 2.0 * np.pi

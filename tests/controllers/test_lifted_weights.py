@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.neighbours import _MOST, SITE, near_clips, near_weights, packed_neighbours, reaches
-from controllers.haptic_map.splines import round_lap
+from controllers.curves.splines import round_lap
+from controllers.haptic_map.lifting.neighbours import _MOST, SITE, near_clips, near_weights, packed_neighbours, reaches
 
 TURN = 2.0 * np.pi
 R, Z = (0.028, 0.072), (-0.022, 0.022)

@@ -6,15 +6,15 @@ from clips_for_maps import JOINTS, difference, swinging, wxyz
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.arrangement import ROWS, SAMPLES, Energy, Task, is_apart, on_lap
-from controllers.haptic_map.common_lap import SAMPLES as STEPS
-from controllers.haptic_map.common_lap import common_lap
-from controllers.haptic_map.layouts import lattice, scaled
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting import lift
-from controllers.haptic_map.motion_features import Features, Motion, features
-from controllers.haptic_map.room import Rectangle, Room
-from controllers.haptic_map.transitions import Transition, compare, find_transitions
+from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, is_apart, on_lap
+from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
+from controllers.haptic_map.lifting.common_lap import common_lap
+from controllers.haptic_map.lifting.layouts import lattice, scaled
+from controllers.haptic_map.lifting.lift import lift
+from controllers.haptic_map.lifting.motion_features import Features, Motion, features
+from controllers.haptic_map.lifting.room import Rectangle, Room
+from controllers.haptic_map.lifting.transitions import Transition, compare, find_transitions
 
 WEIGHTS = np.array([0.4, 0.2, 0.15, 0.1])
 ROOM = Room()

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.limbs import Limb, flexion, place_limb
-from controllers.haptic_map.support import lowering
+from controllers.legs.limbs import Limb, flexion, place_limb
+from controllers.legs.support import lowering
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
 STRAIGHT = 0.9  # length of the leg [m]

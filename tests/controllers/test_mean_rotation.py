@@ -5,7 +5,7 @@ import pytest
 from clips_for_maps import matrices, wxyz
 from scipy.spatial.transform import Rotation
 
-from controllers.haptic_map.mean import mean_derivative, mean_rotation
+from controllers.motion.mean import mean_derivative, mean_rotation
 
 RNG = np.random.default_rng(3)
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from test_footfalls import LEGS, REST, N, kicking, walking
 
-from controllers.haptic_map.footfalls import foot_corrections
-from controllers.haptic_map.pair_corrections import (
+from controllers.blending.pair_corrections import (
     neighbouring_pairs,
     packed_pairs,
     pair_channels,
     pair_correction,
 )
+from controllers.legs.footfalls import foot_corrections
 
 CLIPS = np.stack([kicking(0, 0.1, 0.4), kicking(1, 0.2, 0.5), walking(0.6, 0.03)], axis=1)
 DRIFTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.6, 0.0, 0.0]])

@@ -8,9 +8,9 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.evaluate import evaluate_map, evaluate_map_jacobian
 from controllers.haptic_map.robot_arm import RobotArm
 from controllers.rotations import exponential, multiply
-from experiments.robot_arm import HOME, ORIENTATION, SCALE, robot_arm_map
+from experiments.setups.robot_arm import HOME, ORIENTATION, SCALE, robot_arm_map
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
-from sim.kernel_units import map_units
+from sim.compilation.kernel_units import map_units
 
 MODEL = arm_model()
 MAP = robot_arm_map()

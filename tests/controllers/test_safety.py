@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.errors import ParameterError
-from controllers.safety import FAULT_NOT_FINITE, LIMITER_FAULT, ForceLimiter, limit_force
+from controllers.safety.limiter import FAULT_NOT_FINITE, LIMITER_FAULT, ForceLimiter, limit_force
 
 FAST = ForceLimiter(period=1e-3, slew=1e9)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.saturation import clamped, saturate_vector
+from controllers.saturation import clamped, saturate_vector
 
 LOW, HIGH, MARGIN = -0.02, 0.03, 0.004
 

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.haptic_map.footsteps import FLOOR, STEP, limb_end
-from controllers.haptic_map.stepping_limbs import put_limb, shortfall
+from controllers.legs.footsteps import FLOOR, STEP, limb_end
+from controllers.legs.stepping_limbs import put_limb, shortfall
 from controllers.rotations import multiply
-from experiments.figure_maps import packed_legs
+from experiments.setups.figure_maps import packed_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 

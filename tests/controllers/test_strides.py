@@ -5,8 +5,8 @@ import pytest
 from clips_for_maps import difference, stylus, swinging
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.loops import checked_clip, closed_loop
-from controllers.haptic_map.strides import in_step, strides
+from controllers.motion.loops import checked_clip, closed_loop
+from controllers.motion.strides import in_step, strides
 
 
 def repeated(seed, times, travel, frames=60):

@@ -6,8 +6,8 @@ from clips_for_maps import stylus
 from test_cylindrical_map import MOVING
 from test_lifted_map import MAP
 
-from controllers.haptic_map.combination import fresh_lap
-from controllers.haptic_map.lap import LAP_HEADING, LAP_X, LAP_Y, update_lap
+from controllers.blending.combination import fresh_lap
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, update_lap
 
 TURN = 2.0 * np.pi
 

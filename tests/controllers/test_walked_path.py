@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.curves.walked_path import (
+from controllers.walking.walked_path import (
     GRAVITY,
     PACKED_PATH,
     PATH_HEADING,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments import certified_trials
-from experiments.certified_trials import ASSUMED, EVERYTHING, Let, draw_certified, let_go
+from experiments.studies import certified_trials
+from experiments.studies.certified_trials import ASSUMED, EVERYTHING, Let, draw_certified, let_go
 
 
 @pytest.fixture(scope="module")

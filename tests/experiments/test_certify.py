@@ -8,14 +8,21 @@ from dataclasses import replace
 
 import pytest
 
-from controllers.certificates.hand import HandRange
+from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
-from experiments import certified_field
-from experiments.certified_field import certificate_inputs, read_certificate, verify_certificate
-from experiments.certify import CERTIFICATE, FLIGHTS_PLOT, PAGE, PLOT, certified_rivers, certify_into
+from experiments.certify.certified_field import certificate_inputs, read_certificate, verify_certificate
+from experiments.certify.certify import (
+    CERTIFICATE,
+    FLIGHTS_PLOT,
+    PAGE,
+    PLOT,
+    certified_field,
+    certified_rivers,
+    certify_into,
+)
 from experiments.cli import main
-from experiments.config import RunConfig
+from experiments.config.run_config import RunConfig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 

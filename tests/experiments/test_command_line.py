@@ -123,7 +123,7 @@ def test_a_motion_file_that_is_none_is_refused(tmp_path: Path, capsys: pytest.Ca
 
 def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from models.mocap.library import embedded
-    from models.mocap.own_bvh import write_bvh
+    from models.mocap.readers.own_bvh import write_bvh
 
     source, target = tmp_path / "in.bvh", tmp_path / "out.bvh"
     write_bvh(embedded("cheer"), source)
@@ -135,7 +135,7 @@ def test_a_converted_file_is_not_overwritten_unasked(tmp_path: Path, capsys: pyt
 
 def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path) -> None:
     from models.mocap.library import embedded
-    from models.mocap.own_bvh import write_bvh
+    from models.mocap.readers.own_bvh import write_bvh
 
     write_bvh(embedded("cheer"), tmp_path / "in.bvh")
     for arguments in (["--help"], ["convert", str(tmp_path / "in.bvh"), str(tmp_path / "out.bvh")]):

@@ -11,8 +11,8 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.expressive import EXPRESSIVE
 from experiments import compiling
 from experiments.compiling import compile_once, compiled_parts
-from experiments.config import ArmConfig, RunConfig
-from experiments.robot_arm import wire_arm
+from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.setups.robot_arm import wire_arm
 
 
 @pytest.fixture

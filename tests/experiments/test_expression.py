@@ -9,10 +9,10 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.expression import expressive_figure, oriented
-from experiments.wiring import wire
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.expression import expressive_figure, oriented
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded, embedded_names
 

@@ -7,7 +7,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River
-from experiments.field_files import load_field, save_field
+from experiments.files.field_files import load_field, save_field
 from sim.errors import SimError
 
 CIRCLE = Trajectory.circle(0.05, 4.0)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments import figures
-from experiments.changes import RiverChange
-from experiments.figures import (
+from experiments.results import figures
+from experiments.results.changes import RiverChange
+from experiments.results.figures import (
     POINTS,
     STYLE,
     deviation_figure,
@@ -22,8 +22,8 @@ from experiments.figures import (
     torques_figure,
     tracking_figure,
 )
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 
 ANGLE = np.linspace(0, 2 * np.pi, 61)
 CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
@@ -245,8 +245,9 @@ def test_a_hand_that_never_pushes_shades_nothing(tmp_path):
 def test_no_display_is_needed(tmp_path):
     record(tmp_path / "run.h5").close()
     script = (
-        "import sys; from pathlib import Path; from sim.recording import Recording; "
-        "from experiments.figures import draw_figures; draw_figures(Recording(Path(sys.argv[1])), Path(sys.argv[2])); "
+        "import sys; from pathlib import Path; from sim.recording.recording import Recording; "
+        "from experiments.results.figures import draw_figures; "
+        "draw_figures(Recording(Path(sys.argv[1])), Path(sys.argv[2])); "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"} | {"MPLBACKEND": "tkagg"}

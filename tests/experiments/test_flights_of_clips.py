@@ -6,15 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.certificates.tolerance import Judging
-from experiments.ballistics import clip_ballistics, fly
-from experiments.repair import repair_clip, repair_file
+from controllers.certificates.flight.tolerance import Judging
+from experiments.certify.ballistics import clip_ballistics, fly
+from experiments.certify.repair import repair_clip, repair_file
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_spec
 from models.mocap.clip import Clip
-from models.mocap.contacts import contacts
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.momentum import momentum
 from models.mocap.library import embedded, load_clip
-from models.mocap.momentum import momentum
 
 SHARED = Path(__file__).resolve().parents[2] / ".." / "shared" / "mocap"
 shared = pytest.mark.skipif(not SHARED.is_dir(), reason="motion capture is not at ../shared/mocap")

@@ -5,12 +5,12 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.ballistics import clip_ballistics
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.governor import Governed, animation_along
-from experiments.rate_trials import DRAG, Bench
-from experiments.wiring import wire
+from experiments.certify.ballistics import clip_ballistics
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.governor import Governed, animation_along
+from experiments.setups.wiring import wire
+from experiments.studies.rate_trials import DRAG, Bench
 from models.mocap.library import embedded
 
 

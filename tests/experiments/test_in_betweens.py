@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from experiments.balance import nearest_supported
-from experiments.clips import load_clips
-from experiments.config import FIGURE_CLIPS, RunConfig
-from experiments.figure_maps import clip_map
-from experiments.wiring import wire
+from experiments.config.run_config import FIGURE_CLIPS, RunConfig
+from experiments.setups.balance import nearest_supported
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import clip_map
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.balance import supported
+from models.mocap.authoring.balance import supported
 from models.mocap.clip import pose_difference
-from models.mocap.floor_forces import Floor, residual
-from sim.reference import poses_along
+from models.mocap.dynamics.floor_forces import Floor, residual
+from sim.reference.reference import poses_along
 
 TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
 CONFIG = RunConfig(seconds=1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.json_text import json_text
+from experiments.files.json_text import json_text
 
 
 def strictly(text: str) -> object:

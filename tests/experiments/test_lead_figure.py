@@ -4,11 +4,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from experiments.figures import STYLE
-from experiments.lead_figure import lead_figure
+from experiments.results.figures import STYLE
+from experiments.results.lead_figure import lead_figure
 from models.humanoid.skeleton import rest_pose
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 
 TURNED, SECONDS = 4.0, 9.0
 

@@ -7,17 +7,17 @@ from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
 from controllers.haptic_map.led import Led
 from experiments.cli import main
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.figure_maps import figure_legs
-from experiments.lead import gait_remark, law, leading_hand, led_map, s_curve, walker_argument
-from experiments.lead_measures import LeadSummary, _Retrace, _Soles, support_at
-from experiments.wiring import wire
+from experiments.config.run_config import RunConfig
+from experiments.results.lead_measures import LeadSummary, _Retrace, _Soles, support_at
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import figure_legs
+from experiments.setups.lead import gait_remark, law, leading_hand, led_map, s_curve, walker_argument
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import Clip, PlanarDisplacement
 from models.mocap.library import embedded
 from models.scene import SceneConfig
-from sim.world import phantom_angles
+from sim.world.world import phantom_angles
 
 GAIT = Gait(1.4, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.45)
 

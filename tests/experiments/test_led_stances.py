@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.lead import stances
-from models.mocap.contacts import Contacts
+from experiments.setups.lead import stances
+from models.mocap.dynamics.contacts import Contacts
 
 FPS, FRAMES = 100.0, 101
 FEET = {"left": np.arange(4), "right": np.arange(4, 8)}

@@ -11,19 +11,19 @@ from controllers.fields.river import River
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.archives import read_archive, write_archive
 from experiments.cli import main
-from experiments.config import RunConfig
-from experiments.field_files import save_field
-from experiments.figure_maps import figure_legs
-from experiments.map_files import load_figure_map, load_map, map_digest, save_map
+from experiments.config.run_config import RunConfig
+from experiments.files.archives import read_archive, write_archive
+from experiments.files.field_files import save_field
+from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
 from experiments.run import RECORDING, config_dict
-from experiments.wiring import wire
+from experiments.setups.figure_maps import figure_legs
+from experiments.setups.wiring import wire
 from models.mocap.library import embedded
 from models.scene import SceneConfig
 from sim.errors import SimError
-from sim.recorder import Group, Recorder
-from sim.world import World
+from sim.recording.recorder import Group, Recorder
+from sim.world.world import World
 
 NAMES = ("walk", "angry", "jump")
 CLIPS = [(clip.poses, clip.fps) for clip in map(embedded, NAMES)]
@@ -123,7 +123,7 @@ def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
 
 def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "map.npz"
-    monkeypatch.setattr("experiments.archives.VERSION", 2)
+    monkeypatch.setattr("experiments.files.archives.VERSION", 2)
     write_archive(path, "Lifted", {})
     monkeypatch.undo()
     with pytest.raises(SimError, match="of version 2 of the format, this program reads 1"):

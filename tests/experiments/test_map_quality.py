@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from experiments.in_betweens import measure_motion
-from experiments.map_quality import SAMPLES, Layout, body_weights, in_between, lap_times, measure_map, neighbours
+from experiments.lifting.in_betweens import measure_motion
+from experiments.lifting.map_quality import (
+    SAMPLES,
+    Layout,
+    body_weights,
+    in_between,
+    lap_times,
+    measure_map,
+    neighbours,
+)
 from models.humanoid.skeleton import JOINTS, N_TANGENT, figure_model, joint_range, rest_pose
 from models.mocap.clip import Clip
 

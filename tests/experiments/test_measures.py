@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import measures
-from experiments.measures import summarise
-from experiments.summary import RunSummary
-from experiments.summary_parts import SpeedSummary
+from experiments.results import measures
+from experiments.results.measures import summarise
+from experiments.results.summary import RunSummary
+from experiments.results.summary_parts import SpeedSummary
 from models.humanoid.skeleton import rest_pose
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 
 PERIOD, EVERY, N = 1e-3, 10, 4000
 

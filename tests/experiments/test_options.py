@@ -6,8 +6,8 @@ from math import inf, nan
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.config import ArmConfig, RunConfig
-from experiments.options import Interval, above, at_least, check_numbers
+from experiments.config.options import Interval, above, at_least, check_numbers
+from experiments.config.run_config import ArmConfig, RunConfig
 
 CONFIGS = (RunConfig(), ArmConfig())
 NUMBERS = [(config, option) for config in CONFIGS for option in fields(config) if "interval" in option.metadata]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from experiments.pace import friction_along, paced
+from experiments.setups.pace import friction_along, paced
 from models.scene import PHANTOM
 from sim.errors import SimError
-from sim.world import World, phantom_angles
+from sim.world.world import World, phantom_angles
 
 CURVE = Trajectory.circle(0.05, 2.2, (0.0, 0.0, 0.01))
 

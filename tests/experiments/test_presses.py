@@ -10,15 +10,15 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
-from experiments import stretch_measures
-from experiments.config import RunConfig
-from experiments.hands import hand_remarks, handled, user_arm
-from experiments.phases import EditingSummary, PerformanceSummary, PressSummary
-from experiments.stretch import edited_until, law, stretch_grabs
-from experiments.stretch_measures import press_summaries
-from experiments.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from experiments.config.run_config import RunConfig
+from experiments.results import stretch_measures
+from experiments.results.phases import EditingSummary, PerformanceSummary, PressSummary
+from experiments.results.stretch_measures import press_summaries
+from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
+from experiments.setups.hands import hand_remarks, handled, user_arm
+from experiments.setups.stretch import edited_until, law, stretch_grabs
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 from sim.users.arm import Arm, hand_force
 from sim.users.intent import Grab
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.region_trials import HANDS, certified_region, simulate_from
+from experiments.studies.region_trials import HANDS, certified_region, simulate_from
 
 
 @pytest.mark.slow

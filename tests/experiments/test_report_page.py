@@ -5,9 +5,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from experiments import report
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from experiments.results import report
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 from sim.viewer.palette import RIVERS
 
 REPLAY = '<html><body class="a">3 & 4 < 5</body></html>'

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments import changes
-from experiments.changes import RiverChange, river_changes
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from experiments.results import changes
+from experiments.results.changes import RiverChange, river_changes
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 
 # The fifth and the last but one have the hand for too short a time.
 RIVER = np.repeat([-1.0, 0.0, -1.0, 0.0, 2.0, 1.0, -1.0, 2.0, 0.0, 1.0], [30, 50, 40, 60, 20, 70, 20, 80, 39, 90])

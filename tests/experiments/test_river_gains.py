@@ -10,9 +10,9 @@ from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder, higher_order_wrench
 from controllers.fields.instructions import TRACE_RIVER
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
-from experiments.config import RunConfig
-from experiments.hands import user_arm
-from experiments.modes import law, river_time
+from experiments.config.run_config import RunConfig
+from experiments.setups.hands import user_arm
+from experiments.setups.modes import law, river_time
 from sim.users.arm import hand_force
 
 MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s] of what the hand moves, about the Phantom's

@@ -5,8 +5,8 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from experiments.config import RunConfig
-from experiments.lifted_runs import default_pushes, lifted_river, lifted_rivers, pushed_over
+from experiments.config.run_config import RunConfig
+from experiments.setups.lifted_runs import default_pushes, lifted_river, lifted_rivers, pushed_over
 from models.mocap.library import embedded
 
 TURN = 2.0 * np.pi

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
-from experiments.figure_maps import figure_legs
-from experiments.map_files import save_map
+from experiments.files.map_files import save_map
+from experiments.setups.figure_maps import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 

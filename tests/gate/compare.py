@@ -1,6 +1,7 @@
 """The gate of a change that moves code and no number: short runs of a commit and of this tree, compared bit for bit.
 
-``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case there
+``python tests/gate/compare.py COMMIT [CASE ...]`` checks the commit out into a worktree of its own, runs every case
+there
 and here on this machine, both at once, and compares every channel of the two recordings. Hashes of recordings could not
 be kept instead: libraries round by processor, and a figure with contacts magnifies that.
 """
@@ -87,7 +88,9 @@ def gate(commit: str, cases: list[str]) -> int:
             for case in cases:
                 runs = [start(case, place, folder) for place, folder in zip((tree, ROOT), folders, strict=True)]
                 codes = [run.wait() for run in runs]
-                said = [f"exit code {code} {side}" for code, side in zip(codes, ("before", "after"), strict=True) if code]
+                said = [
+                    f"exit code {code} {side}" for code, side in zip(codes, ("before", "after"), strict=True) if code
+                ]
                 if said:
                     said += [(folder / f"{case}.log").read_text()[-800:] for folder in folders]
                 elif case == "lift":

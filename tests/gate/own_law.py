@@ -4,6 +4,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from experiments.own_law import loop_with
+from sim.recorder import Recorder
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra import Weight
@@ -11,9 +13,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
 from experiments.config import RunConfig
-from experiments.own_law import loop_with
 from sim.loop import groups, record_into
-from sim.recorder import Recorder
 
 
 def wall(hand: HandState) -> np.ndarray:

@@ -14,8 +14,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
-from experiments.config import RunConfig
-from experiments.modes import law
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import law
 
 GOLDEN = Path(__file__).with_name("fields.csv")
 CURVE = Trajectory.circle(0.0477, 4.0)

@@ -12,8 +12,8 @@ from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.leading import ARGUMENT, Gait
 from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
-from experiments.config import RunConfig
-from experiments.lead import law, leading_hand
+from experiments.config.run_config import RunConfig
+from experiments.setups.lead import law, leading_hand
 from sim.users.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")

@@ -13,7 +13,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
-from experiments.stretch import law, stretch_grabs
+from experiments.setups.stretch import law, stretch_grabs
 from sim.users.arm import Arm, hand_force
 
 MODES = ("stretch", "stretch-then-follow")

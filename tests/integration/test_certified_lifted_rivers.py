@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from experiments.certify import CERTIFICATE
+from experiments.certify.certify import CERTIFICATE
 from experiments.cli import main
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.config import RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.run import run
 from models.mocap.clip import pose_difference
-from sim.recording import Recording
+from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow
 

@@ -6,8 +6,8 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
-from experiments.config import RunConfig
-from experiments.own_law import loop_with
+from experiments.config.run_config import RunConfig
+from experiments.setups.own_law import loop_with
 from sim.users.intent import Push
 
 CURVE = Trajectory.circle(0.0477, 4.0)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import lead
-from experiments.config import RunConfig
+from experiments.config.run_config import RunConfig
 from experiments.run import run
-from sim.recording import Recording
+from experiments.setups import lead
+from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow
 

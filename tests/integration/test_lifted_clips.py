@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.haptic_map.frames import CLOSES, closing_gap
 from controllers.haptic_map.lifted import Lifted
-from experiments.figure_maps import figure_legs
+from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
+from experiments.setups.figure_maps import figure_legs
 from models.errors import ModelError
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, embedded_names, load_clip
 from models.scene import SceneConfig
-from sim.reference import poses_along
-from sim.world import World
+from sim.reference.reference import poses_along
+from sim.world.world import World
 
 TURN = 2.0 * np.pi
 LEGS = figure_legs(World(SceneConfig()).figure)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from controllers.haptic_map.lap import MEMORY
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.room import Room
-from experiments.figure_maps import figure_legs
-from experiments.in_betweens import measure_motion
-from experiments.lift import lift_clips
-from experiments.map_quality import in_between, neighbours
+from controllers.haptic_map.lifting.room import Room
+from controllers.motion.lap import MEMORY
+from experiments.lifting.in_betweens import measure_motion
+from experiments.lifting.lift import lift_clips
+from experiments.lifting.map_quality import in_between, neighbours
+from experiments.setups.figure_maps import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.config import RunConfig
-from experiments.map_files import load_figure_map
+from experiments.config.run_config import RunConfig
+from experiments.files.map_files import load_figure_map
 from experiments.run import run
-from sim.recording import Recording
+from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow
 

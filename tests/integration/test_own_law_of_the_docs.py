@@ -9,10 +9,10 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
-from experiments.config import RunConfig
-from experiments.own_law import loop_with
+from experiments.config.run_config import RunConfig
+from experiments.setups.own_law import loop_with
 from sim.errors import SimError
-from sim.loop import Loop
+from sim.loop.loop import Loop
 
 CONFIG = RunConfig(clips=("cheer", "angry"), seconds=0.2)
 FOLLOW = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube).program()

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.config import ArmConfig
-from experiments.robot_arm import HOME, SCALE, wire_arm
+from experiments.config.run_config import ArmConfig
+from experiments.setups.robot_arm import HOME, SCALE, wire_arm
 from models.scene import PEDESTAL
-from sim.loop import Loop
-from sim.recording import Recording
+from sim.loop.loop import Loop
+from sim.recording.recording import Recording
 
 
 @pytest.fixture(scope="module")

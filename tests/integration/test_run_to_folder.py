@@ -12,7 +12,7 @@ import pytest
 
 from experiments.cli import main
 from models.mocap.library import load_clip
-from sim.recording import Recording
+from sim.recording.recording import Recording
 
 pytestmark = pytest.mark.slow
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.wall_trials import meet
+from experiments.studies.wall_trials import meet
 
 
 @pytest.mark.slow

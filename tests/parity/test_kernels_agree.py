@@ -11,7 +11,7 @@ from controllers.curves.trajectory import Trajectory, curve_point, curve_velocit
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force
 from controllers.fields.river import window
-from controllers.safety import force_ceiling
+from controllers.safety.limiter import force_ceiling
 
 casadi.GlobalOptions.setNumpyMode(1)
 RNG = np.random.default_rng(5)

@@ -9,10 +9,10 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from models.humanoid.skeleton import N_TANGENT, rest_pose
 from models.scene import FIGURE, PHANTOM
-from sim.devices.phantom_port import phantom_port, sense, sense_in_motion, true_motion
-from sim.reference import begin_in_motion
-from sim.stylus_filter import smooth_hand
-from sim.world import World
+from sim.reference.reference import begin_in_motion
+from sim.reference.stylus_filter import smooth_hand
+from sim.world.phantom_port import phantom_port, sense, sense_in_motion, true_motion
+from sim.world.world import World
 
 
 @pytest.mark.parametrize("v_H", [(0.1, 0.0, 0.0), (-0.05, 0.12, 0.03)])

@@ -4,7 +4,7 @@ import pytest
 
 from models.humanoid.skeleton import N_POSE, figure_model, rest_pose
 from models.mocap.clip import Clip
-from sim.clip_motion import clip_motion
+from sim.body.clip_motion import clip_motion
 
 
 def _wandering_clip(closing: bool) -> Clip:

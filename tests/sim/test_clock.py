@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from sim.clock import RealTime
+from sim.loop.clock import RealTime
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sim import compiled
+from sim.compilation import compiled
 
 PACKAGES = ("models", "controllers", "sim")
 
@@ -14,7 +14,7 @@ PACKAGES = ("models", "controllers", "sim")
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for package in PACKAGES:
         shutil.copytree(
-            Path(compiled.__file__).parent.parent / package, tmp_path / package, ignore=shutil.ignore_patterns("*.bvh")
+            Path(compiled.__file__).parents[2] / package, tmp_path / package, ignore=shutil.ignore_patterns("*.bvh")
         )
     monkeypatch.setattr(compiled, "_ROOT", tmp_path)
     return tmp_path
@@ -38,7 +38,7 @@ def test_a_change_in_any_source_is_another_folder(sources: Path) -> None:
 
 def test_a_renamed_source_is_another_folder(sources: Path) -> None:
     before = compiled.cache_folder()
-    (sources / "controllers" / "safety.py").rename(sources / "controllers" / "safe.py")
+    (sources / "controllers" / "easing.py").rename(sources / "controllers" / "ease.py")
     assert compiled.cache_folder() != before
 
 

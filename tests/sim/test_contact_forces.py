@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from sim.contact_forces import N_EDGES, cone_edges, shared_forces
+from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 
 
 def _random_problem(rng):

@@ -4,11 +4,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES, JOINTS, figure_model, rest_pose, torque_limit
+from sim.body.feedback import rotation_error, turned
+from sim.body.figure import CONTACTS, Figure, FigureGains
+from sim.body.stance import N_LEG, stance_response
+from sim.body.tracking import TrackingConfig, floor_world
 from sim.errors import SimError
-from sim.feedback import rotation_error, turned
-from sim.figure import CONTACTS, Figure, FigureGains
-from sim.stance import N_LEG, stance_response
-from sim.tracking import TrackingConfig, floor_world
 
 PREFIX = "figure/"
 STILL = np.zeros(57)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from experiments.config import RunConfig
+from experiments.config.run_config import RunConfig
 from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
 from sim.users.arm import Arm, hand_force
 from sim.users.intent import Grab
-from sim.world import World
+from sim.world.world import World
 
 GRAB = Grab(1.0, (0.0, 0.02, 0.0), duration=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
 

@@ -18,11 +18,11 @@ from controllers.haptic_map.evaluate import MAP_KERNELS, evaluate_map, kinds_of
 from controllers.haptic_map.expressive import EXPRESSIVE
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from controllers.state import HandState
-from experiments.robot_arm import robot_arm_map
-from sim import kernel_units
-from sim.kernel_units import law_units, map_units
-from sim.map_derivative import map_derivative
-from sim.reference import poses_along
+from experiments.setups.robot_arm import robot_arm_map
+from sim.compilation import kernel_units
+from sim.compilation.kernel_units import law_units, map_units
+from sim.reference.map_derivative import map_derivative
+from sim.reference.reference import poses_along
 
 ARM = robot_arm_map()
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
@@ -81,7 +81,7 @@ def test_what_is_not_compiled_is_an_error_and_no_crash():
 _PROCESS = """
 import numpy as np
 from controllers.haptic_map.robot_arm import ROBOT_ARM
-from sim import kernel_units
+from sim.compilation import kernel_units
 kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
 (unit,) = kernel_units._alive
 print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()), kernel_units.__file__)
@@ -89,7 +89,7 @@ print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values())
 
 
 def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
-    here, copy = Path(kernel_units.__file__).parent.parent, tmp_path / "copy"
+    here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
     for package in ("models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     told = [

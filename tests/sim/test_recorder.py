@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from sim.recorder import CHUNK_SECONDS, PAGE, Group, Recorder
-from sim.recording import Recording, RecordingError
+from sim.recording.recorder import CHUNK_SECONDS, PAGE, Group, Recorder
+from sim.recording.recording import Recording, RecordingError
 
 CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
 GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
@@ -22,7 +22,7 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from sim.recorder import Group, Recorder
+from sim.recording.recorder import Group, Recorder
 channels = {"t": (), "p": (3,), "applied": (2, 3)}
 recorder = Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, channels)}, {"xml": "x" * 300000})
 n = 0
@@ -97,8 +97,8 @@ KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
 import numpy as np
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 channels = {"t": (), "p": (3,), "applied": (2, 3), "q": (4,), "v": (3,), "ctrl": (54,)}
 rng, path, lost = random.Random(0), Path(sys.argv[1]) / "run.h5", 0
 def numbers(start, shape):
@@ -202,8 +202,8 @@ def test_memory_does_not_grow_with_the_run(tmp_path):
 import sys
 from pathlib import Path
 import numpy as np
-from sim.memory import peak_memory_mb
-from sim.recorder import Group, Recorder
+from sim.loop.memory import peak_memory_mb
+from sim.recording.recorder import Group, Recorder
 n = 250
 with Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, {"x": (100,)})}, {}) as recorder:
     for i in range(530):

@@ -13,8 +13,8 @@ import zstandard
 
 from models.humanoid.skeleton import rest_pose
 from models.scene import P_WH, SceneConfig, world_model
-from sim.recorder import Group, Recorder
-from sim.recording import Recording
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
 from sim.viewer import replay_html as module
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER, rgb, river_colors
 from sim.viewer.replay_html import GHOST_AT, MAGNIFICATION, PHANTOM_AT, drawn_tube, replay_html

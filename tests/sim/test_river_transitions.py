@@ -9,8 +9,14 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from experiments.balance import nearest_supported
-from experiments.change_trials import (
+from experiments.lifting.in_betweens import soles
+from experiments.setups.balance import nearest_supported
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import figure_legs, packed_legs
+from experiments.setups.hands import stylus_path
+from experiments.setups.modes import river_bundle
+from experiments.setups.rests import with_rests
+from experiments.studies.change_trials import (
     BLEND,
     LAP,
     PERIOD,
@@ -19,16 +25,10 @@ from experiments.change_trials import (
     played_change,
     rivers_that_play,
 )
-from experiments.clips import load_clips
-from experiments.figure_maps import figure_legs, packed_legs
-from experiments.hands import stylus_path
-from experiments.in_betweens import soles
-from experiments.modes import river_bundle
-from experiments.rests import with_rests
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
-from sim.reference import make_reference, reference_along
-from sim.transition import DWELL
+from sim.reference.reference import make_reference, reference_along
+from sim.reference.transition import DWELL
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "river_clips.csv"
 FIGURE = figure_model()

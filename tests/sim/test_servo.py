@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 
 from controllers.fields.program import evaluate
-from controllers.safety import limit_force
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.hands import lap_pushes
-from experiments.session import Session
-from experiments.wiring import wire
+from controllers.safety.limiter import limit_force
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.hands import lap_pushes
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, jacobian
 from models.scene import SceneConfig
-from sim.devices.phantom_port import PEAK_TORQUE, actuate, phantom_port, sense, true_motion
 from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
-from sim.loop import Loop, make_logs, tick_channels
-from sim.servo import run_block
+from sim.loop.loop import Loop, make_logs, tick_channels
+from sim.loop.servo import run_block
 from sim.users.arm import Arm
-from sim.world import World, phantom_angles
+from sim.world.phantom_port import PEAK_TORQUE, actuate, phantom_port, sense, true_motion
+from sim.world.world import World, phantom_angles
 
 CLIPS = ("cheer", "angry")
 CONFIG = RunConfig(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))

@@ -7,19 +7,19 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.figure_maps import figure_legs, packed_legs
-from experiments.hands import stylus_path
-from experiments.stretch import edited_until, flight_remarks
-from experiments.wiring import wire
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import figure_legs, packed_legs
+from experiments.setups.hands import stylus_path
+from experiments.setups.stretch import edited_until, flight_remarks
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
 from models.scene import FIGURE
-from sim.loop import Loop, pose_errors
-from sim.reference import make_reference, reference_along
-from sim.servo import FrameLog, TickLog
-from sim.settling import approach, let_down, slowness
+from sim.loop.loop import Loop, pose_errors
+from sim.loop.servo import FrameLog, TickLog
+from sim.reference.reference import make_reference, reference_along
+from sim.reference.settling import approach, let_down, slowness
 
 FIGURE_MODEL = figure_model()
 LEGS, ENDS = packed_legs(FIGURE_MODEL), np.empty((2, 7))

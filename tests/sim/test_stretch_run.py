@@ -10,22 +10,22 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.hands import stylus_path
-from experiments.session import Session
-from experiments.stretch import CURVE_FILE, law, load_curve, save_curve, stretch_grabs, stretch_summary
-from experiments.stretch_figure import draw_stretch
-from experiments.wiring import wire
+from experiments.config.run_config import RunConfig
+from experiments.results.stretch_figure import draw_stretch
+from experiments.setups.clips import load_clips
+from experiments.setups.hands import stylus_path
+from experiments.setups.session import Session
+from experiments.setups.stretch import CURVE_FILE, law, load_curve, save_curve, stretch_grabs, stretch_summary
+from experiments.setups.wiring import wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError
-from sim.loop import Loop, groups
-from sim.plant import make_hand
-from sim.recorder import Recorder
-from sim.recording import Recording
-from sim.reference import poses_along
-from sim.servo import FrameLog, TickLog
+from sim.loop.loop import Loop, groups
+from sim.loop.servo import FrameLog, TickLog
+from sim.recording.recorder import Recorder
+from sim.recording.recording import Recording
+from sim.reference.reference import poses_along
 from sim.users.arm import Arm
+from sim.world.plant import make_hand
 
 FLAGS = SimpleNamespace(
     mode="stretch", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5, stiffness=300.0, damping=4.0, tube=0.25

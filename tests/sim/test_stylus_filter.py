@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.stylus_filter import smooth_hand, smooth_turn, turned_on
+from sim.reference.stylus_filter import smooth_hand, smooth_turn, turned_on
 
 SMOOTHING, PERIOD = 0.74, 8e-3
 RNG = np.random.default_rng(3)

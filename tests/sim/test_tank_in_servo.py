@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers.energy_tank import TANK_ENERGY, EnergyTank
 from controllers.fields.python_law import PythonLaw
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.hands import lap_pushes
-from experiments.own_law import loop_with
-from experiments.wiring import wire
-from sim.loop import Loop
+from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.hands import lap_pushes
+from experiments.setups.own_law import loop_with
+from experiments.setups.wiring import wire
+from sim.loop.loop import Loop
 from sim.users.intent import Push
 
 CLIPS = ("cheer", "angry")

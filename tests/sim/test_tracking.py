@@ -4,9 +4,9 @@ import pytest
 from models.humanoid.skeleton import JOINTS, rest_pose
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
+from sim.body.figure import FigureGains
+from sim.body.tracking import TrackingConfig, report, track, tracked_motion
 from sim.errors import SimError
-from sim.figure import FigureGains
-from sim.tracking import TrackingConfig, report, track, tracked_motion
 
 
 def _squats() -> Clip:

@@ -5,20 +5,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.clips import load_clips
-from experiments.config import RunConfig
-from experiments.wiring import wire
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.scene import PHANTOM
-from sim.devices.phantom_port import phantom_port, true_turn
 from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
-from sim.loop import make_logs, tick_channels
-from sim.servo import run_block
+from sim.loop.loop import make_logs, tick_channels
+from sim.loop.servo import run_block
 from sim.users.arm import Arm
 from sim.users.fingers import turning_moment, wanted_turn
 from sim.users.intent import Turn, turn_table
-from sim.world import World
+from sim.world.phantom_port import phantom_port, true_turn
+from sim.world.world import World
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 START = np.array([0.03, 0.02, 0.04])

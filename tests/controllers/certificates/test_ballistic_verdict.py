@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from controllers.certificates.ballistic import BodyMotion, ballistic_verdict, judge_flights
-from controllers.certificates.rate_bounds import floor_rates, rate_bounds, turn_rate, turn_speed, turns_verdict
-from controllers.certificates.tolerance import BallisticTolerance
+from controllers.certificates.flight.ballistic import BodyMotion, ballistic_verdict, judge_flights
+from controllers.certificates.flight.rate_bounds import floor_rates, rate_bounds, turn_rate, turn_speed, turns_verdict
+from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.errors import ParameterError
 
 FPS = 120.0

@@ -4,18 +4,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.certificates.energy import energy, terminal_speed
-from controllers.certificates.hand import HandImpedance, HandRange
-from controllers.certificates.laws import FOLLOW_LAW
-from controllers.certificates.passivity import passivity
-from controllers.certificates.sampled_loop import SampledLoop
-from controllers.certificates.sampling import Sampling
-from controllers.certificates.stability import River, stability
+from controllers.certificates.loop.energy import energy, terminal_speed
+from controllers.certificates.loop.hand import HandImpedance, HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.passivity import passivity
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
-from experiments.certified_device import phantom_device
-from experiments.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
-from experiments.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
+from experiments.certify.certified_device import phantom_device
+from experiments.studies.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
+from experiments.studies.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
 from sim.users.arm import Arm
 
 pytestmark = pytest.mark.slow

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers.certificates.hand import NO_HAND, HandImpedance
-from controllers.certificates.leading_law import Regime, walking
-from controllers.certificates.linear_loop import linearise
-from controllers.certificates.sampled_loop import SampledLoop
-from controllers.certificates.sampling import Sampling
-from controllers.certificates.stability import River, stability
+from controllers.certificates.loop.hand import NO_HAND, HandImpedance
+from controllers.certificates.loop.leading_law import Regime, walking
+from controllers.certificates.loop.linear_loop import linearise
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
 from controllers.state import HandState
-from experiments.certified_device import phantom_device
-from experiments.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
-from experiments.config import RunConfig
-from experiments.lead import s_curve
-from experiments.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
-from experiments.trial_onset import observed, predicted
-from experiments.trial_simulation import Conditions, simulate
+from experiments.certify.certified_device import phantom_device
+from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
+from experiments.config.run_config import RunConfig
+from experiments.setups.lead import s_curve
+from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
+from experiments.studies.trial_onset import observed, predicted
+from experiments.studies.trial_simulation import Conditions, simulate
 from models.mocap.library import embedded
 
 DEVICE, CURVE = phantom_device(), s_curve()

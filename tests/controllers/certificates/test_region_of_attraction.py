@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from controllers.certificates.decrease_check import check_form
-from controllers.certificates.device import kinematics_function, plant_function
-from controllers.certificates.hand import NO_HANDS, HandRange
-from controllers.certificates.intervals import bounds, spectral_bound
-from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW
-from controllers.certificates.lyapunov import Axis, Cell, Limits, decrease, find_form
-from controllers.certificates.region import region
+from controllers.certificates.loop.device import kinematics_function, plant_function
+from controllers.certificates.loop.hand import NO_HANDS, HandRange
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River
+from controllers.certificates.region.decrease_check import check_form
+from controllers.certificates.region.intervals import bounds, spectral_bound
+from controllers.certificates.region.lyapunov import Axis, Cell, Limits, decrease, find_form
+from controllers.certificates.region.region import region
+from controllers.certificates.region.tube_bounds import tube_bounds
 from controllers.certificates.report import CertificateError, Verdict
-from controllers.certificates.sampling import Sampling
-from controllers.certificates.stability import River
-from controllers.certificates.tube_bounds import tube_bounds
 from controllers.curves.trajectory import Trajectory
-from experiments.certified_device import phantom_device
+from experiments.certify.certified_device import phantom_device
 
 SLOW = Trajectory.circle(0.0477, 12.0)
 RIVER = River(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.certificates.repair import RepairError, RepairTask, repair
+from controllers.certificates.flight.repair import RepairError, RepairTask, repair
 from controllers.errors import ParameterError
 
 FPS = 60.0

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from controllers.certificates.energy import distance_bound, energy, peak_gain, terminal_speed
-from controllers.certificates.hand import NO_HAND, HandImpedance, HandRange
-from controllers.certificates.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW
-from controllers.certificates.linear_loop import linearise
-from controllers.certificates.passivity import damping_needed, passivity
-from controllers.certificates.report import Certificate
-from controllers.certificates.sampled_loop import SampledLoop
-from controllers.certificates.sampling import Sampling
-from controllers.certificates.stability import (
+from controllers.certificates.loop.energy import distance_bound, energy, peak_gain, terminal_speed
+from controllers.certificates.loop.hand import NO_HAND, HandImpedance, HandRange
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW
+from controllers.certificates.loop.linear_loop import linearise
+from controllers.certificates.loop.passivity import damping_needed, passivity
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import (
     River,
     boundary,
     critical_damping,
@@ -24,6 +23,7 @@ from controllers.certificates.stability import (
     lap_multipliers,
     stability,
 )
+from controllers.certificates.report import Certificate
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError, ParameterError
 from controllers.fields.bunny import Bunny
@@ -31,7 +31,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_SWITCH, HandState
-from experiments.certified_device import phantom_device
+from experiments.certify.certified_device import phantom_device
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     forward_kinematics,

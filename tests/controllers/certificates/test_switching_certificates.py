@@ -6,18 +6,18 @@ from functools import partial
 import numpy as np
 import pytest
 
-from controllers.certificates.common_lyapunov import common_lyapunov, contraction
-from controllers.certificates.hand import HandRange
-from controllers.certificates.sampling import Sampling
-from controllers.certificates.switching import Keeping, Sharing, hysteresis_dwell, switching
-from controllers.certificates.switching_search import SECONDS, Course, Push, counterexample, failure
-from experiments.certified_device import phantom_device
-from experiments.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
-from experiments.certify import certified_rivers
-from experiments.config import RunConfig
-from experiments.crossing_simulation import simulated_course
-from experiments.modes import law
-from experiments.switching_trials import straight_pair, trials
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
+from controllers.certificates.switching.switching import Keeping, Sharing, hysteresis_dwell, switching
+from controllers.certificates.switching.switching_search import SECONDS, Course, Push, counterexample, failure
+from experiments.certify.certified_device import phantom_device
+from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
+from experiments.certify.certify import certified_rivers
+from experiments.certify.crossing_simulation import simulated_course
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import law
+from experiments.studies.switching_trials import straight_pair, trials
 
 CLOCK = Sampling(1e-3)
 SLOW_FILTER = Sampling(1e-3, 0.0, 50.0)

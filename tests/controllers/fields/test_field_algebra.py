@@ -76,11 +76,11 @@ def test_composed_fields_have_no_jump():
 def test_laws_in_python_keep_their_order_through_the_algebra():
     one, two = (PythonLaw(lambda hand, k=k: [k, 0.0, 0.0]) for k in (1.0, 2.0))
     field = (one.program() + A).blended(two.program().limited(5.0), Weight.constant(0.5))
-    assert field.python_laws == (one, two)
+    assert field.python_laws == (one.function, two.function)
     assert len(field.external_slots) == 2
     memory = field.fresh_memory()
     for slot, law in zip(field.external_slots, field.python_laws, strict=True):
-        memory[slot : slot + 3] = law.function(HAND)
+        memory[slot : slot + 3] = law(HAND)
     filled = Program(field.ops, field.params, memory, field.python_laws)
     np.testing.assert_allclose(force_of(filled, HAND), 0.5 * F + np.array([1.5, 0.0, 0.0]), rtol=1e-12)
     np.testing.assert_array_equal(one.wrench(HAND).force, [1.0, 0.0, 0.0])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.fields.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.leading import HELD, SPEED, Leading
 from controllers.fields.program import evaluate
+from controllers.walking.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
 
 RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)
 FIELD = Leading(RUN, (-0.06, 0.0), scale=160.0, forward=1.05)

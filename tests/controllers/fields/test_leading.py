@@ -6,7 +6,12 @@ import pytest
 from field_probes import force_of, largest_jump
 from numba import njit
 
-from controllers.curves.walked_path import (
+from controllers.errors import ParameterError
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import ARGUMENT, PATH, SPEED, Gait, Leading, leading_force
+from controllers.fields.program import evaluate
+from controllers.state import HandState
+from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_X,
     PATH_Y,
@@ -16,11 +21,6 @@ from controllers.curves.walked_path import (
     path_front,
     path_value,
 )
-from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, PATH, SPEED, Gait, Leading, leading_force
-from controllers.fields.program import evaluate
-from controllers.state import HandState
 
 # A run: one foot, none, the other, none; and a walk on one or two.
 _RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)

@@ -9,9 +9,9 @@ from controllers.fields.program import evaluate
 from controllers.fields.soft_wall import SoftWall, raise_walls
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
-from experiments.robot_arm import robot_arm_map
+from experiments.setups.robot_arm import robot_arm_map
 from models.robot_arm.spec import arm_limits, arm_model
-from sim.kernel_units import map_units
+from sim.compilation.kernel_units import map_units
 
 FPS, K, MARGIN, DAMPING, SPEED = 30.0, 2.0, 0.1, 0.02, 6.0
 

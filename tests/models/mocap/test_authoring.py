@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, rest_pose
-from models.mocap.authoring import Arm, Choreography, Key, Lap, Step, poses_at, solve_leg
+from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at, solve_leg
 from models.mocap.clip import Clip
 
 HANGING = Arm(raised=0, plane=0, elbow=0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from models.errors import ModelError
 from models.mocap.library import load, load_clip, read_motion
-from models.mocap.motion_file import MotionFileError
+from models.mocap.readers.motion_file import MotionFileError
 
 BVH = """HIERARCHY
 ROOT Hips

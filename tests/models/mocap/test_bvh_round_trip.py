@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, JOINTS, SEGMENTS, figure_model, rest_pose
-from models.mocap.bvh import read_bvh
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import load
-from models.mocap.own_bvh import own_clip, write_bvh, write_bvh_blocks
+from models.mocap.readers.bvh import read_bvh
+from models.mocap.readers.own_bvh import own_clip, write_bvh, write_bvh_blocks
 
 
 def random_clip(seed, n=60, fps=120.0):

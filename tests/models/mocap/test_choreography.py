@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, joint_range
 from models.mocap import __main__ as everything
-from models.mocap.balance import dynamics, outside_support
-from models.mocap.choreography import CLIPS
+from models.mocap.authoring.balance import dynamics, outside_support
+from models.mocap.authoring.choreography import CLIPS
 from models.mocap.clip import pose_difference
 from models.mocap.library import embedded, embedded_names
 

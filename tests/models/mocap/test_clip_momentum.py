@@ -7,10 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import DEFAULT_MASS, FOOT_CONTACTS, figure_model, rest_pose
 from models.mocap.clip import Clip
-from models.mocap.contacts import contacts
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.momentum import momentum
+from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
 from models.mocap.library import embedded
-from models.mocap.momentum import momentum
-from models.mocap.moved_legs import leg_lines, with_moved_body
 
 
 def placed(poses, geoms=FOOT_CONTACTS, bodies=("left_foot", "right_foot")):

@@ -5,10 +5,10 @@ import pytest
 from clip_measures import G, acceleration, limit_excess, measure, overlap, residuals, rms, slide, steps
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
-from models.mocap import gait
-from models.mocap.coordinates import coordinate
+from models.mocap.authoring.authoring import gait
+from models.mocap.dynamics.coordinates import coordinate
+from models.mocap.dynamics.spacetime import Motion
 from models.mocap.library import embedded
-from models.mocap.spacetime import Motion
 
 GAITS = {"walk": gait.WALK, "run": gait.RUN}
 LEFT = slice(0, 4)

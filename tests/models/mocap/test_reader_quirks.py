@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.mocap.asf_amc import read_amc
-from models.mocap.bvh import read_bvh
-from models.mocap.deepmimic import read_deepmimic
 from models.mocap.library import read_motion
+from models.mocap.readers.asf_amc import read_amc
+from models.mocap.readers.bvh import read_bvh
+from models.mocap.readers.deepmimic import read_deepmimic
 
 CHAIN = """HIERARCHY
 ROOT Hips

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.mocap import quaternions
-from models.mocap.asf_amc import read_amc
-from models.mocap.bvh import read_bvh
-from models.mocap.deepmimic import read_deepmimic
 from models.mocap.library import read_motion
+from models.mocap.readers.asf_amc import read_amc
+from models.mocap.readers.bvh import read_bvh
+from models.mocap.readers.deepmimic import read_deepmimic
 
 LONG_FILES = (
     "animated_drawings/jumping.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/131_03.bvh",

@@ -10,9 +10,9 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, figu
 from models.mocap import quaternions
 from models.mocap.clip import pose_difference
 from models.mocap.library import load, read_motion
-from models.mocap.motion_file import MotionFileError
-from models.mocap.retarget import retarget
-from models.mocap.skeleton_roles import roles_of
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.retargeting.retarget import retarget
+from models.mocap.retargeting.skeleton_roles import roles_of
 
 # Walk, run, jump, dance and kick, each from skeletons that differ in rest pose, names, axes and units.
 MOTIONS = (

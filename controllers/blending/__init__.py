@@ -1,0 +1,1 @@
+"""Blends of aligned motions: one pose of several, and its derivative."""

@@ -1,0 +1,136 @@
+"""Alignment of loops in time: a shift of the phase, then, where it pays, a smooth monotone warp that closes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from controllers.legs.limb_ends import end_poses
+from controllers.legs.limbs import Limb
+from controllers.motion.loops import Loop
+from controllers.state import Array, IntArray
+
+_SAMPLES = 128
+_BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
+_STEEPEST = 0.25  # and changes the pace by at most a quarter
+_STANCE = 2.0  # what standing counts beside rotations
+_LOW, _SLOW = 0.02, 0.5  # [m], [m a lap] an end so high, or so fast, stands by half
+_WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it bends flights and steps for nothing
+
+
+def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
+    """Rotation matrices of root and joints, which know no sign, the root's height, and which ends stand.
+
+    Shape (samples, features).
+    """
+    channels = loop.channels(np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES))
+    w, x, y, z = np.moveaxis(channels[:, 3:].reshape(_SAMPLES, -1, 4), -1, 0)
+    matrix = np.stack(
+        [w * w + x * x, y * y + w * w, z * z + w * w, x * y - w * z, x * y + w * z, x * z - w * y, x * z + w * y,
+         y * z - w * x, y * z + w * x],
+        axis=-1,
+    )  # fmt: skip
+    stance = [_STANCE * _stands(channels, loop.drift, limb)[:, None] for limb in limbs]
+    return np.concatenate([2.0 * matrix.reshape(_SAMPLES, -1), channels[:, 2:3], *stance], axis=1)
+
+
+def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
+    """From 0 to 1, how much an end stands: low, and slow over the ground; shape (samples,)."""
+    place, _, height = (part[:, 0] for part in end_poses(channels[:, None], limb))
+    ahead, behind = (np.roll(place, shift, axis=0) for shift in (-1, 1))
+    across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
+    # Over the ground an end moves with the drift of its clip, and in its frame.
+    speed = np.linalg.norm(0.5 * _SAMPLES * (ahead - behind)[:, :2] + drift[:2] + across, axis=1)
+    low = 1.0 / (1.0 + ((height - height.min()) / _LOW) ** 2)
+    return low / (1.0 + (speed / _SLOW) ** 2)
+
+
+def _best_shift(reference: Array, features: Array) -> int:
+    """Circular shift [samples] that correlates best; none for a motion that does not tell one phase from another."""
+    spectra = np.conj(np.fft.rfft(reference, axis=0)) * np.fft.rfft(features, axis=0)
+    correlation = np.fft.irfft(spectra.sum(axis=1), _SAMPLES)
+    spread = float(np.sqrt((reference.var(axis=0).sum()) * (features.var(axis=0).sum()))) * _SAMPLES
+    best = int(correlation.argmax())
+    return best if correlation[best] - correlation[0] > 0.02 * spread + 1e-12 else 0
+
+
+def _warp(reference: Array, features: Array) -> Array:
+    """Lead of the loop's phase over the reference's at each sample [samples], by dynamic time warping in a band.
+
+    The lead changes by at most one sample a sample, and is zero at the lap's ends.
+    """
+    leads = np.arange(-_BAND, _BAND + 1)
+    index: IntArray = (np.arange(_SAMPLES)[:, None] + leads) % _SAMPLES
+    cost = ((features[index] - reference[:, None, :]) ** 2).sum(axis=2)
+    # Where the motions do not tell, the shortest path is the straight one.
+    cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _BAND)
+    total = np.full(len(leads), np.inf)
+    total[_BAND] = 0.0
+    steps = np.zeros((_SAMPLES, len(leads)), dtype=np.int64)
+    for k in range(_SAMPLES):
+        padded = np.pad(total, 1, constant_values=np.inf)
+        options = np.stack([padded[1:-1], padded[:-2] + 0.2, padded[2:] + 0.2])
+        steps[k] = np.array([0, -1, 1])[options.argmin(axis=0)]
+        total = options.min(axis=0) + cost[k]
+    lead = np.zeros(_SAMPLES)
+    at = _BAND
+    for k in range(_SAMPLES - 1, -1, -1):
+        lead[k] = leads[at]
+        at += steps[k, at]
+    return lead
+
+
+def _smoothed(lead: Array) -> Array:
+    """Low-pass of a periodic lead by a Gaussian of a sixteenth of the lap, no steeper than allowed."""
+    frequency = np.fft.rfftfreq(_SAMPLES)
+    spectrum = np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _SAMPLES / 16.0) ** 2)
+    smooth = np.fft.irfft(spectrum, _SAMPLES)
+    steepest = float(np.abs(np.diff(smooth, append=smooth[:1])).max())
+    return smooth * min(1.0, _STEEPEST / max(steepest, 1e-12))
+
+
+def _lead(reference: Array, features: Array) -> Array:
+    """Lead of a loop over the reference at each sample [laps]: the smoothed warp, or none where it gains little."""
+    lead = _smoothed(_warp(reference, features))
+    at = np.arange(_SAMPLES) + lead
+    first = np.floor(at).astype(int)
+    share = (at - first)[:, None]
+    warped = (1.0 - share) * features[first % _SAMPLES] + share * features[(first + 1) % _SAMPLES]
+    left, before = float(((warped - reference) ** 2).sum()), float(((features - reference) ** 2).sum())
+    return lead / _SAMPLES if left < _WORTH * before else np.zeros(_SAMPLES)
+
+
+def aligned_channels(loops: list[Loop], samples: int, limbs: Sequence[Limb] = ()) -> Array:
+    """Remainders of all loops at equal steps of the common phase.
+
+    The first loop keeps its own phase; every other one is shifted and warped to it.
+
+    Parameters
+    ----------
+    loops : list of Loop
+        Clips as closed loops.
+    samples : int
+        N, phases 0, 1/N, … of the lap.
+    limbs : sequence of Limb
+        Limbs whose standing is aligned to standing.
+
+    Returns
+    -------
+    Array, shape (N, m, nq)
+        Signs of quaternions agree with the first loop's as far as they can.
+    """
+    reference = _features(loops[0], limbs)
+    phase = np.arange(samples) / samples
+    channels = [loops[0].channels(phase, np.zeros(samples))]
+    for loop in loops[1:]:
+        features = _features(loop, limbs)
+        shift = _best_shift(reference, features)
+        lead = _lead(reference, np.roll(features, -shift, axis=0))
+        knots = np.arange(_SAMPLES + 1) / _SAMPLES
+        smooth = CubicSpline(knots, np.append(lead, lead[0]), bc_type="periodic")(phase)
+        own = loop.channels(phase + shift / _SAMPLES + smooth, smooth)
+        for first in range(3, own.shape[1], 4):
+            if (own[:, first : first + 4] * channels[0][:, first : first + 4]).sum() < 0.0:
+                own[:, first : first + 4] *= -1.0
+        channels.append(own)
+    return np.stack(channels, axis=1)

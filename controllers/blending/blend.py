@@ -1,0 +1,106 @@
+"""Blends of aligned loops: their channels as uniform cubic B-splines round the lap, combined with weights."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.blending.alignment import aligned_channels
+from controllers.blending.combination import combine, figure_channels, figure_size, packed_figure
+from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.legs.limb_ends import with_ends
+from controllers.legs.limbs import Limb
+from controllers.motion.loops import Loop
+from controllers.state import Array, IntArray
+
+_SAMPLES, _CLIPS, _DRIFTS = range(3)
+
+
+@njit
+def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Array, slope: Array) -> None:
+    """Channels of each clip and their derivatives by the angle, from uniform cubic B-splines."""
+    channels = value.shape[1]
+    s = angle * samples / (2.0 * np.pi)
+    row = min(int(s), samples - 1)
+    b0, b1, b2, b3 = basis(s - row)
+    d0, d1, d2, d3 = basis_slope(s - row)
+    rate = samples / (2.0 * np.pi)
+    stride = clips * channels
+    for clip in range(clips):
+        first = row * stride + clip * channels
+        p0, p1 = rows[first : first + channels], rows[first + stride : first + stride + channels]
+        first += 2 * stride
+        p2, p3 = rows[first : first + channels], rows[first + stride : first + stride + channels]
+        for k in range(channels):
+            value[clip, k] = b0 * p0[k] + b1 * p1[k] + b2 * p2[k] + b3 * p3[k]
+            slope[clip, k] = rate * (d0 * p0[k] + d1 * p1[k] + d2 * p2[k] + d3 * p3[k])
+
+
+@njit
+def blend(
+    params: Array, angle: float, weights: Array, changes: Array, chain: Array, memory: Array, pose: Array,
+    jacobian: Array,
+) -> None:  # fmt: skip
+    """Blended pose, and its derivative unless `jacobian` has no rows.
+
+    Parameters
+    ----------
+    params : Array
+        `packed_blend`.
+    angle, weights, changes, chain, memory, pose, jacobian
+        As `combine` takes them.
+    """
+    blend_corrected(params, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian)
+
+
+@njit
+def blend_corrected(
+    params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
+    pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
+    """`blend`, with a correction as `combine` takes it."""
+    samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
+    drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
+    figure = params[_DRIFTS + 3 * clips :]
+    channels = figure_channels(figure)
+    value, slope = np.empty((clips, channels)), np.empty((clips, channels))
+    _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
+    combine(
+        figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
+        np.empty((0, 0, 3)), 0.0, 0.0, pose, jacobian,
+    )  # fmt: skip
+
+
+def _closing_signs(channels: Array, rotations: int) -> Array:
+    """Signs (m, channels) with which channels (N, m, ·) close: −1 for a quaternion that comes back as −q."""
+    signs = np.ones(channels.shape[1:])
+    for first in range(3, 3 + 4 * rotations, 4):
+        dots = (channels[-1, :, first : first + 4] * channels[0, :, first : first + 4]).sum(axis=1)
+        signs[:, first : first + 4] = np.where(dots < 0.0, -1.0, 1.0)[:, None]
+    return signs
+
+
+def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Sequence[Limb]) -> Array:
+    """What `blend` reads: the loops, aligned in time to the first, as splines through equal steps of the lap.
+
+    Parameters
+    ----------
+    loops : list of Loop
+        Clips as closed loops.
+    samples : int
+        Of a lap.
+    groups : IntArray, shape (1 + joints,)
+        Which group of weights blends the root and each joint.
+    limbs : sequence of Limb
+        Limbs whose ends are blended; their joints belong to group 0.
+
+    Raises
+    ------
+    ParameterError
+        If a limb has a joint that the poses do not have.
+    """
+    drifts = np.stack([loop.drift for loop in loops])
+    channels = with_ends(aligned_channels(loops, samples, limbs), drifts, limbs)
+    rotations = len(groups)
+    rows = control_points(channels, _closing_signs(channels, rotations)).ravel()
+    return np.concatenate([[samples, len(loops)], drifts.ravel(), packed_figure(groups, limbs), rows])

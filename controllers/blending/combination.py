@@ -1,0 +1,216 @@
+r"""One pose of several: the weighted mean of clips' channels at a phase, and its derivative.
+
+.. math:: h = A \cdot \exp\bigl(\tfrac{\theta}{2\pi} \textstyle\sum_i w_i \xi_i\bigr) \cdot \bar{\rho}_w(\theta)
+
+θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
+the ground by its twist ξ (`loops`); the ends of limbs are blended as the root is, and the limbs follow (`limbs`,
+`support`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.legs.floor import keep_above
+from controllers.legs.footing import go_on, keep_footing, mixed
+from controllers.legs.limbs import END, LIMB, Limb, place_limb
+from controllers.legs.support import lowering
+from controllers.motion.inbetween import FOOT, ROOT
+from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
+from controllers.motion.mean import mean_derivative, mean_rotation
+from controllers.rotations import multiply, relative
+from controllers.state import Array, IntArray
+
+_ROTATIONS, _LIMBS, _GROUPS = range(3)
+_WAYS = 3  # parameters of a pose: θ, and two by which only the weights change
+
+
+@njit
+def figure_size(figure: Array) -> int:
+    """Numbers that `packed_figure` takes at the start of an array."""
+    return _GROUPS + int(figure[_ROTATIONS]) + LIMB * int(figure[_LIMBS])
+
+
+@njit
+def figure_channels(figure: Array) -> int:
+    """Channels of a clip: root position, rotations, ends of limbs."""
+    return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])
+
+
+@njit
+def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
+    """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
+    for i in range(value.shape[0]):
+        q, d = value[i, column : column + 4], slope[i, column : column + 4]
+        scale = 1.0 / np.sqrt(max(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1e-12))
+        for j in range(4):
+            unit[i, j] = scale * q[j]
+        _, x, y, z = relative(unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3], d[0], d[1], d[2], d[3])
+        spin[i, 0], spin[i, 1], spin[i, 2] = 2.0 * scale * x, 2.0 * scale * y, 2.0 * scale * z
+
+
+@njit
+def _mean_position(value: Array, slope: Array, column: int, weights: Array, changes: Array, mean: Array) -> None:
+    """Mean of three channels, rows: value, derivatives by θ and the two other parameters."""
+    mean[:] = 0.0
+    for i in range(value.shape[0]):
+        for k in range(3):
+            mean[0, k] += weights[i] * value[i, column + k]
+            mean[1, k] += weights[i] * slope[i, column + k]
+            for way in range(_WAYS):
+                mean[1 + way, k] += changes[way, i] * value[i, column + k]
+
+
+@njit
+def _turn_position(angle: float, turn: Array, x: float, y: float, shift: Array, p: Array) -> None:
+    """Move a position and its derivatives by a displacement of the plane: turn by an angle, then shift by (x, y).
+
+    `turn` (3,) and `shift` (2, 3) hold the derivatives of angle and shift.
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    for k in range(_WAYS):
+        dx, dy = p[1 + k, 0] - turn[k] * p[0, 1], p[1 + k, 1] + turn[k] * p[0, 0]
+        p[1 + k, 0], p[1 + k, 1] = c * dx - s * dy + shift[0, k], s * dx + c * dy + shift[1, k]
+    p[0, 0], p[0, 1] = c * p[0, 0] - s * p[0, 1] + x, s * p[0, 0] + c * p[0, 1] + y
+
+
+@njit
+def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
+    """Turn a rotation about the vertical by an angle with derivatives `turn`; rates are local, shape (3, 3)."""
+    up_x, up_y = 2.0 * (q[1] * q[3] - q[0] * q[2]), 2.0 * (q[2] * q[3] + q[0] * q[1])
+    up_z = 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2])
+    for k in range(_WAYS):
+        rate[0, k] += turn[k] * up_x
+        rate[1, k] += turn[k] * up_y
+        rate[2, k] += turn[k] * up_z
+    q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
+
+
+@njit
+def combine(
+    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
+    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
+    floor: float, pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
+    """Mean of poses, and its derivative unless `jacobian` has no rows.
+
+    Parameters
+    ----------
+    figure : Array
+        `packed_figure`, at the start of the array.
+    value, slope : Array, shape (clips, channels)
+        Channels of each clip at θ, and their derivatives by θ; λ of a limb is read from the first clip's.
+    drifts : Array, shape (clips, 3)
+        ξ of each clip.
+    angle : float
+        θ in [0, 2π].
+    weights : Array, shape (groups, clips)
+        Of sum 1; group 0 is the root's. Slightly negative ones are taken (see `mean`).
+    changes : Array, shape (groups, 3, clips)
+        Their derivatives by θ and two other parameters.
+    correction : Array, shape (4, 2 + 4 limbs)
+        By which root and ends are moved (see `inbetween`), and its derivatives by the three; (4, 0) for none.
+    chain : Array, shape (3, 6)
+        Derivatives of the three by the stylus.
+    memory : Array
+        The frame of the lap; updated.
+    footing : Array
+        Memory of the ends' footing (see `footing`); updated. Empty: they have none.
+    soles : Array, shape (limbs, k, 3)
+        Points of each end that may touch, from their centre [m]. None: they go wherever they go.
+    ground, floor : float
+        Height at which they touch, and below which none goes [m].
+    pose, jacobian : Array, shapes (nq,), (nv, 6)
+        Written.
+    """
+    clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
+    corrected = correction.shape[1] > 0
+    packed = figure[_GROUPS + rotations :]
+    tangents = _WAYS if jacobian.shape[0] > 0 else 0
+
+    drift, shift, turn = np.zeros((1 + _WAYS, 3)), np.empty((2, 3)), np.empty(3)
+    for i in range(clips):
+        for k in range(3):
+            drift[0, k] += weights[0, i] * drifts[i, k]
+            for way in range(_WAYS):
+                drift[1 + way, k] += changes[0, way, i] * drifts[i, k]
+    update_lap(memory, angle, drift[0])
+    # The root is in the frame of the drift, and that in the frame of the lap.
+    s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
+    frame, ahead, mixture = np.empty(3), 0.0, 0.0
+    if footing.shape[0] > 0:
+        x, y = drift_motion(drift, s, 1.0, shift, turn)
+        frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
+        frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
+        frame[2] = s * drift[0, 2] + lap
+        ahead, mixture = go_on(footing, angle), mixed(weights[0])
+
+    unit, spin = np.empty((clips, 4)), np.empty((clips, 3))
+    q, rates = np.empty((rotations, 4)), np.empty((rotations, 3, 3))
+    for joint in range(rotations):
+        group = int(figure[_GROUPS + joint])
+        _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
+        mean_rotation(unit, weights[group], q[joint])
+        if tangents:
+            mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
+    root, end, lower = np.empty((4, 3)), np.empty((4, 3)), np.zeros(4)
+    _mean_position(value, slope, 0, weights[0], changes[0], root)
+    if corrected:
+        root[:, :2] += correction[:, :2]
+    elif limbs > 0:
+        clearance = slice(3 + 4 * rotations + END - 1, value.shape[1], END)
+        lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)
+    for n in range(limbs):
+        limb = packed[LIMB * n : LIMB * (n + 1)]
+        last, column = int(limb[2]), 3 + 4 * rotations + END * n
+        _mean_position(value, slope, column, weights[0], changes[0], end)
+        for k in range(4):
+            end[k, 2] -= lower[k]
+        heading = 0.0
+        if corrected:
+            at = ROOT + FOOT * n
+            end += correction[:, at : at + 3]
+            heading = correction[0, at + 3]
+        lag = value[0, column + 3]
+        x, y = drift_motion(drift, lag, 2.0 * np.pi * slope[0, column + 3], shift, turn)
+        _turn_position(lag * drift[0, 2], turn, x, y, shift, end)
+        if corrected:
+            turn += correction[1:, ROOT + FOOT * n + 3]
+        _turn_rotation(lag * drift[0, 2] + heading, turn, q[last], rates[last])
+        if soles.shape[0] > 0:
+            keep_above(floor, soles[n], end, q[last], rates[last], tangents)
+        if footing.shape[0] > 0:
+            keep_footing(footing, n, ahead, mixture, soles[n], ground, frame, end[0], q[last])
+        place_limb(limb, q, rates, root, end, tangents)
+
+    x, y = drift_motion(drift, s, 1.0, shift, turn)
+    _turn_position(s * drift[0, 2], turn, x, y, shift, root)
+    _turn_rotation(s * drift[0, 2] + lap, turn, q[0], rates[0])
+    shift[:], turn[:] = 0.0, 0.0
+    _turn_position(lap, turn, memory[LAP_X], memory[LAP_Y], shift, root)
+    pose[0], pose[1], pose[2] = root[0, 0], root[0, 1], root[0, 2]
+    for joint in range(rotations):
+        for j in range(4):
+            pose[3 + 4 * joint + j] = q[joint, j]
+    if tangents:
+        for j in range(jacobian.shape[1]):
+            for i in range(3):
+                jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
+            for joint in range(rotations):
+                for i in range(3):
+                    rate = rates[joint, i]
+                    total = rate[0] * chain[0, j] + rate[1] * chain[1, j] + rate[2] * chain[2, j]
+                    jacobian[3 + 3 * joint + i, j] = total
+
+
+def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:
+    """What `combine` reads: which group of weights blends the root and each joint (1 + joints,), and the limbs."""
+    return np.concatenate([[len(groups), len(limbs)], groups, *(limb.packed() for limb in limbs)])
+
+
+def fresh_lap() -> Array:
+    """Memory of a blend at the start of a run."""
+    memory = np.zeros(MEMORY)
+    memory[LAST_ANGLE] = np.nan
+    return memory

@@ -1,0 +1,121 @@
+r"""What in-betweens of any number of clips are corrected by: for every two neighbours, a polynomial of their weights.
+
+.. math:: D(\theta, w) = \textstyle\sum_{i<j} w_i w_j \sum_k (w_i - w_j)^k\, C_{ijk}(\theta)
+
+It has the channels of `inbetween`, passes through what `footfalls` finds at some mixtures of each two, and vanishes
+where a clip is alone. C is periodic in θ, by cubic B-splines.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.legs.footfalls import foot_corrections
+from controllers.legs.limbs import Limb
+from controllers.motion.inbetween import FOOT, ROOT
+from controllers.state import Array, IntArray
+
+_TERMS = 3  # as many mixtures of two are met exactly
+_ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
+
+
+def neighbouring_pairs(sites: Array) -> list[tuple[int, int]]:
+    """Pairs of sites (rows, m, 2) between which, at some row, there is no other (Gabriel & Sokal 1969)."""
+    clips = sites.shape[1]
+    found: list[tuple[int, int]] = []
+    for j in range(clips):
+        for i in range(j):
+            middle, half = 0.5 * (sites[:, i] + sites[:, j]), 0.5 * np.linalg.norm(sites[:, i] - sites[:, j], axis=1)
+            others = np.delete(sites, (i, j), axis=1)
+            apart = np.linalg.norm(others - middle[:, None], axis=2).min(axis=1, initial=np.inf)
+            if (apart >= half).any():
+                found.append((i, j))
+    return found
+
+
+def packed_pairs(channels: Array, drifts: Array, limbs: Sequence[Limb], pairs: Sequence[tuple[int, int]]) -> Array:
+    """What `pair_correction` reads.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq + 5 limbs)
+        Of the clips at equal steps of the lap, limbs by their ends (`limb_ends`).
+    drifts : Array, shape (m, 3)
+        Their drifts ξ.
+    limbs : sequence of Limb
+        None: nothing is corrected.
+    pairs : sequence of (int, int)
+        Clips to correct the in-betweens of, the lower number first.
+    """
+    rows, clips = channels.shape[:2]
+    size = ROOT + FOOT * len(limbs)
+    if not limbs or not pairs:
+        return np.array([1.0, clips, 0.0, 0.0])
+    index = np.full((clips, clips), -1.0)
+    second = np.arange(1, _TERMS + 1) / (_TERMS + 1)
+    weights = np.zeros((len(pairs), _TERMS, clips))
+    for n, (i, j) in enumerate(pairs):
+        index[i, j] = n
+        weights[n, :, i], weights[n, :, j] = 1.0 - second, second
+    found = foot_corrections(channels, drifts, limbs, weights.reshape(-1, clips))
+    powers = (second * (1.0 - second))[:, None] * (1.0 - 2.0 * second)[:, None] ** np.arange(_TERMS)
+    table = np.einsum("kt,nptc->npkc", np.linalg.inv(powers), found.reshape(rows, len(pairs), _TERMS, size))
+    return np.concatenate([[rows, clips, len(pairs), size], index.ravel(), control_points(table, np.ones(1)).ravel()])
+
+
+@njit
+def pair_channels(numbers: Array) -> int:
+    """Channels of `packed_pairs`; 0 if nothing is corrected."""
+    return int(numbers[_CHANNELS])
+
+
+@njit
+def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, changes: Array, d: Array) -> None:
+    """Corrections D and their derivatives.
+
+    Parameters
+    ----------
+    numbers : Array
+        `packed_pairs`.
+    angle : float
+        θ in [0, 2π].
+    clips : IntArray, shape (count,)
+        Those that are near.
+    w, changes : Array, shapes (count,), (3, count)
+        Their weights, and the derivatives of these by θ and two other parameters.
+    d : Array, shape (4, channels)
+        Written: D [m, rad], and its derivatives by the three.
+    """
+    rows, total, pairs, channels = (
+        int(numbers[_ROWS]), int(numbers[_CLIPS]), int(numbers[_PAIRS]), int(numbers[_CHANNELS]),
+    )  # fmt: skip
+    scale = rows / (2.0 * np.pi)
+    row = min(int(angle * scale), rows - 1)
+    b0, b1, b2, b3 = basis(angle * scale - row)
+    c0, c1, c2, c3 = basis_slope(angle * scale - row)
+    stride = pairs * _TERMS * channels
+    table, rates = _INDEX + total * total + row * stride, np.empty(3)
+    d[:] = 0.0
+    for a in range(len(clips)):
+        for b in range(len(clips)):
+            pair = int(numbers[_INDEX + clips[a] * total + clips[b]])
+            if pair < 0:
+                continue
+            product, difference, power, slope = w[a] * w[b], w[a] - w[b], 1.0, 0.0
+            for k in range(_TERMS):
+                for way in range(3):
+                    rates[way] = (changes[way, a] * w[b] + w[a] * changes[way, b]) * power
+                    rates[way] += product * slope * (changes[way, a] - changes[way, b])
+                first = table + (pair * _TERMS + k) * channels
+                for c in range(channels):
+                    p = first + c
+                    v0, v1, v2, v3 = numbers[p], numbers[p + stride], numbers[p + 2 * stride], numbers[p + 3 * stride]
+                    value = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
+                    d[0, c] += product * power * value
+                    d[1, c] += product * power * scale * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+                    for way in range(3):
+                        d[1 + way, c] += rates[way] * value
+                slope = (k + 1) * power
+                power *= difference

@@ -1,0 +1,1 @@
+"""Certificates of flights and turns of a motion, and their repair."""

@@ -1,0 +1,176 @@
+r"""Ballistic certificate: whether the flights of a motion can be flown, and at which rates they may be played.
+
+A flight recorded under gravity ĝ falls with σ² ĝ at the rate σ. Two tolerances bound σ:
+
+.. math:: g_{min} \le \sigma^2 \hat g \le g_{max} \quad\text{(seen)}, \qquad
+          \min_{p_0, v_0} \max_t \lVert c_\sigma(t) - p_0 - v_0 t + \tfrac12 g t^2 e_z \rVert \le d \quad\text{(done)} .
+
+The first is about the viewer, the second about a body that takes off as well as it can and then really falls.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.certificates.flight.flight_fit import (
+    FlightFit,
+    Mask,
+    best_fall,
+    find_flights,
+    fit_flight,
+    reachable_rates,
+)
+from controllers.certificates.flight.tolerance import GRAVITY, BallisticTolerance
+from controllers.certificates.report import Outcome, Verdict
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """A motion as the certificate sees it, of n frames.
+
+    Parameters
+    ----------
+    fps : float
+        Frames per second [1/s].
+    com, angular : array, shape (n, 3)
+        Centre of mass [m] and angular momentum about it [kg m²/s], in the world.
+    inertia : array, shape (n, 3, 3)
+        About the centre of mass [kg m²].
+    clearance : array, shape (n,)
+        Height of the lowest point of the body over the floor [m].
+    supported : array of bool, shape (n,)
+        Whether anything bears load.
+
+    Raises
+    ------
+    ParameterError
+        If the shapes do not fit together, or a number is not finite.
+    """
+
+    fps: float
+    com: Array
+    angular: Array
+    inertia: Array
+    clearance: Array
+    supported: Mask
+
+    def __post_init__(self) -> None:
+        n = len(self.supported)
+        for name, shape in (("com", (n, 3)), ("angular", (n, 3)), ("inertia", (n, 3, 3)), ("clearance", (n,))):
+            array: Array = getattr(self, name)
+            if array.shape != shape or not np.isfinite(array).all():
+                raise ParameterError(f"{name} has shape {array.shape}; expected finite numbers of shape {shape}")
+
+
+@dataclass(frozen=True, eq=False)
+class FlightJudgement:
+    """What is known of one flight.
+
+    Attributes
+    ----------
+    fit : FlightFit
+        Its parabola.
+    verdict : {"certified", "refuted", "unknown"}
+        Whether it can be flown as recorded.
+    reason : str
+        Why, with numbers.
+    seen : (float, float)
+        Rates σ at which viewers take it for natural.
+    done : (float, float) or None
+        Rates at which a body that really falls stays within the tolerance; None if at no rate.
+    """
+
+    fit: FlightFit
+    verdict: Outcome
+    reason: str
+    seen: tuple[float, float]
+    done: tuple[float, float] | None
+
+    @property
+    def admissible(self) -> tuple[float, float]:
+        """Rates that are both seen as natural and can be done; the former where no rate can be done."""
+        if self.done is None:
+            return self.seen
+        low, high = max(self.seen[0], self.done[0]), min(self.seen[1], self.done[1])
+        return (low, high) if low <= high else self.seen
+
+
+def judge_flights(motion: BodyMotion, tolerance: BallisticTolerance) -> tuple[FlightJudgement, ...]:
+    """Find and judge all flights of a motion."""
+    spans = find_flights(motion.supported, motion.fps)
+    return tuple(_judge(motion, span, tolerance) for span in spans)
+
+
+def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolerance) -> FlightJudgement:
+    fit = fit_flight(span, motion.fps, motion.com, motion.angular, motion.inertia, motion.clearance)
+    low, high = tolerance.gravity
+    likely = fit.likely_gravity
+    seen = (float(np.sqrt(low / likely)), float(np.sqrt(high / likely))) if likely > 0.0 else (np.inf, np.inf)
+    done = reachable_rates(motion.com[span[0] : span[1] + 1], motion.fps, tolerance.distance)
+    falls = f"falls at {fit.gravity:.1f} ± {fit.uncertainty:.1f} m/s²"
+    verdict: Outcome = "refuted"
+    if likely < low and fit.clearance < tolerance.clearance:
+        verdict = "unknown"
+        why = f"{falls} and rises only {100 * fit.clearance:.0f} cm: it may stand on a floor that the recording misses"
+    elif not low <= likely <= high:
+        natural = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g" if fit.gravity > 0.0 else ""
+        why = f"{falls}, not within {low:g} to {high:g}{natural}"
+    elif fit.misfit > tolerance.misfit:
+        why = f"strays {100 * fit.misfit:.1f} cm (RMS) from a parabola, more than {100 * tolerance.misfit:g}"
+    elif fit.drift > tolerance.drift:
+        why = (
+            f"turns {np.rad2deg(fit.drift):.0f}° away from constant angular momentum, "
+            f"more than {np.rad2deg(tolerance.drift):.0f}°"
+        )
+    else:
+        verdict, why = "certified", falls
+    return FlightJudgement(fit, verdict, f"flight at {fit.time:.2f} s, {fit.duration:.2f} s long, {why}", seen, done)
+
+
+def ballistic_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], tolerance: BallisticTolerance) -> Verdict:
+    """The verdict on a whole motion: its worst flight's.
+
+    The margin is the distance of the rate 1 from the nearest end of what is seen as natural, over all flights:
+    how much faster or slower the motion may be played; negative when refuted for its gravity.
+    The counterexample of a refuted motion is the take-off of its first refuted flight: a body that takes off with this
+    velocity, the best there is, and really falls, is that far from the recorded centre of mass at some time.
+    """
+    assumptions = (
+        f"gravity is {GRAVITY} m/s², without drag, on the figure's own size and mass",
+        f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
+        "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
+        "flights are what contacts of feet, hands and other parts leave, of five frames and 0.08 s or more",
+    )
+    if not flights:
+        return Verdict("certified", "no flight: nothing has to fall", None, assumptions)
+    refuted = [flight for flight in flights if flight.verdict == "refuted"]
+    doubtful = [flight for flight in flights if flight.verdict == "unknown"]
+    margin = min(min(1.0 - flight.seen[0], flight.seen[1] - 1.0) for flight in flights)
+    figures = {"flights": [_figures(flight) for flight in flights]}
+    if refuted:
+        fit = refuted[0].fit
+        com = motion.com[fit.start : fit.end + 1]
+        distance, state = best_fall(com, motion.fps, 1.0)
+        counterexample = {
+            "start": fit.start, "end": fit.end, "position": state[0], "velocity": state[1],
+            "momentum": fit.momentum, "distance": distance,
+        }  # fmt: skip
+        reason = "; ".join(flight.reason for flight in refuted)
+        return Verdict("refuted", reason, margin, assumptions, counterexample, figures)
+    reasons = [flight.reason for flight in doubtful or flights]
+    return Verdict("unknown" if doubtful else "certified", "; ".join(reasons), margin, assumptions, figures=figures)
+
+
+def _figures(flight: FlightJudgement) -> dict[str, object]:
+    fit = flight.fit
+    return {
+        "verdict": flight.verdict, "start": fit.start, "end": fit.end, "time": fit.time, "duration": fit.duration,
+        "gravity": fit.gravity, "gravity_uncertainty": fit.uncertainty, "natural_rate": fit.natural_rate,
+        "misfit": fit.misfit, "rise": fit.rise, "take_off": fit.take_off, "take_off_speed": fit.take_off_speed,
+        "clearance": fit.clearance, "momentum": fit.momentum, "drift": fit.drift,
+        "rate_seen": list(flight.seen), "rate_done": None if flight.done is None else list(flight.done),
+        "rate_admissible": list(flight.admissible),
+    }  # fmt: skip

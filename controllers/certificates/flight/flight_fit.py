@@ -1,0 +1,222 @@
+r"""One flight of a motion against free fall: the gravity it shows, and how far a body that really falls would stray.
+
+While nothing touches the floor, the centre of mass c of any body is a parabola and its angular momentum L is constant:
+
+.. math:: c(t) = p_0 + v_0 t - \tfrac12 g t^2 e_z, \qquad L(t) = L_0 .
+
+Played at the rate σ, all accelerations are multiplied by σ², so a flight recorded under gravity ĝ falls with σ² ĝ.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.state import Array
+
+Mask = npt.NDArray[np.bool_]
+
+NOISE = 3e-3  # the centre of mass of a captured body is not known better [m]
+FEWEST = 5  # frames: two more than a parabola has coefficients
+_SHORTEST = 0.08  # what is shorter is a foot that rolls over [s]
+
+
+@dataclass(frozen=True)
+class FlightFit:
+    """A flight, from the last frame of support to the first one, and the parabola nearest to it.
+
+    Attributes
+    ----------
+    start, end : int
+        Its first and last frame; both still (already) touch, unless the clip begins or ends in the air.
+    time, duration : float
+        When it begins, and how long it is [s].
+    gravity, uncertainty : float
+        ĝ of the least-squares parabola, and half the width of its 95 % interval [m/s²].
+    misfit : float
+        RMS distance of the centre of mass from that parabola [m].
+    rise : float
+        Height of the apex over the take-off [m].
+    take_off : array, shape (3,)
+        Velocity at the start, of the parabola [m/s].
+    clearance : float
+        Greatest height of the lowest point of the body over the floor [m].
+    momentum : array, shape (3,)
+        Mean angular momentum about the centre of mass [kg m²/s].
+    drift : float
+        How far the body turns away from where constant angular momentum would have turned it [rad].
+    """
+
+    start: int
+    end: int
+    time: float
+    duration: float
+    gravity: float
+    uncertainty: float
+    misfit: float
+    rise: float
+    take_off: Array
+    clearance: float
+    momentum: Array
+    drift: float
+
+    @property
+    def likely_gravity(self) -> float:
+        """The gravity nearest to the true one that the recording does not exclude [m/s²]."""
+        low, high = self.gravity - self.uncertainty, self.gravity + self.uncertainty
+        return float(min(max(GRAVITY, low), high))
+
+    @property
+    def natural_rate(self) -> float:
+        """σ at which the recorded flight would fall with g: √(g / ĝ); infinite where it does not fall."""
+        return float(np.sqrt(GRAVITY / self.gravity)) if self.gravity > 0.0 else np.inf
+
+    @property
+    def take_off_speed(self) -> float:
+        """Upward speed that true gravity asks for the recorded rise: √(2 g h) [m/s]."""
+        return float(np.sqrt(2.0 * GRAVITY * self.rise))
+
+
+def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
+    """First and last frame of every flight: the frames of support around a stretch without any, if there are such.
+
+    Parameters
+    ----------
+    supported : array of bool, shape (n,)
+        Whether anything bears load in a frame.
+    fps : float
+        Frames per second [1/s].
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], supported, [True]]).astype(np.int8)))
+    spans = [(max(int(a) - 1, 0), min(int(b), len(supported) - 1)) for a, b in edges.reshape(-1, 2)]
+    return [(a, b) for a, b in spans if b - a + 1 >= FEWEST and (b - a) / fps >= _SHORTEST]
+
+
+def fit_flight(
+    span: tuple[int, int], fps: float, com: Array, angular: Array, inertia: Array, clearance: Array
+) -> FlightFit:
+    """Fit free fall to a flight, gravity free.
+
+    Parameters
+    ----------
+    span : (int, int)
+        First and last frame.
+    fps : float
+        Frames per second [1/s].
+    com, angular : array, shape (n, 3)
+        Centre of mass [m] and angular momentum about it [kg m²/s] of all frames of the clip.
+    inertia : array, shape (n, 3, 3)
+        About the centre of mass [kg m²].
+    clearance : array, shape (n,)
+        Height of the lowest point of the body [m].
+    """
+    a, b = span
+    t = np.arange(b - a + 1) / fps
+    middle = t - t[-1] / 2.0
+    c = com[a : b + 1]
+    level = np.polynomial.polynomial.polyfit(middle, c[:, :2], 1)
+    height = np.polynomial.polynomial.polyfit(middle, c[:, 2], 2)
+    missed = c - np.column_stack([level[0] + np.outer(middle, level[1]), np.vander(middle, 3, True) @ height])
+    spread = max(float(np.sqrt(np.sum(missed[:, 2] ** 2) / (len(t) - 3))), NOISE)
+    covariance = np.linalg.inv(np.vander(middle, 3).T @ np.vander(middle, 3))
+    uncertainty = 2.0 * spread * np.sqrt(covariance[0, 0]) * float(student.ppf(0.975, len(t) - 3))
+    air = slice(a + 1, b)
+    mean = angular[air].mean(axis=0)
+    excess = np.linalg.solve(inertia[air], (angular[air] - mean)[:, :, None])[:, :, 0]
+    strayed = np.cumsum(excess, axis=0) / fps
+    return FlightFit(
+        start=a, end=b, time=a / fps, duration=float(t[-1]), gravity=float(-2.0 * height[2]),
+        uncertainty=float(uncertainty), misfit=float(np.sqrt(np.mean(np.sum(missed**2, axis=1)))),
+        rise=float(max(c[:, 2].max() - c[0, 2], 0.0)),
+        take_off=np.array([*level[1], height[1] + 2.0 * height[2] * middle[0]]),
+        clearance=float(clearance[a : b + 1].max()), momentum=mean,
+        drift=float(np.linalg.norm(strayed - strayed.mean(axis=0), axis=1).max()),
+    )  # fmt: skip
+
+
+def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
+    """The free fall that stays nearest to a flight played at a rate.
+
+    Minimises the greatest distance over the affine part by Lawson's iteration: least squares, weighted again and again
+    by the distances they leave.
+
+    Parameters
+    ----------
+    com : array, shape (n, 3)
+        Centre of mass during the flight [m].
+    fps : float
+        Frames per second as recorded [1/s].
+    rate : float
+        σ.
+
+    Returns
+    -------
+    distance : float
+        The greatest distance [m].
+    state : array, shape (2, 3)
+        Position [m] and velocity [m/s] of the fall at the first frame.
+    """
+    t = np.arange(len(com)) / (fps * rate)
+    wanted = com + np.outer(0.5 * GRAVITY * t**2, (0.0, 0.0, 1.0))
+    basis = np.column_stack([np.ones_like(t), t])
+    weights = np.full(len(t), 1.0 / len(t))
+    greatest, best = np.inf, np.zeros((2, 3))
+    for _ in range(40):
+        normal = basis.T @ (weights[:, None] * basis)
+        state = np.asarray(np.linalg.solve(normal, basis.T @ (weights[:, None] * wanted)), dtype=np.float64)
+        missed = np.linalg.norm(wanted - basis @ state, axis=1)
+        if missed.max() < greatest:
+            greatest, best = float(missed.max()), state
+        if greatest < 1e-9:
+            break
+        weights = weights * missed + 1e-12
+        weights /= weights.sum()
+    return greatest, best
+
+
+def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, float] | None:
+    """Rates σ at which some free fall stays within a distance of the flight: an interval, or none.
+
+    The least distance is convex in 1/σ², since distances are convex in the fall and 1/σ² alike; so one minimum is
+    found by trisection and the two crossings by bisection.
+
+    Parameters
+    ----------
+    com, fps
+        As in `best_fall`.
+    tolerance : float
+        [m].
+
+    Returns
+    -------
+    (float, float) or None
+        Least and greatest rate; the greatest is infinite for a flight that is straight within the tolerance.
+    """
+
+    def missed(inverse: float) -> float:
+        return best_fall(com, fps, 1.0 / np.sqrt(max(inverse, 1e-9)))[0]
+
+    duration = (len(com) - 1) / fps
+    low, high = 0.0, 16.0 * (np.ptp(com[:, 2]) + tolerance) / (GRAVITY * duration**2) + 1.0
+    top = high
+    for _ in range(20):
+        first, second = low + (high - low) / 3.0, high - (high - low) / 3.0
+        if missed(first) < missed(second):
+            high = second
+        else:
+            low = first
+    bottom = (low + high) / 2.0
+    if missed(bottom) > tolerance:
+        return None
+
+    def crossing(inside: float, outside: float) -> float:
+        for _ in range(20):
+            middle = (inside + outside) / 2.0
+            inside, outside = (middle, outside) if missed(middle) <= tolerance else (inside, middle)
+        return inside
+
+    slowest = crossing(bottom, 2.0 * top)
+    fastest = 0.0 if missed(0.0) <= tolerance else crossing(bottom, 0.0)
+    return float(1.0 / np.sqrt(slowest)), float(1.0 / np.sqrt(fastest)) if fastest > 0.0 else np.inf

@@ -1,0 +1,174 @@
+r"""How fast a motion may be played at each frame, as plain arrays: in flight from gravity, on the floor from friction.
+
+On the floor, a body whose centre of mass accelerates by a must be pushed by m (a + g e_z), within the cone of friction.
+At the rate σ the acceleration is σ² a, so
+
+.. math:: \sigma^2 (\lVert a_h \rVert - \mu a_z) \le \mu g .
+
+In a turn of radius r at speed v this is v² / r ≤ μ g; with nothing but a_z it says that the floor cannot pull.
+
+Accelerations are those of the best parabola through a window of frames, a = Σ c_i p_i (Savitzky & Golay 1964). As a
+mean with weights ≥ 0 of what the acceleration is in between, it is within the cone for whatever body the floor carries.
+So if a misses the cone by d, each such body misses some frame of the window by at least d / Σ|c_i|.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement
+from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.certificates.report import Verdict
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+_WINDOW = 0.2  # of the local parabolas whose curvature is the acceleration [s]
+
+
+class RateBounds(NamedTuple):
+    """Admissible rates of a motion, frame by frame.
+
+    Attributes
+    ----------
+    low, high : array, shape (n,)
+        Least and greatest σ; 0 and infinity where nothing bounds it.
+    """
+
+    low: Array
+    high: Array
+
+    def stylus_speed(self, phases: Array, speed: Array) -> tuple[Array, Array]:
+        """Admissible speeds of the stylus along a curve that plays the motion: σ |φ̇|.
+
+        Between two frames the narrower bound of the two holds.
+
+        Parameters
+        ----------
+        phases : array, shape (m,)
+            Share of the motion that is over at samples of the curve, 0 to 1.
+        speed : array, shape (m,)
+            |φ̇| there when the motion is played as recorded [m/s].
+
+        Returns
+        -------
+        low, high : array, shape (m,)
+            Least and greatest speed [m/s].
+
+        Raises
+        ------
+        ParameterError
+            If the shapes differ, a phase is outside 0 to 1, or a speed is negative or not finite.
+        """
+        if phases.ndim != 1 or phases.shape != speed.shape:
+            raise ParameterError(f"phases {phases.shape} and speed {speed.shape}; expected two arrays of shape (m,)")
+        if not (np.all((phases >= 0.0) & (phases <= 1.0)) and np.all(np.isfinite(speed) & (speed >= 0.0))):
+            raise ParameterError("phases must lie within 0 and 1, speeds be finite and not negative")
+        at = phases * (len(self.low) - 1)
+        before, after = np.floor(at + 1e-9).astype(np.int64), np.ceil(at - 1e-9).astype(np.int64)
+        low = np.maximum(self.low[before], self.low[after]) * speed
+        fastest = np.minimum(self.high[before], self.high[after])
+        # At rest no rate makes the stylus move.
+        return low, np.where(speed > 0.0, fastest * np.maximum(speed, 1e-12), 0.0)
+
+
+def rate_bounds(motion: BodyMotion, flights: Sequence[FlightJudgement], friction: float) -> RateBounds:
+    """Admissible rates of every frame.
+
+    Parameters
+    ----------
+    motion : BodyMotion
+        n frames.
+    flights : sequence of FlightJudgement
+        Its flights. A doubtful one counts as support.
+    friction : float
+        μ of soles on the floor.
+    """
+    low, high = np.zeros(len(motion.com)), floor_rates(motion, friction)
+    for flight in flights:
+        if flight.verdict != "unknown":
+            span = slice(flight.fit.start, flight.fit.end + 1)
+            low[span], high[span] = flight.admissible
+    return RateBounds(low, high)
+
+
+def floor_rates(motion: BodyMotion, friction: float) -> Array:
+    """Greatest rate at which friction and a floor that only pushes can give the acceleration of each frame, (n,).
+
+    Raises
+    ------
+    ParameterError
+        If the coefficient of friction is not positive.
+    """
+    if not (np.isfinite(friction) and friction > 0.0):
+        raise ParameterError(f"the coefficient of friction is {friction}; expected a finite number > 0")
+    window = _frames_of_window(motion.fps)
+    if len(motion.com) < window:
+        return np.full(len(motion.com), np.inf)
+    a = _mean_acceleration(motion)
+    needed = np.linalg.norm(a[:, :2], axis=1) - friction * a[:, 2]
+    return np.where(needed > 0.0, np.sqrt(friction * GRAVITY / np.maximum(needed, 1e-12)), np.inf)
+
+
+def _frames_of_window(fps: float) -> int:
+    return 2 * max(2, round(_WINDOW * fps / 2)) + 1
+
+
+def _mean_acceleration(motion: BodyMotion) -> Array:
+    """Of the best parabola about each frame, (n, 3); the first and last windows serve all of their half."""
+    window = _frames_of_window(motion.fps)
+    return np.asarray(savgol_filter(motion.com, window, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
+
+
+def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], friction: float, frames: int) -> Verdict:
+    """Whether friction can turn, start and stop the first frames as recorded; the margin is the least σ² − 1.
+
+    The counterexample is the window of frames ``start`` to ``end`` about the hardest ``frame``, with the centre of mass
+    [m] and its velocity [m/s] as it begins, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which any
+    body on that floor misses the window, whatever its own state is as it begins.
+    """
+    high = floor_rates(motion, friction)
+    for flight in flights:
+        high[flight.fit.start : flight.fit.end + 1] = np.inf
+    frame = int(np.argmin(high[:frames]))
+    rate = float(high[frame])
+    assumptions = (
+        f"coefficient of friction {friction:g}, the floor pushes and does not pull",
+        f"accelerations are those of the centre of mass, averaged over {_WINDOW:g} s",
+    )
+    if not np.isfinite(rate):
+        return Verdict("certified", "nothing turns, starts or stops on the floor", None, assumptions)
+    reason = f"the floor gives it up to {rate:.2f} of its speed; the hardest is at {frame / motion.fps:.2f} s"
+    if rate >= 1.0:
+        return Verdict("certified", reason, rate**2 - 1.0, assumptions)
+    counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
+    reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.1f} mm"
+    return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
+
+
+def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str, Any]:
+    window, delta = _frames_of_window(motion.fps), 1.0 / motion.fps
+    start = int(np.clip(frame - window // 2, 0, len(motion.com) - window))
+    a = _mean_acceleration(motion)[frame]
+    drift = float(np.linalg.norm(a[:2]))
+    push = float(a[2]) + GRAVITY
+    # The nearest point of the cone is its apex for a push that points below the cone's polar.
+    outside = (drift - friction * push) / np.hypot(1.0, friction) if push > -friction * drift else np.hypot(drift, push)
+    per_metre = float(np.abs(savgol_coeffs(window, 2, deriv=2, delta=delta)).sum())
+    span = slice(start, start + window)
+    velocity = savgol_filter(motion.com[span], window, 2, deriv=1, delta=delta, axis=0)[0]
+    return {
+        "start": start, "end": start + window - 1, "com": motion.com[start], "velocity": velocity, "acceleration": a,
+        "distance": float(outside) / per_metre,
+    }  # fmt: skip
+
+
+def turn_speed(radius: Array, friction: float) -> Array:
+    """Greatest speed in a turn [m/s], √(μ g r), for radii [m] of any shape."""
+    return np.sqrt(friction * GRAVITY * radius)
+
+
+def turn_rate(speed: Array, friction: float) -> Array:
+    """Greatest rate of turning [rad/s] at speeds [m/s] of any shape: μ g / v, infinite at rest."""
+    return np.where(speed > 0.0, friction * GRAVITY / np.maximum(speed, 1e-12), np.inf)

@@ -1,0 +1,198 @@
+r"""The nearest motion that can be flown: a nonlinear program in the timing and the place of the body.
+
+Frame k keeps its posture; free are how long it lasts until the next, h_k, and how far the whole body is moved, δ_k:
+
+.. math:: \min_{h, \delta, p, v, \bar L} \; \frac1n \sum_k
+            \Big(\frac{\ln h_k / h}{s_h}\Big)^2 + \Big(\frac{\lVert\delta_k\rVert}{s_\delta}\Big)^2
+            + \text{(changes of both)} + \sum_{k \in \text{flight}} \lVert L_k h / h_k - \bar L \rVert^2 / L_{max}^2
+
+subject to free fall in every flight, c_k + δ_k = p + v τ_k − ½ g τ_k² e_z; a floor that only pushes, c̈_z ≥ −g; legs
+that reach the feet that stand; and no part of a flying body below the floor.
+"""
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from controllers.certificates.flight.flight_fit import Mask
+from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.errors import ControllerError, ParameterError
+from controllers.state import Array
+
+_PACE = 0.5  # s_h: a rate changed by that much (natural logarithm) costs as much as
+_PLACE = 0.05  # s_δ: a body moved by that much [m]
+_HASTE = 3.0  # 1/s: changes of the rate's logarithm
+_JOLT = 10.0  # m/s²: accelerations of the move
+_TURN = 0.5  # weight of angular momentum that is not constant
+_RATES = (0.15, 3.0)  # of playing, compared with the recording
+_REACH = 0.998  # share of a leg's length
+
+
+class RepairError(ControllerError):
+    """A motion for which no feasible neighbour was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class RepairTask:
+    """A stretch of n frames of a motion, to be made feasible.
+
+    Parameters
+    ----------
+    fps : float
+        Frames per second [1/s].
+    com, angular : array, shape (n, 3)
+        Centre of mass [m] and angular momentum about it [kg m²/s].
+    clearance : array, shape (n,)
+        Height of the lowest point of the body [m].
+    flights : sequence of (int, int)
+        First and last frame of every flight, both of them still on the floor.
+    legs : array, shape (n, 2, 3)
+        From hips to ankles [m].
+    standing : array of bool, shape (n, 2)
+        Which foot stands.
+    leg_length : float
+        Of a straight leg [m].
+    held : (bool, bool)
+        Whether the first and the last frame are joined to frames that stay as they are.
+
+    Raises
+    ------
+    ParameterError
+        If the shapes do not fit together, or a flight is not within the frames.
+    """
+
+    fps: float
+    com: Array
+    angular: Array
+    clearance: Array
+    flights: Sequence[tuple[int, int]]
+    legs: Array
+    standing: Mask
+    leg_length: float
+    held: tuple[bool, bool]
+
+    def __post_init__(self) -> None:
+        n = len(self.com)
+        shapes = {"com": (n, 3), "angular": (n, 3), "clearance": (n,), "legs": (n, 2, 3), "standing": (n, 2)}
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ParameterError(f"{name} has shape {getattr(self, name).shape}; expected {shape}")
+        for start, end in self.flights:
+            if not 0 <= start < end < n:
+                raise ParameterError(f"a flight from frame {start} to {end} is not within 0 to {n - 1}")
+
+
+@dataclass(frozen=True, eq=False)
+class RepairPlan:
+    """What makes a stretch of motion feasible.
+
+    Attributes
+    ----------
+    times : array, shape (n,)
+        When each frame is reached, from 0 on [s].
+    shift : array, shape (n, 3)
+        How far the body is moved in each frame [m].
+    falls : array, shape (flights, 2, 3)
+        Position [m] and velocity [m/s] of the centre of mass at each take-off.
+    iterations : int
+        That the solver took.
+    """
+
+    times: Array
+    shift: Array
+    falls: Array
+    iterations: int
+
+
+@contextmanager
+def _matrix_indexing() -> Generator[None, None, None]:
+    """CasADi's own indexing while a program is written, whatever other code has chosen for the process."""
+    chosen = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(0)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setNumpyMode(chosen)
+
+
+@_matrix_indexing()
+def repair(task: RepairTask) -> RepairPlan:
+    """Solve the nonlinear program of this module with IPOPT.
+
+    Raises
+    ------
+    RepairError
+        If the solver finds no feasible motion.
+    """
+    n, step = len(task.com), 1.0 / task.fps
+    opti = ca.Opti()
+    pace = opti.variable(n - 1)  # ln(h_k / h): timing without a constraint of sign
+    shift = opti.variable(n, 3)
+    steps = step * ca.exp(pace)
+    moved = task.com + shift
+    velocity = (moved[1:, :] - moved[:-1, :]) / ca.repmat(steps, 1, 3)
+    between = (steps[1:] + steps[:-1]) / 2.0
+    rise = (velocity[1:, 2] - velocity[:-1, 2]) / between
+    jolt = (shift[2:, :] - 2.0 * shift[1:-1, :] + shift[:-2, :]) / step**2
+
+    cost = ca.sumsqr(pace / _PACE) + ca.sumsqr(shift / _PLACE) + ca.sumsqr(jolt / _JOLT)
+    cost += ca.sumsqr((pace[1:] - pace[:-1]) / (step * _HASTE))
+    opti.subject_to(opti.bounded(-np.log(_RATES[1]), pace, -np.log(_RATES[0])))
+    airborne = np.zeros(n, dtype=bool)
+    states: list[ca.MX] = []
+    for start, end in task.flights:
+        airborne[start + 1 : end] = True
+        state = opti.variable(2, 3)
+        states.append(state)
+        since = ca.vertcat(0, ca.cumsum(steps[start:end]))
+        fall = ca.repmat(state[0, :], end - start + 1, 1) + since @ state[1, :]
+        opti.subject_to(moved[start : end + 1, :2] == fall[:, :2])
+        opti.subject_to(moved[start : end + 1, 2] == fall[:, 2] - 0.5 * GRAVITY * since**2)
+        mean = opti.variable(1, 3)
+        air = np.arange(start + 1, end)
+        scale = max(float(np.linalg.norm(task.angular[air], axis=1).max()), 1.0)
+        turning = task.angular[air] / scale / ca.repmat(ca.exp(pace[start + 1 : end]), 1, 3)
+        cost += _TURN * ca.sumsqr(turning - ca.repmat(mean, len(air), 1))
+        opti.set_initial(mean, task.angular[air].mean(axis=0) / scale)
+        guess = _first_fall(task.com[start : end + 1], step)
+        opti.set_initial(state, guess[:2])
+        opti.set_initial(pace[start:end], guess[2, 0])
+    for k in np.flatnonzero(~airborne[1:-1]):
+        opti.subject_to(rise[int(k)] >= -GRAVITY)
+    for k in np.flatnonzero(airborne):
+        opti.subject_to(shift[int(k), 2] >= -max(float(task.clearance[k]), 0.0))
+    for k, leg in np.argwhere(task.standing):
+        line = task.legs[k, leg]
+        longest = max(_REACH * task.leg_length, float(np.linalg.norm(line)))
+        opti.subject_to(ca.sumsqr(line[None, :] - shift[int(k), :]) <= longest**2)
+    for held, frame, interval in ((task.held[0], 0, 0), (task.held[1], n - 1, n - 2)):
+        if held:
+            opti.subject_to(shift[frame, :] == 0.0)
+            opti.subject_to(pace[interval] == 0.0)
+    opti.minimize(cost / n)
+    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 500, "tol": 1e-6})
+    try:
+        solution = opti.solve()
+    except RuntimeError:
+        raise RepairError(
+            f"no feasible neighbour of {len(task.flights)} flights in {n} frames was found "
+            f"({opti.return_status()}); expected flights that timing and height can mend"
+        ) from None
+    return RepairPlan(
+        times=np.concatenate([[0.0], np.cumsum(np.asarray(solution.value(steps)).ravel())]),
+        shift=np.asarray(solution.value(shift)).reshape(n, 3),
+        falls=np.array([np.asarray(solution.value(state)) for state in states]).reshape(-1, 2, 3),
+        iterations=int(solution.stats()["iter_count"]),
+    )
+
+
+def _first_fall(com: Array, step: float) -> Array:
+    """A first guess of take-off (position, velocity) and ln(h_k / h) of a flight, shape (3, 3)."""
+    t = np.arange(len(com)) * step
+    curve = np.polynomial.polynomial.polyfit(t, com, 2)
+    rate = np.sqrt(GRAVITY / max(-2.0 * curve[2, 2], 1.0))
+    rate = float(np.clip(rate, *_RATES))
+    return np.array([curve[0], rate * curve[1], np.full(3, -np.log(rate))])

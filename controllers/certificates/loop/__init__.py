@@ -1,0 +1,1 @@
+"""Certificates of the sampled loop about one curve: stability, passivity, energy."""

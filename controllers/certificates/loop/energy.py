@@ -1,0 +1,163 @@
+r"""Energy of a river: what it injects in a lap, how fast it drives the hand, how far a bounded force moves it off.
+
+A river pushes along its tangent, so it is active by design. Of FOLLOW's force, k_r's part is a potential and b_d's
+injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: that bounds its power whatever the hand does. A relaxed hand moves at the speed at
+which the force pays for friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
+
+.. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon))\bigr), \qquad
+          G = \sum_j \sigma_{max}(E\,A^j B)
+
+with A the loop across the curve, B its response to a force, E the displacement of the tip: the peak gain of the sampled
+loop, the least number for which this holds. U_0 bounds what the lap itself asks for: inertia, friction and the filter's
+lag; the last term is what the window takes away off the curve. The least solution R is reached from the curve, and
+cannot be left: the loop is input-to-state stable inside.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.loop.device import kinematics_function
+from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.stability import River
+from controllers.certificates.report import Verdict
+from controllers.fields.river import window
+from controllers.safety.energy_tank import river_power
+from controllers.state import Array
+
+
+class Drag(NamedTuple):
+    """Friction along the curve: viscous [N s/m] and Coulomb's [N] at the tip, shape (n,) each."""
+
+    viscous: Array
+    coulomb: Array
+
+
+def drag(river: River, linear: LinearLoop) -> Drag:
+    """The device's friction felt along the curve."""
+    along = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
+    joints = joint_motion(linear.jacobian, along)
+    return Drag(joints**2 @ np.array(river.device.viscous), np.abs(joints) @ np.array(river.device.coulomb))
+
+
+def terminal_speed(river: River, linear: LinearLoop) -> Array:
+    """Speed [m/s] at which a relaxed hand is carried at every phase: (b_d |φ̇| − f_c)/(b_d + b), at least 0."""
+    friction, pace = drag(river, linear), np.linalg.norm(linear.velocity, axis=1)
+    return np.maximum(0.0, (river.b_d * pace - friction.coulomb) / (river.b_d + friction.viscous))
+
+
+class PeakGain(NamedTuple):
+    """Largest effect that a force of 1 N of any course has: displacement across the curve, and the river's force."""
+
+    distance: float
+    force: float
+
+
+def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
+    """Peak gains [m/N], [N/N], the largest over the phases; infinite where the loop is not stable."""
+    maps = loop.frozen(k_r, b_d)
+    if np.abs(np.linalg.eigvals(maps)).max() >= 1.0:
+        return PeakGain(float("inf"), float("inf"))
+    basis, projection = loop.across
+    force = projection @ loop.push
+    rows = [loop.linear.jacobian @ basis[:, :3], loop.force(k_r, b_d) @ basis]
+    gains = np.zeros((2, len(maps)))
+    for _ in range(200_000):
+        part = np.array([np.linalg.norm(row @ force, ord=2, axis=(1, 2)) for row in rows])
+        gains += part
+        if np.all(part < 1e-9 * gains):
+            break
+        rows = [row @ maps for row in rows]
+    return PeakGain(*(float(gain.max()) for gain in gains))
+
+
+def own_force(river: River, linear: LinearLoop) -> Array:
+    """U_0 [N] at every phase: what the lap at its own pace asks for, as a force at the tip."""
+    kinematics = kinematics_function(river.device).map(len(linear.phases))
+    acceleration = river.curve.acceleration(linear.phases)
+    bend = np.array(kinematics(linear.theta.T, linear.rate.T)[1]).T
+    turn = joint_motion(linear.jacobian, acceleration - bend)
+    torque = np.einsum("nij,nj->ni", linear.mass, turn)
+    for i, (theta, rate) in enumerate(zip(linear.theta, linear.rate, strict=True)):
+        coriolis = np.array(river.device.coriolis(theta, rate), dtype=float)
+        torque[i] += coriolis @ rate + np.array(river.device.viscous) * rate
+    inertia = np.linalg.norm(joint_motion(linear.jacobian.transpose(0, 2, 1), torque), axis=1)
+    # Coulomb's torques have any sign: the worst corner of the box.
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1) * np.array(river.device.coulomb)[:, None]
+    stiction = np.linalg.norm(np.linalg.solve(linear.jacobian.transpose(0, 2, 1), signs[None]), axis=1).max(axis=1)
+    sampling = river.sampling
+    lag = sampling.delay + 1.5 * sampling.period + sampling.period * sampling.keep / (1.0 - sampling.keep)
+    return inertia + stiction + river.b_d * np.linalg.norm(acceleration, axis=1) * lag
+
+
+def distance_bound(river: River, gain: float, force: float) -> float:
+    """Least R [m] with R = G (U + k_r R (1 − w(R/ε))); inf when there is none within the tube."""
+    radius = 0.0
+    for _ in range(500):
+        share = float(window(radius * radius * river.width**-2))
+        following = gain * (force + river.k_r * radius * (1.0 - share))
+        if following > river.width:
+            return float("inf")
+        if abs(following - radius) < 1e-12:
+            return following
+        radius = following
+    return float("inf")
+
+
+def energy(river: River, push: float, ceiling: float) -> Verdict:
+    """Verdict on the distance from the curve of a hand that pushes with at most `push` newtons, with FOLLOW.
+
+    Certified when the bound exists, stays within the tube and the curve's reach, where the nearest point is unique, and
+    the river's force below `ceiling` [N]. The margin is how much more the hand might push [N].
+    """
+    moving = river.moving()
+    gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
+    own, room = float(own_force(river, moving).max()), min(river.width, river.curve.reach)
+
+    def bounds(force: float) -> tuple[float, float]:
+        distance = distance_bound(river, gain.distance, force + own) if np.isfinite(gain.distance) else float("inf")
+        return distance, gain.force * distance / gain.distance if np.isfinite(distance) else float("inf")
+
+    def holds(force: float) -> bool:
+        distance, felt = bounds(force)
+        return distance < room and felt < ceiling
+
+    allowed, beyond = 0.0, ceiling
+    for _ in range(40):
+        middle = 0.5 * (allowed + beyond)
+        allowed, beyond = (middle, beyond) if holds(middle) else (allowed, middle)
+    distance, felt = bounds(push)
+    pace, speed, friction = np.linalg.norm(moving.velocity, axis=1), terminal_speed(river, moving), drag(river, moving)
+    lap = river.curve.duration
+    figures: dict[str, object] = {
+        "phases": river.phases(),
+        "pace": pace,
+        "terminal_speed": speed,
+        "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
+        "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
+        "power_bound": river_power(river.b_d, float(np.max(pace))),
+        "speed_bound": float(np.max(pace)) + push / river.b_d if river.b_d > 0.0 else None,
+        "peak_gain": gain.distance,
+        "force_gain": gain.force,
+        "own_force": own,
+        "push": push,
+        "push_allowed": allowed,
+        "distance_bound": distance,
+        "force_bound": felt,
+    }
+    assumptions = (
+        "kinematics and inertia off the curve are those on it; the hand's force is bounded and has no impedance",
+        f"the limiter lets {ceiling:g} N through: the motors are not yet warm",
+    )
+    said = (
+        f"|U| ≤ {push:g} N moves the hand by at most {1e3 * distance:.3g} mm, the river answers with at most "
+        f"{felt:.3g} N; this holds up to {allowed:.3g} N"
+    )
+    if holds(push):
+        return Verdict("certified", said, allowed - push, assumptions, {}, figures)
+    reason = (
+        f"no bound for |U| ≤ {push:g} N within {1e3 * room:.3g} mm of the curve and {ceiling:g} N; "
+        f"there is one up to {allowed:.3g} N"
+    )
+    return Verdict("unknown", reason, allowed - push, assumptions, {}, figures)

@@ -1,0 +1,89 @@
+"""Laws of force on CasADi symbols, from the kernels that run."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import casadi
+
+from controllers.certificates.loop.device import Device, Symbol, matrix, vector
+from controllers.curves.trajectory import PIECE, piece_point, piece_velocity
+from controllers.fields.bunny import gaussian
+from controllers.fields.follow import follow_force
+from controllers.fields.river import window
+from controllers.fields.stretchy_tubes import stretch_force
+
+
+class Law(NamedTuple):
+    """A law of force on symbols.
+
+    Attributes
+    ----------
+    force : callable
+        ``force(p, v, piece, u, k_r, b_d, width)`` in H: the curve's piece as 28 coefficients, the phase u in it, and
+        1/ε² or 1/δ². Linear in k_r and b_d.
+    slides : bool
+        Whether there are shifts that the law does not answer: of a law that carries, the shift along the curve.
+    carries : bool
+        Whether the hand is driven along the curve, or comes to rest on it.
+    """
+
+    force: Callable[..., Symbol]
+    slides: bool
+    carries: bool
+
+
+def _nearest(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
+    """t* as a function of p: one Newton step from the nearest phase u has its value and its derivative."""
+    slope = casadi.dot(vector(piece_point.py_func(piece, 0, u)) - p, vector(piece_velocity.py_func(piece, 0, u)))
+    return u - slope / casadi.jacobian(slope, u)
+
+
+def _follow(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
+    """FOLLOW, attracted by the nearest point."""
+    nearest = _nearest(p, piece, u)
+    p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
+    w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
+    return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
+
+
+def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
+    """Bunny in its point form: the attractor does not depend on the hand."""
+    p_curve, v_curve = piece_point.py_func(piece, 0, u), piece_velocity.py_func(piece, 0, u)
+    pull = gaussian.py_func(casadi.sumsqr(vector(p_curve) - p), width)
+    return pull * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
+
+
+def _seek(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_f: Symbol, b: Symbol, width: Symbol) -> Symbol:
+    """Stretchy tubes with the switch open: attracted by the nearest point, and slowed down."""
+    target = piece_point.py_func(piece, 0, _nearest(p, piece, u))
+    return vector([stretch_force.py_func(p[i], v[i], target[i], k_f, b) for i in range(3)])
+
+
+def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol, width: Symbol) -> Symbol:
+    """Stretchy tubes that are held: attracted by the point that was taken hold of, wherever the curve goes."""
+    target = piece_point.py_func(piece, 0, u)
+    return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
+
+
+FOLLOW_LAW = Law(_follow, slides=True, carries=True)
+BUNNY_LAW = Law(_bunny, slides=False, carries=True)
+SEEK_LAW = Law(_seek, slides=True, carries=False)
+HOLD_LAW = Law(_hold, slides=False, carries=False)
+LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
+
+
+def torque_function(device: Device, law: Law) -> Any:
+    """CasADi function (θ, ω, piece, u, k_r, b_d, width) → torques τ = J(θ)ᵀ F + N(θ), and their derivatives by θ, ω.
+
+    ω are the rates as filtered, apart from θ: the force is F(p(θ), J(θ) ω).
+    """
+    theta, omega, piece = casadi.SX.sym("theta", 3), casadi.SX.sym("omega", 3), casadi.SX.sym("piece", PIECE)
+    u, k_r, b_d, width = (casadi.SX.sym(name) for name in ("u", "k_r", "b_d", "width"))
+    jacobian = matrix(device.jacobian(theta))
+    force = law.force(vector(device.position(theta)), jacobian @ omega, piece, u, k_r, b_d, width)
+    torque = jacobian.T @ force + vector(device.gravity(theta))
+    return casadi.Function(
+        "torque",
+        [theta, omega, piece, u, k_r, b_d, width],
+        [torque, casadi.jacobian(torque, theta), casadi.jacobian(torque, omega)],
+    )

@@ -1,0 +1,118 @@
+r"""LEADING on CasADi symbols, from the kernels that run: its regimes, and the walker as state.
+
+The force is a spring outside dead bands, so near a place where it sets in it is linear on either side. Each regime is
+that side, at the edge where the force is nothing: a hand that holds on with a constant force adds no derivative to it.
+
+.. math:: F = -k_l\,(\alpha\,t t^T + \beta\,n (n - c\,t)^T)\,\delta p - k_z\,\delta z\,e_z - b\,v
+
+α is 1 where the stylus is farther along than the figure follows, β is 1 beside what it can reach, and c = κ_max × the
+way beyond the path's front: the room to the sides grows with that way. k_z is scaled with k_l.
+"""
+
+from typing import NamedTuple
+
+import casadi
+import numpy as np
+
+from controllers.certificates.loop.device import Symbol, vector
+from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.sampled_loop import KEPT, SampledLoop
+from controllers.curves.trajectory import piece_point, piece_velocity
+from controllers.fields.leading import leading_force, walker_acceleration
+from controllers.state import Array
+
+_INSIDE = 1e-9  # [m] of floor on the side of an edge where the spring acts
+_WIDE = 10.0  # [m] a dead band in which nothing is felt
+
+
+class Regime(NamedTuple):
+    """A side of the dead bands of LEADING, and how the path lies.
+
+    Attributes
+    ----------
+    ahead, aside : bool
+        Whether the springs along and across the path act: α and β.
+    beyond : bool
+        Whether the stylus is beyond the path's front, or on the path.
+    turn : float
+        c, signed by the side: 1 m of way beyond the front and 1/m of bend make 1.
+    heading : float
+        Of the path, from the direction of the curve along which the loop is linearised [rad].
+    """
+
+    ahead: bool
+    aside: bool
+    beyond: bool = False
+    turn: float = 0.0
+    heading: float = 0.0
+
+    def tangent(self, way: Symbol) -> tuple[Symbol, Symbol]:
+        """Tangent t of the path in the plane, for a direction of the curve."""
+        x, y = way[0], way[1]
+        size = (x * x + y * y) ** 0.5
+        c, s = np.cos(self.heading), np.sin(self.heading)
+        return (c * x - s * y) / size, (s * x + c * y) / size
+
+    def law(self, scale: float, upright: float) -> Law:
+        """The law in this regime; `scale` is S, `upright` is k_z/k_l."""
+
+        def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_l: Symbol, b: Symbol, width: Symbol) -> Symbol:
+            here = piece_point.py_func(piece, 0, u)
+            c, s = self.tangent(piece_velocity.py_func(piece, 0, u))
+            advance = scale * (c * (p[0] - here[0]) + s * (p[1] - here[1]))
+            # On the path the place next to the stylus goes along with it, and there is no room to the sides.
+            gone = 0.0 if self.beyond else advance
+            room = self.turn * advance - _INSIDE if self.aside else _WIDE
+            pull = leading_force.py_func(
+                p[0], p[1], v[0], v[1], scale * here[0] + c * gone, scale * here[1] + s * gone, c, s, gone, _WIDE,
+                -_INSIDE if self.ahead else _WIDE, room, scale, k_l, b,
+            )  # fmt: skip
+            return vector([*pull, -upright * k_l * p[2] - b * v[2]])
+
+        return Law(force, slides=not (self.ahead and self.aside), carries=False)
+
+
+def walking(loop: SampledLoop, regime: Regime, scale: float, rate: float, k_l: float, b: float) -> Array:
+    """Maps of a period with the walker as state, without the shifts that are neutral, shape (n, r, r).
+
+    The walker, (s, ṡ), steps before the force is taken, as in the servo: ṡ⁺ = ṡ + T s̈, s⁺ = s + T ṡ⁺, and s⁺ takes
+    k_l s⁺/S from the spring along the path. Nothing changes if stylus and walker are shifted together along it.
+
+    Parameters
+    ----------
+    loop : SampledLoop
+        Linearised in a regime in which the spring along the path acts and c is 0.
+    regime : Regime
+        That one.
+    scale, rate : float
+        S and ω [1/s].
+    k_l, b : float
+        [N/m], [N s/m].
+    """
+    linear, period, size = loop.linear, loop.sampling.period, loop.size
+    n = len(linear.phases)
+    way = np.zeros((n, 3))
+    way[:, 0], way[:, 1] = regime.tangent(linear.velocity.T)
+    goal = scale * np.einsum("ni,nij->nj", way, linear.jacobian)
+    walker: Symbol = casadi.SX.sym("walker", 2)
+    slope = casadi.jacobian(walker_acceleration.py_func(walker[0], walker[1], rate), walker)
+    by_lag, by_speed = (float(value) for value in np.ravel(casadi.evalf(slope)))
+    faster = np.array([-period * by_lag, 1.0 + period * by_speed])
+    steps = np.zeros((n, 2, size + 2))
+    steps[:, :, :3] = np.array([[period * period], [period]]) * by_lag * goal[:, None]
+    steps[:, :, size:] = np.array([1.0, 0.0]) + period * faster, faster
+    pull = loop.fresh @ (k_l / scale * np.einsum("nij,ni->nj", linear.jacobian, way))[:, :, None]
+    maps = np.zeros((n, size + 2, size + 2))
+    maps[:, :size, :size] = loop.matrices(k_l, b)
+    maps[:, :size] += pull @ steps[:, :1]
+    maps[:, size:] = steps
+    if linear.held:
+        return maps
+    shift = np.zeros((n, size + 2, linear.shift.shape[2] + 1))
+    joints = np.linalg.solve(linear.jacobian, way[:, :, None])
+    weight = np.tile(linear.weight_theta @ joints, (1, (size - KEPT) // 3, 1))
+    shift[:, :size, :-1] = loop.shifts
+    shift[:, 0:3, -1:], shift[:, 6:9, -1:], shift[:, KEPT:size, -1:] = joints, joints, weight
+    shift[:, size, -1] = scale
+    basis = np.linalg.qr(shift, mode="complete")[0][:, :, shift.shape[2] :]
+    return basis.transpose(0, 2, 1) @ maps @ basis

@@ -1,0 +1,98 @@
+r"""Passivity of the sampled river as its hand meets it, beside stability: it asks more, and knows nothing of the hand.
+
+A virtual wall of stiffness K and damping B on a device of damping b is passive if b > K T/2 + |B| (Colgate & Schenkel
+1997). Their general form, for a discrete impedance H(z) and all ω up to Nyquist's,
+
+.. math:: b > \frac{T}{2}\,\frac{1}{1 - \cos\omega T}\,\mathrm{Re}\bigl((1 - e^{-i\omega T})\,H(e^{i\omega T})\bigr)
+
+holds delay and velocity filter as they are. A wall that is quantised by Δ, on a device with Coulomb friction f_c, is
+passive for K ≤ min(2b/T, 2f_c/Δ) (Abbott & Okamura 2005). Along the curve b, f_c and Δ are the device's own, mapped to
+the tip in the directions across the curve; both conditions are for one axis, taken for the worst one.
+"""
+
+import numpy as np
+
+from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, unstable_start
+from controllers.certificates.report import Verdict
+from controllers.state import Array
+
+DIRECTIONS = 24  # across the curve, over half a turn
+FREQUENCIES = 4000
+STIFFEST = 1e6  # [N/m] of the springs that are tried against the river
+
+
+def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]:
+    """The device's b [N s/m], f_c [N] and Δ [m] at the tip, across the curve, each shape (n, DIRECTIONS).
+
+    For a motion n of the tip the joints move by J⁻¹ n: b(n) = Σ D_i (J⁻¹n)_i², f_c(n) = Σ f_i |(J⁻¹n)_i|. A count
+    of one encoder moves the reading by nᵀJ_i Δ_i: Δ(n) is the largest.
+    """
+    tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
+    plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
+    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    directions = circle @ plane
+    joints = joint_motion(linear.jacobian[:, None], directions)
+    device = river.device
+    count = np.abs(directions @ linear.jacobian) * np.array(device.encoder_step)
+    return joints**2 @ np.array(device.viscous), np.abs(joints) @ np.array(device.coulomb), count.max(axis=2)
+
+
+def damping_needed(k: float, b: float, sampling: Sampling) -> tuple[float, float]:
+    """Device damping [N s/m] with which stiffness k and damping b are passive, and the frequency that needs it [rad/s].
+
+    The impedance is the servo's: backward difference, first-order low-pass, delay rounded up to whole periods.
+    """
+    period, keep = sampling.period, sampling.keep
+    turn = np.pi * (np.arange(FREQUENCIES) + 1.0) / FREQUENCIES
+    late = np.exp(-1j * turn)
+    delay = late ** (sampling.whole_delay + (sampling.rest_delay > 0.0))
+    impedance = delay * (k + b * (1.0 - keep) / (1.0 - keep * late) * (1.0 - late) / period)
+    needed = 0.5 * period * ((1.0 - late) * impedance).real / (1.0 - np.cos(turn))
+    worst = int(np.argmax(needed))
+    return float(needed[worst]), float(turn[worst] / period)
+
+
+def passivity(river: River) -> Verdict:
+    """Verdict on passivity across the curve, for any passive hand.
+
+    Certified by Colgate & Schenkel's general condition at every phase, in the worst direction; refuted by a spring on
+    the stylus, which is passive, that makes the loop unstable; unknown where neither is found. The margin is the least
+    damping of the device less what is needed [N s/m].
+    """
+    linear = river.still()
+    damping, coulomb, resolution = tip_friction(river, linear)
+    needed, frequency = damping_needed(river.k_r, river.b_d, river.sampling)
+    period = river.sampling.period
+    walls = np.minimum(2.0 * damping / period, 2.0 * coulomb / resolution).min(axis=1)
+    margin = float(damping.min()) - needed
+    figures: dict[str, object] = {
+        "phases": river.phases(),
+        "damping": damping.min(axis=1),
+        "damping_needed": needed,
+        "damping_needed_unfiltered": 0.5 * river.k_r * period + river.b_d,
+        "stiffness_colgate": 2.0 * damping.min(axis=1) / period,
+        "stiffness_quantised": 2.0 * (coulomb / resolution).min(axis=1),
+        "stiffness_abbott_okamura": walls,
+        "frequency": frequency,
+    }
+    assumptions = ("one axis at a time, the worst direction across the curve", "viscous friction of the device alone")
+    reason = (
+        f"the device's damping is {damping.min():.3g} N s/m, {needed:.3g} N s/m are needed at {frequency:.0f} rad/s; "
+        f"springs alone are passive up to {walls.min():.3g} N/m (Abbott & Okamura)"
+    )
+    if margin > 0.0:
+        return Verdict("certified", reason, margin, assumptions, {}, figures)
+    for stiffness in np.geomspace(10.0, STIFFEST, 24):
+        hand = HandImpedance(stiffness=float(stiffness))
+        loop = SampledLoop(river.still(hand), river.sampling)
+        radius = loop.radius(river.k_r, river.b_d)
+        if radius.max() > 1.0:
+            example = unstable_start(river, hand, int(radius.argmax()))
+            reason += f"; a spring of {stiffness:.3g} N/m on the stylus makes it unstable"
+            return Verdict("refuted", reason, margin, assumptions, example, figures)
+    return Verdict("unknown", f"{reason}; no spring was found that makes it unstable", margin, assumptions, {}, figures)

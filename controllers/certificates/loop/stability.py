@@ -1,0 +1,215 @@
+"""Stability of a river under its clock: critical gains and delay, Floquet multipliers, and the verdict."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.certificates.loop.device import Device
+from controllers.certificates.loop.hand import NO_HAND, HandImpedance
+from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.linear_loop import LinearLoop, linearise
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.report import Verdict
+from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
+
+MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] no device gives more, so the searches end here
+GRID = 40  # gains tried before bisection
+PHASES = 48
+LAP_PHASES = 400  # for the multipliers of a lap
+LATEST = 16  # periods of delay at which the search for the delay margin ends
+
+
+class River(NamedTuple):
+    """What is certified: law and gains, curve, device and clock."""
+
+    law: Law
+    k_r: float
+    b_d: float
+    width: float
+    curve: Trajectory
+    device: Device
+    sampling: Sampling
+
+    def phases(self, n: int = PHASES) -> Array:
+        """Equal phases of the curve [s]: all round if it is closed, else within its ends."""
+        if self.curve.periodic:
+            return self.curve.start + self.curve.duration * np.arange(n) / n
+        return self.curve.start + self.curve.duration * (np.arange(n) + 0.5) / n
+
+    def moving(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
+        """The loop linearised at `phases`, moving along the curve at its pace."""
+        return linearise(self.device, self.law, self.curve, self.phases(), hand, self.width)
+
+    def still(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
+        """The loop linearised at `phases` of a curve as slow as if it stood still."""
+        slow, curve = 1e6, self.curve
+        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * self.phases()
+        standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
+        return linearise(self.device, self.law, standing, places, hand, self.width)
+
+
+def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
+    """Neighbours of the grid between which each column of `stable`, (grid, n), is lost first; inf if it never is."""
+    first = np.where(np.all(stable, axis=0), len(grid), np.argmin(stable, axis=0))
+    ends = np.append(grid, np.inf)
+    return ends[np.maximum(first - 1, 0)], ends[first]
+
+
+def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
+    """Smallest k_r [N/m] from `least` on at which the loop is unstable with the phase held, at every phase, shape (n,).
+
+    Infinite where it is stable up to `MOST_STIFFNESS`; `least` where it is unstable there already.
+    """
+    grid = np.geomspace(least, MOST_STIFFNESS, GRID)
+    low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for k_r in grid]), grid)
+    for _ in range(24):
+        middle = np.sqrt(low * np.minimum(high, MOST_STIFFNESS))
+        stable = loop.radius(middle, b_d) < 1.0
+        low, high = np.where(stable, middle, low), np.where(stable, high, middle)
+    return high
+
+
+def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
+    """Smallest b_d [N s/m] from `least` on at which the loop is unstable with the phase held, shape (n,)."""
+    grid = np.geomspace(least, MOST_DAMPING, GRID)
+    low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for b_d in grid]), grid)
+    for _ in range(24):
+        middle = np.sqrt(low * np.minimum(high, MOST_DAMPING))
+        stable = loop.radius(k_r, middle) < 1.0
+        low, high = np.where(stable, middle, low), np.where(stable, high, middle)
+    return high
+
+
+def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
+    """Delay [s] beyond the loop's own at which it is first unstable at some phase; inf beyond `LATEST` periods."""
+    period, delay = loop.sampling.period, loop.sampling.delay
+
+    def stable(extra: float) -> bool:
+        later = SampledLoop(loop.linear, replace(loop.sampling, delay=delay + extra))
+        return bool(later.radius(k_r, b_d).max() < 1.0)
+
+    steps = 0.25 * period * np.arange(4 * LATEST)
+    first = next((extra for extra in steps if not stable(float(extra))), np.inf)
+    if first == 0.0 or np.isinf(first):
+        return float(first)
+    low, high = first - 0.25 * period, first
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return float(low)
+
+
+def lap_multipliers(river: River, linear: LinearLoop) -> Array:
+    """Floquet multipliers of a lap across the curve, complex, the largest first; of a loop that moves along it."""
+    periods = max(1, round(river.curve.duration / river.sampling.period / LAP_PHASES))
+    n = max(1, round(river.curve.duration / river.sampling.period / periods))
+    return SampledLoop(linear.lap(river.curve, n), river.sampling).multipliers(river.k_r, river.b_d, periods)
+
+
+def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
+    """Verdict on the river's linear stability along its curve, for every one of some hands.
+
+    Certified: at every phase on a grid and with every hand, k_r stays below what is critical there by more than the
+    critical value changes to the neighbouring phase, or, where that jumps, the spectral radius below 1 by more than it
+    changes; and where the hand is carried round a closed curve, the Floquet multipliers of the lap lie inside the unit
+    circle. The margin is (critical k_r)/k_r − 1.
+    """
+    critical, multipliers, bounds = [], [], []
+    worst = (np.inf, NO_HAND, 0)
+    for hand in hands:
+        loop = SampledLoop(river.still(hand), river.sampling)
+        onset = critical_stiffness(loop, river.b_d, max(river.k_r, 1e-3))
+        if onset.min() < worst[0]:
+            worst = (float(onset.min()), hand, int(onset.argmin()))
+        critical.append(onset)
+        radii = loop.radius(river.k_r, river.b_d)
+        bounds.append(float((np.maximum(radii[1:], radii[:-1]) + np.abs(np.diff(radii))).max()))
+        if river.curve.periodic and river.law.carries:
+            multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
+    bare = SampledLoop(river.still(), river.sampling)
+    onsets = np.array(critical)
+    capped = np.minimum(onsets, MOST_STIFFNESS)
+    change = float(np.abs(np.diff(capped, axis=1)).max())
+    least, hand, at = worst
+    margin = min(least, MOST_STIFFNESS) / max(river.k_r, 1e-3) - 1.0
+    radius = bare.radius(river.k_r, river.b_d)
+    figures: dict[str, object] = {
+        "phases": river.phases(),
+        "radius": radius,
+        "radius_bound": max(bounds),
+        "decay_rate": -np.log(np.maximum(radius, 1e-12)) / river.sampling.period,
+        "critical_stiffness": onsets.min(axis=0),
+        "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
+        "delay_margin": delay_margin(bare, river.k_r, river.b_d),
+        "multiplier": max(multipliers, default=None),
+    }
+    assumptions = (
+        "linear: small deviations, forces below the limiter's and the motors' bounds, no Coulomb friction, no rounding",
+        f"phases: {onsets.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
+        "the device as modelled: rigid links, ideal torque sources",
+    )
+    said = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; critical k_r = {least:.4g} N/m with {hand}"
+    if least <= max(river.k_r, 1e-3):
+        below = critical_stiffness(SampledLoop(river.still(hand), river.sampling), river.b_d, 1e-3)[at]
+        said = said.replace(f"critical k_r = {least:.4g}", f"critical k_r = {below:.4g}")
+        margin = min(float(below) / max(river.k_r, 1e-3), 1.0) - 1.0
+        return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
+    if multipliers and max(multipliers) >= 1.0:
+        reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"
+        return Verdict("unknown", reason, margin, assumptions, {}, figures)
+    if least - change <= river.k_r and max(bounds) >= 1.0:
+        reason = f"the critical k_r changes by {change:.4g} N/m from phase to phase, too coarse a grid; {said}"
+        return Verdict("unknown", reason, margin, assumptions, {}, figures)
+    return Verdict("certified", f"stable: {said}", margin, assumptions, {}, figures)
+
+
+def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
+    """Where, with which hand and from which state ξ a river that is unstable at one of its phases grows, and how fast.
+
+    Parameters
+    ----------
+    river : River
+        Of the law.
+    hand : HandImpedance
+        On the stylus.
+    at : int
+        Which phase.
+    """
+    state, growth = growing_mode(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d, at)
+    phase = float(river.phases()[at])
+    return {"phase": phase, "p": river.curve.point(phase), "hand": hand, "state": state, "growth_rate": growth}
+
+
+def slowest_mode(
+    loop: SampledLoop, k_r: float, b_d: float, at: int, swings: bool = False
+) -> tuple[complex, npt.NDArray[np.complex128]]:
+    """Multiplier and complex state ξ of the slowest (or growing) mode at one phase, of those that swing if so asked.
+
+    Its tip swings by 1 m.
+    """
+    values, vectors = np.linalg.eig(loop.frozen(k_r, b_d)[at])
+    largest = int(np.argmax(np.where(swings & (np.abs(np.angle(values)) < 1e-3), 0.0, np.abs(values))))
+    mode = loop.across[0][at] @ vectors[:, largest]
+    # Turned to where its tip is farthest off, so that the real part is that moment.
+    away = loop.linear.jacobian[at] @ mode[:3]
+    turns = np.exp(1j * np.linspace(0.0, np.pi, 64, endpoint=False))
+    reaches = np.linalg.norm((away * turns[:, None]).real, axis=1)
+    best = int(np.argmax(reaches))
+    return complex(values[largest]), mode * turns[best] / reaches[best]
+
+
+def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Array, float]:
+    """State ξ in the slowest (or growing) mode at one phase, its tip 1 mm off, and its growth rate [1/s]."""
+    value, mode = slowest_mode(loop, k_r, b_d, at)
+    return 1e-3 * mode.real, float(np.log(np.abs(value))) / loop.sampling.period
+
+
+def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
+    """Critical k_r [N/m] for each of some b_d, the least over the phases, shape as `damping`."""
+    loop = SampledLoop(river.still(hand), river.sampling)
+    return np.array([critical_stiffness(loop, float(b_d)).min() for b_d in damping])

@@ -1,0 +1,1 @@
+"""Certificates of a region about a curve: Lyapunov functions checked by interval bounds."""

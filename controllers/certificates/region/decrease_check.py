@@ -1,0 +1,66 @@
+"""Whether a Lyapunov function of `lyapunov` decreases everywhere in a cell of masses and hands, by interval bounds."""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from controllers.certificates.region.intervals import bounds
+from controllers.certificates.region.lyapunov import PARAMETERS, Axis, Cell, Form, decrease
+from controllers.state import Array
+
+
+class Checked(NamedTuple):
+    """Cells on which the decrease was checked, and by how much a corner's matrix may differ from one inside [1/s]."""
+
+    cells: int
+    slack: float
+    least: float
+
+
+def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, int]) -> Checked:
+    """Whether a form decreases everywhere in a cell: `least` is positive, the least eigenvalue on corners less `slack`.
+
+    On each of the cells' parts a matrix differs from what is interpolated between its corners, entry by entry, by at
+    most Σ h_i²/8 sup|∂²/∂z_i²|; the suprema are interval bounds of CasADi's second derivatives over the whole part.
+    What is interpolated between positive definite matrices is positive definite.
+    """
+    z = ca.SX.sym("z", PARAMETERS + 1)
+    a, p = axis.matrix(z), form.matrix(z)
+    edges = [
+        (np.geomspace if i == 0 else np.linspace)(cell.low[i], cell.high[i], counts[i] + 1)
+        if cell.high[i] > cell.low[i] else np.array([cell.low[i]] * 2)
+        for i in range(PARAMETERS)
+    ]  # fmt: skip
+    parts = np.stack(np.meshgrid(*(np.arange(len(edge) - 1) for edge in edges), indexing="ij"), axis=-1)
+    parts = parts.reshape(-1, PARAMETERS)
+    low, high = (np.stack([edges[i][parts[:, i] + k] for i in range(PARAMETERS)], axis=1) for k in (0, 1))
+    # A larger lever only makes the columns of the forces longer: over a part it is taken at its largest.
+    levers = cell.lever(high[:, :1])
+    low, high = np.hstack([low, levers]), np.hstack([high, levers])
+    checked = [
+        _check_parts(decrease(axis, a, axis.pushes(a, z[0], z[PARAMETERS], form.units, early), p, form), z, low, high)
+        for early in (True, False)
+    ]
+    return Checked(len(low), max(slack for slack, _ in checked), min(least for _, least in checked))
+
+
+def _check_parts(rows: list[list[Any]], z: Any, low: Array, high: Array) -> tuple[float, float]:
+    """Largest slack on some parts, and least eigenvalue on corners less slack."""
+    matrix = ca.vertcat(*(ca.horzcat(*row) for row in rows))
+    curvature = np.zeros((len(low), len(rows), len(rows)))
+    for i in range(PARAMETERS):
+        if np.any(high[:, i] > low[:, i]):
+            second = ca.jacobian(ca.jacobian(ca.vec(matrix), z[i]), z[i])
+            ends = bounds(ca.Function("second", [z], [ca.reshape(second, *matrix.shape)]), low, high)
+            curvature += np.maximum(np.abs(ends[0]), np.abs(ends[1])) * (high - low)[:, i, None, None] ** 2 / 8.0
+    slack = np.linalg.norm(curvature, axis=(1, 2))
+    evaluate = ca.Function("matrix", [z], [matrix])
+    least = np.full(len(low), np.inf)
+    moving = np.any(high > low, axis=0)
+    for choice in np.ndindex(*(1 + moving).tolist()):
+        corner = np.where(np.array(choice), high, low)
+        blocks = np.array(evaluate.map(len(corner))(corner.T)).reshape(len(rows), len(corner), len(rows))
+        blocks = blocks.transpose(1, 0, 2)
+        least = np.minimum(least, np.linalg.eigvalsh(0.5 * (blocks + blocks.transpose(0, 2, 1)))[:, 0])
+    return float(slack.max()), float((least - slack).min())

@@ -1,0 +1,309 @@
+r"""A region about the curve from which the loop that runs comes near to it: its Lyapunov certificate.
+
+`lyapunov` finds V and checks its decrease, `tube_bounds` says what the device can do in a tube, `remainder` what the
+frozen axes leave out. With these, on {√V ≤ ℓ},
+
+.. math:: \|x^+\| \le f_\ell(\|x\|), \qquad
+          f_\ell(v) = \sqrt{e^{-2rT} v^2 + T \textstyle\sum_c s_c w_c^2(\ell)} + T\,(r_0(\ell)\,v + \delta(\ell)),
+
+so the set is never left if f_ℓ(ℓ) < ℓ. From it √V falls to a level ℓ' if between neighbours ℓ_i < ℓ_{i+1} of a grid
+f(v) < v at v = ℓ_i, with all that is left out as at ℓ_{i+1}: v − f(v) grows with v.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW, HOLD_LAW, SEEK_LAW
+from controllers.certificates.loop.stability import River
+from controllers.certificates.region.decrease_check import Checked, check_form
+from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, find_form
+from controllers.certificates.region.remainder import Course, Remainder, remainder
+from controllers.certificates.region.tube_bounds import TubeBounds, tube_bounds
+from controllers.certificates.report import CertificateError, Verdict
+from controllers.fields.window import window
+from controllers.state import Array
+
+RADIUS, SPEED = 0.006, 0.25  # [m], [m/s] that a region stays within: beyond, bounds of what is left out grow faster
+SHARES = (0.82, 0.6)  # of the slowest axis' own rate that a form is asked for
+FIRM = 0.2  # share of the hands' intervals that is the firm part: the most mass and damping, the least stiffness
+LEVELS = 40  # of √V between 0 and 1
+HALF = 0.5  # level at which is told what is too much
+PARTS = (160, 8, 4, 1)  # of a cell of hands along μ, b_h, k_h, w
+BACKED_OFF = (0.97, 0.93, 0.85)  # of the rate that was asked for, as the check of the cells needs room
+
+
+class Found(NamedTuple):
+    """A form that was checked, its level ℓ, the level of the ball that is reached, and the remainder at ℓ."""
+
+    form: Form
+    checked: Checked
+    cell: Cell
+    level: float
+    ball: float
+    rest: Remainder
+
+    @property
+    def held_up(self) -> float:
+        """Level at which the forces that are left out would hold √V up by themselves."""
+        return float(np.sqrt(_lifted(self.form, self.rest) / (2.0 * self.form.rate)))
+
+    def offsets(self, axis: Axis) -> tuple[float, float]:
+        """Largest offset at the curve's pace [m] and largest wrong speed on the curve [m/s] that are surely inside."""
+        blocks = np.array([np.diag(self.form.numbers(z)) for z in self.cell.corners(2)]).max(axis=0)
+        inside = max(0.0, self.level - self.rest.shift)
+        both = np.array([self.form.numbers(z)[1:3, 1:3].sum() for z in self.cell.corners(2)]).max()
+        return float(inside * axis.scale[0] / np.sqrt(blocks[0])), float(inside * axis.scale[1] / np.sqrt(both))
+
+
+def _lifted(form: Form, rest: Remainder) -> float:
+    """Σ s_c w_c² [1/s]."""
+    pushes = (rest.newtons, rest.metric)
+    return sum(s * (w / unit) ** 2 for s, w, unit in zip(form.gains, pushes, form.units, strict=True))
+
+
+def _levels(
+    axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, limits: Limits
+) -> tuple[float, float]:
+    """Largest ℓ that is not left, and the level of the ball; zeros if there is none."""
+    grid = np.arange(LEVELS + 1) / LEVELS
+    held, falls = [False], [False]
+    for i in range(1, LEVELS + 1):
+        rest = remainder(axis, form, cell, tube, course, share, float(grid[i]))
+        inside = grid[i] * rest.distance <= limits.distance and grid[i] * rest.force <= limits.force
+        lifted = _lifted(form, rest)
+
+        def after(v: float, rest: Remainder = rest, lifted: float = lifted) -> float:
+            kept = np.sqrt(np.exp(-2.0 * form.rate * axis.period) * v * v + axis.period * lifted)
+            return float(kept + axis.period * (rest.rate * v + rest.drift))
+
+        held.append(inside and np.isfinite(lifted) and after(float(grid[i])) < grid[i])
+        falls.append(held[i] and after(float(grid[i - 1])) < grid[i - 1])
+    if not any(held):
+        return 0.0, 0.0
+    top = max(i for i in range(LEVELS + 1) if held[i])
+    ball = top
+    while falls[ball]:
+        ball -= 1
+    return float(grid[top]), float(grid[ball])
+
+
+def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
+    """The form with the largest of a few rates, and the least of its gains, at which every part of the cell passes."""
+    for share in BACKED_OFF:
+        gains = tuple(gain / share for gain in form.gains)
+        slower = form._replace(rate=share * form.rate, gains=gains)
+        result = check_form(axis, slower, cell, PARTS)
+        if result.least > 0.0:
+            return slower, result
+    return None
+
+
+class Search(NamedTuple):
+    """What came of it: a form whose set is not left, and one whose frozen axes decrease; None where there is none."""
+
+    found: Found | None
+    frozen: Found | None
+
+
+def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
+    """A form for all hands of some intervals at once.
+
+    Parameters
+    ----------
+    river, axis
+        The loop.
+    tube : TubeBounds
+        What the device can do within `RADIUS`.
+    hands : HandRange
+        Their masses come on top of the device's own.
+    ceiling : float
+        The limiter's [N].
+    """
+    frozen: Found | None = None
+    carries = river.law.carries
+    course = Course.of(river.curve, carries)
+    share = float(window((RADIUS / river.width) ** 2)) if carries else 1.0
+    low = np.array([tube.mass_low + hands.mass[0], hands.damping[0], hands.stiffness[0], share])
+    high = np.array([tube.mass_high + hands.mass[1], hands.damping[1], hands.stiffness[1], 1.0])
+    cell = Cell(low, high, tube.mass_high, tube.mass_low)
+    slowest = max(_radius(axis, z) for z in cell.corners())
+    if slowest >= 1.0:
+        return Search(None, None)
+    steady = axis.damping * course.pace * hands.damping[1] / (axis.damping + hands.damping[1])
+    limits = Limits(min(ceiling, tube.motor_force) - steady, RADIUS, SPEED, _expected(axis, cell, tube, course))
+    for part in SHARES:
+        form = find_form(axis, cell, limits, -part * np.log(slowest) / axis.period)
+        passed = None if form is None else _checked(axis, form, cell)
+        if passed is None:
+            continue
+        level, ball = _levels(axis, passed[0], cell, tube, course, share, limits)
+        rest = remainder(axis, passed[0], cell, tube, course, share, level or HALF)
+        if level > 0.0:
+            return Search(Found(*passed, cell, level, ball, rest), Found(*passed, cell, 1.0, 0.0, rest))
+        frozen = frozen or Found(*passed, cell, 1.0, 0.0, rest)
+    return Search(None, frozen)
+
+
+def _radius(axis: Axis, z: Array) -> float:
+    """Spectral radius of an axis."""
+    return float(np.abs(np.linalg.eigvals(axis.numbers(z))).max())
+
+
+def _expected(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple[float, float]:
+    """Forces about as large as those that the axes leave out near the curve [N], [N/√kg]."""
+    shift = axis.damping / cell.low[0] * tube.rounding
+    friction = tube.coulomb + (axis.damping + cell.high[1]) * shift + axis.stiffness * tube.rounding
+    pace = axis.damping / (axis.damping + cell.low[1]) * course.pace
+    momentum = np.sqrt(tube.mass_high) * (pace + 0.5 * SPEED)
+    return friction, float(momentum * (tube.coriolis * pace + tube.drag))
+
+
+def _loosest(axis: Axis, tube: TubeBounds, hands: HandRange) -> HandRange:
+    """Of the corners of some intervals the one hand that comes back the slowest."""
+
+    def radius(hand: tuple[float, float, float]) -> float:
+        masses = (hand[0] + tube.mass_low, hand[0] + tube.mass_high)
+        return max(_radius(axis, np.array([mass, *hand[1:], 1.0])) for mass in masses)
+
+    m, b, k = max(product(hands.mass, hands.damping, hands.stiffness), key=radius)
+    return HandRange((m, m), (b, b), (k, k))
+
+
+def _firm(hands: HandRange) -> HandRange:
+    """The part of some intervals with the most mass and damping and the least stiffness."""
+
+    def upper(low: float, high: float) -> tuple[float, float]:
+        return high - FIRM * (high - low), high
+
+    low, high = hands.stiffness
+    return HandRange(upper(*hands.mass), upper(*hands.damping), (low, low + FIRM * (high - low)))
+
+
+def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
+    """Verdict on a region about the curve that is attracted to a ball about it, for every hand of some intervals.
+
+    Certified: V decreases on all of it in spite of the remainder; the margin is the offset [m] from which a hand that
+    moves at the curve's own pace surely comes near. Refuted where the loop is not even stable along the curve. Where
+    it is unknown because of the loosest hand, the intervals' firm part is tried, and what is certain of it is told.
+
+    Parameters
+    ----------
+    river : River
+        What is certified.
+    hands : HandRange
+        Intervals of mass, damping, and stiffness about the nearest point.
+    ceiling : float
+        The limiter's [N].
+    linear : Verdict
+        On its stability.
+    """
+    if linear.verdict == "refuted":
+        reason = "no region: the loop is unstable on the curve itself"
+        return Verdict("refuted", reason, -1.0, (), linear.counterexample)
+    if river.law not in (FOLLOW_LAW, SEEK_LAW, HOLD_LAW):
+        return Verdict("unknown", "a region is sought only about curves whose nearest point attracts, and points")
+    if river.sampling.rest_delay > 0.0 or river.k_r <= 0.0 or river.b_d <= 0.0:
+        return Verdict("unknown", "a region needs a stiffness, a damping, and a delay of whole periods")
+    if min(0.4 * river.curve.reach, 0.8 * river.width) < RADIUS:
+        return Verdict("unknown", f"a region needs {1e3 * RADIUS:g} mm about the curve, too much for its bends or tube")
+    sampling = river.sampling
+    axis = Axis(river.k_r, river.b_d, sampling.period, sampling.keep, sampling.whole_delay, river.law.slides)
+    try:
+        tube = tube_bounds(river.device, river.curve, RADIUS)
+    except CertificateError as error:
+        return Verdict("unknown", str(error))
+    loosest = _loosest(axis, tube, hands)
+    alone = search(river, axis, tube, loosest, ceiling)
+    tried = alone if alone.found is None or hands == loosest else search(river, axis, tube, hands, ceiling)
+    if tried.found is not None:
+        figures = _figures(axis, tried.found)
+        return Verdict("certified", _told(axis, tried.found), tried.found.offsets(axis)[0], ASSUMPTIONS, {}, figures)
+    reason = _why(alone.frozen, loosest) if alone.found is None else "no one Lyapunov function suits all these hands"
+    firm = _firm(hands)
+    part = Search(None, None) if hands == loosest else search(river, axis, tube, firm, ceiling)
+    if part.found is None:
+        return Verdict("unknown", f"{reason}; narrow their intervals", None, ASSUMPTIONS)
+    figures = _figures(axis, part.found) | {"firm_hands": firm}
+    reason = f"{reason}. Certain for {_named(firm)}: {_told(axis, part.found)}"
+    return Verdict("unknown", reason, None, ASSUMPTIONS, {}, figures)
+
+
+def _told(axis: Axis, found: Found) -> str:
+    offset, wrong = found.offsets(axis)
+    return (
+        f"from {1e3 * offset:.3g} mm off the curve, or {wrong:.3g} m/s from its pace, the hand comes within "
+        f"{1e3 * found.rest.distance * found.ball:.3g} mm and stays there"
+    )
+
+
+def _named(hands: HandRange) -> str:
+    """Intervals as text; one number where they are points."""
+    intervals = ((hands.mass, "kg"), (hands.damping, "N s/m"), (hands.stiffness, "N/m"))
+    return "hands of " + ", ".join(
+        f"{low:.3g}{f' to {high:.3g}' if high > low else ''} {unit}" for (low, high), unit in intervals
+    )
+
+
+def _why(frozen: Found | None, loosest: HandRange) -> str:
+    """Why one hand alone has no certain region."""
+    if frozen is None:
+        return f"no Lyapunov function was found for {_named(loosest)} alone"
+    return (
+        f"with {_named(loosest)} alone V falls at {frozen.form.rate:.3g}/s with the inertia frozen, but half way in "
+        f"what that leaves out may take {frozen.rest.rate:.3g}/s, push by {frozen.rest.drift:.3g}/s, and with "
+        f"{frozen.rest.newtons:.2g} N hold it at {frozen.held_up:.2g} of its edge: too much to be certain"
+    )
+
+
+ASSUMPTIONS = (
+    "the linkage as modelled, with Coulomb friction, rounding encoders and its own nonlinearity in the whole tube",
+    "a hand of constant mass, damping and stiffness about the curve's nearest point, anywhere in the intervals",
+    "a limiter that lets the region's forces through: motors not yet warm, no jump from rest above its rate",
+    "pace, curvature and window of the curve are taken from a fine grid; terms of second order in the period by 5 %",
+    "rounding errors of what is not interval arithmetic, eigenvalues among it, are not bounded",
+)
+
+
+def _figures(axis: Axis, found: Found) -> dict[str, object]:
+    offset, speed = found.offsets(axis)
+    return {
+        "distance": offset,
+        "speed": speed,
+        "ball": found.rest.distance * found.ball,
+        "largest_distance": found.rest.distance * found.level,
+        "largest_force": found.rest.force * found.level,
+        "rate": float(found.form.rate),
+        "remainder_rate": found.rest.rate,
+        "remainder_drift": found.rest.drift,
+        "remainder_force": found.rest.newtons,
+        "held_up": found.held_up,
+        "level": found.level,
+        "ball_level": found.ball,
+        "shift": found.rest.shift,
+        "cells": float(found.checked.cells),
+        "cell_slack": found.checked.slack,
+        "cell_least": found.checked.least,
+        "scale": axis.scale,
+        "alpha": found.form.alpha,
+        "beta": found.form.beta,
+        "hand": found.form.hand,
+        "masses": np.array([found.cell.low[0], found.cell.high[0]]),
+        "ellipse": _ellipses(axis, found),
+    }
+
+
+def _ellipses(axis: Axis, found: Found) -> Array:
+    """Edges of region and ball over (e [m], ν = y [m/s]), for the lightest and the heaviest mass, (2, 2, n, 2)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    spread = np.zeros((axis.size, 2))
+    spread[0, 0] = spread[1, 1] = spread[2, 1] = 1.0
+    edges: list[list[Array]] = []
+    for z in (found.cell.low, found.cell.high):
+        lower = np.linalg.cholesky(spread.T @ found.form.numbers(z) @ spread)
+        edge = np.linalg.solve(lower.T, circle) * axis.scale[:2, None]
+        edges.append([(level * edge).T for level in (max(0.0, found.level - found.rest.shift), found.ball)])
+    return np.array(edges)

@@ -1,0 +1,180 @@
+r"""What the frozen axes of `lyapunov` leave out, as rates and forces: an input-to-state estimate of the whole loop.
+
+With ‖x‖ = √V ≤ ℓ, the loop that runs obeys
+
+.. math:: \|x^+\| \le \sqrt{e^{-2rT} \|x\|^2 + T \textstyle\sum_c s_c w_c^2} + T\,(r_0 \|x\| + \delta)
+
+r is the form's rate and s_c what it allows for forces w_c; r_0 is what the nonlinearity takes of the rate, δ what does
+not vanish on the curve and is no force. All of them grow with ℓ.
+Every term is the largest it can be in the tube, with the form's worst mass and hand. Terms of second order in T are
+made good by `SAFE`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.region.lyapunov import Axis, Cell, Form
+from controllers.certificates.region.tube_bounds import TubeBounds
+from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
+
+SAFE = 1.05
+DENSE = 120  # masses at which what is not convex in the mass is evaluated
+
+
+class Course(NamedTuple):
+    """The curve as the loop knows it: pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
+
+    A law that does not carry the hand has no pace.
+    """
+
+    pace: float
+    slowest: float
+    curvature: float
+    acceleration: float
+    cosine: float
+
+    @staticmethod
+    def of(curve: Trajectory, carries: bool, n: int = 4000) -> "Course":
+        """On a grid so fine that a spline does not hide anything between its points."""
+        phases = np.linspace(curve.start, curve.end, n)
+        velocity, acceleration = curve.velocity(phases), curve.acceleration(phases)
+        speed, size = np.linalg.norm(velocity, axis=1), np.linalg.norm(acceleration, axis=1)
+        cosine = np.abs(np.einsum("ni,ni->n", velocity, acceleration)) / np.maximum(speed * size, 1e-300)
+        bend = size * np.sqrt(np.maximum(0.0, 1.0 - cosine**2)) / speed**2
+        moving = 1.01 * carries
+        return Course(
+            moving * float(speed.max()), float(speed.min()), 1.01 * float(bend.max()), moving * float(size.max()),
+            float(cosine.max()),
+        )  # fmt: skip
+
+
+class Remainder(NamedTuple):
+    """Bounds on a level set, and what √V = 1 is worth.
+
+    Attributes
+    ----------
+    rate, drift : float
+        r_0 and δ [1/s].
+    newtons, metric : float
+        Forces w: [N], and [N/√kg] in the metric of the device's own mass.
+    shift : float
+        How far the encoders' rounding shifts a state, in √V.
+    distance, speed, force : float
+        Largest |e| [m], |ν| [m/s] and force of the law [N] on √V = 1.
+    """
+
+    rate: float
+    drift: float
+    newtons: float
+    metric: float
+    shift: float
+    distance: float
+    speed: float
+    force: float
+
+
+def remainder(
+    axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, level: float
+) -> Remainder:
+    """Bounds of the remainder on {√V ≤ level} for one cell of hands.
+
+    Parameters
+    ----------
+    axis, form, cell
+        The loop, its form and the hands.
+    tube : TubeBounds
+        Of the device, in a tube that holds the level set.
+    course : Course
+        Of the curve.
+    share : float
+        Least w of the window in the tube.
+    level : float
+        ℓ, at most 1.
+    """
+    t, n, k, b, scale = axis.period, axis.size, axis.stiffness, axis.damping, axis.scale
+    forms = np.array([form.numbers(z) for z in cell.corners(2)])
+    inverses: Array = np.asarray(np.linalg.inv(forms), dtype=np.float64)
+
+    def reach(row: Array) -> float:
+        """Largest value of a row on ‖x‖ ≤ 1; P⁻¹ is convex in z, so a corner has it."""
+        return float(np.sqrt(np.einsum("i,nij,j->n", row, inverses, row).max()))
+
+    def rows(*numbers: float) -> Array:
+        return np.array([*numbers, *np.zeros(n - len(numbers))]) * scale
+
+    e, v, y = (reach(rows(*np.eye(3)[i])) for i in range(3))
+    force = max(reach(rows(k, 0.0, b)), reach(np.eye(n)[-1] * scale) if axis.delay else 0.0)
+    spring, viscous = cell.high[2], cell.high[1]
+    total = reach(rows(k + spring, viscous, b))
+    pace_share, slow_share = b / (b + cell.low[1]), b / (b + viscous)
+    pace = pace_share * course.pace
+    swing = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
+    speed = pace + swing * v * level
+    near = course.curvature * e * level
+    if near >= 0.7:
+        return Remainder(np.inf, np.inf, np.inf, np.inf, np.inf, e, v, force)
+    bend = course.curvature / (1.0 - near)
+
+    # What is not convex in μ, on a dense grid of masses with the corners of the rest.
+    z = cell.corners(DENSE)
+    dense = np.array([form.numbers(row) for row in z])
+    back = np.linalg.inv(dense)
+    lever = cell.lever(z[:, 0])
+    motion = float((lever * np.sqrt(back[:, 1, 1])).max()) * scale[1] * swing * level
+    swap = np.linalg.eigh(form.beta)
+    size = (swap[1] * np.abs(swap[0])) @ swap[1].T
+    roots = np.linalg.cholesky(back)
+    drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * lever**2
+    blocks = np.sqrt(np.einsum("nii->ni", dense)) / scale
+    shift = b / z[:, 0] * tube.rounding
+    late = (1 + axis.delay) * t * speed
+
+    newtons = (
+        tube.jacobian_slope * late * (force * level + b * course.pace * (1.0 - slow_share))
+        + tube.weight_slope * late
+        + (1.0 - share) * b * course.pace
+        + tube.coulomb
+        + (b + viscous) * float(shift.max()) + (k + tube.mass_slope * speed * b) * tube.rounding
+        + axis.slides * 0.5 * t * spring * v * swing * level
+    )  # fmt: skip
+    metric = (
+        tube.drag * (motion + np.sqrt(tube.mass_high) * pace)
+        + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
+        + tube.mass_slope * t * speed * float((lever / z[:, 0]).max()) * total * level
+    )
+    slowest = _least(forms, 2, scale)
+    rate = 0.5 * tube.mass_slope * float(drifts.max()) * speed
+    rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * swing) / slowest * speed
+    drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
+    if axis.slides:
+        row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(n - 3)])
+        turn = float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
+        part = forms[:, 0].copy()
+        part[:, 0] = 0.0
+        spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
+        cross = 0.5 * spread / scale[0] ** 2 * e
+        cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
+        again = 0.5 * bend * bend / max(course.curvature, 1e-9)
+        rate += bend * (pace * e + swing * _pair(inverses, scale, e, v) * level) * cross
+        rate += (bend + again) * v * swing * t * speed * cross
+        rate += 0.5 * course.acceleration * pace_share / course.slowest * (v * turn + course.cosine)
+        drift += pace_share**2 * course.acceleration * turn
+        drift += again * t * speed * pace * cross
+    return Remainder(
+        rate=SAFE * rate, drift=SAFE * drift, newtons=SAFE * newtons, metric=SAFE * metric,
+        shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
+    )  # fmt: skip
+
+
+def _least(forms: Array, i: int, scale: Array) -> float:
+    """1/√p_ii at its largest, in SI."""
+    return float(scale[i] / np.sqrt(forms[:, i, i].max()))
+
+
+def _pair(inverses: Array, scale: Array, e: float, v: float) -> float:
+    """Largest |e| |ν| on ‖x‖ ≤ 1, by ½(σ|e|² + |ν|²/σ)."""
+    weight = np.diag([0.5 * v / e * scale[0] ** 2, 0.5 * e / v * scale[1] ** 2])
+    roots = np.linalg.cholesky(inverses[:, :2, :2])
+    return float(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ weight @ roots)[:, -1].max())

@@ -1,0 +1,149 @@
+r"""What the device can do anywhere in a tube about a curve: bounds by interval arithmetic on boxes that cover it.
+
+M = L Lᵀ is the linkage's mass matrix, J its Jacobian, Λ = J⁻ᵀ M J⁻¹ its mass at the tip. How fast a quantity changes is
+told per metre of the tip's motion; in the metric of Λ (matrices X as Λ^{-1/2} X Λ^{-1/2}, forces as Λ^{-1/2} f) where
+that is said, since there heavy and light directions count alike.
+"""
+
+import itertools
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from controllers.certificates.loop.device import Device, matrix, vector
+from controllers.certificates.region.intervals import bounds, spectral_bound
+from controllers.certificates.report import CertificateError
+from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
+
+SEGMENTS = 48  # of the curve
+PARTS = 8  # of a segment's box along each joint
+
+
+class TubeBounds(NamedTuple):
+    """Bounds over a tube.
+
+    Attributes
+    ----------
+    mass_low, mass_high : float
+        Eigenvalues of Λ [kg].
+    mass_slope, jacobian_slope, coriolis : float
+        [1/m]: of Λ in its metric; of J, as ∂J J⁻¹; and of Coriolis' force in the metric, by |Λ^{1/2} v| |v|.
+    weight_slope : float
+        Of the weight at the tip [N/m].
+    drag : float
+        Viscous friction in the metric [1/s].
+    coulomb, coulomb_metric : float
+        Coulomb friction at the tip [N], and in the metric [N/√kg].
+    rounding : float
+        How far the encoders' rounding moves the tip [m].
+    motor_force : float
+        Force that the motors give in any direction, the weight carried [N].
+    boxes : int
+        That cover the tube.
+    """
+
+    mass_low: float
+    mass_high: float
+    mass_slope: float
+    jacobian_slope: float
+    coriolis: float
+    weight_slope: float
+    drag: float
+    coulomb: float
+    coulomb_metric: float
+    rounding: float
+    motor_force: float
+    boxes: int
+
+
+def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
+    """Bounds within some radius [m] of a curve.
+
+    Raises
+    ------
+    CertificateError
+        If the tube comes so near to a singular configuration that its boxes hold one.
+    """
+    theta = ca.SX.sym("theta", 3)
+    jacobian, mass = matrix(device.jacobian(theta)), matrix(device.mass(theta))
+    back, lower = ca.inv(jacobian), _cholesky(mass)
+    unit = ca.inv(lower)
+    low, high = _boxes(device, curve, radius, ca.Function("back", [theta], [back]))
+
+    def sup(expression: Any) -> float:
+        return float(spectral_bound(*bounds(ca.Function("f", [theta], [expression]), low, high)).max())
+
+    def magnitude(expression: Any) -> Array:
+        ends = bounds(ca.Function("f", [theta], [expression]), low, high)
+        return np.maximum(np.abs(ends[0]), np.abs(ends[1]))
+
+    def slope(parts: list[Any]) -> float:
+        """Of Σ X_i θ̇_i per metre: the Frobenius norm bounds the spectral one."""
+        return sup(ca.horzcat(*(ca.vec(part) for part in parts)) @ back)
+
+    turns = [ca.reshape(ca.jacobian(ca.vec(jacobian), theta[i]), 3, 3) for i in range(3)]
+    masses = [ca.reshape(ca.jacobian(ca.vec(mass), theta[i]), 3, 3) for i in range(3)]
+    by_mass: list[Any] = []
+    by_coriolis: list[Any] = []
+    for i in range(3):
+        side = unit @ (back @ turns[i]).T @ lower
+        by_mass.append(unit @ masses[i] @ unit.T - side - side.T)
+        axis = [float(i == j) for j in range(3)]
+        by_coriolis.append((unit @ matrix(device.coriolis(theta, axis)) - lower.T @ back @ turns[i]) @ unit.T)
+    tip = jacobian @ unit.T
+    mobility = bounds(ca.Function("f", [theta], [tip @ tip.T]), low, high)
+    middle, spread = 0.5 * (mobility[0] + mobility[1]), 0.5 * (mobility[1] - mobility[0])
+    eigenvalues, loose = np.linalg.eigvalsh(middle), np.linalg.norm(spread, axis=(1, 2))
+    if np.any(eigenvalues[:, 0] <= loose):
+        raise CertificateError("the tube comes too near to a singular configuration of the arm")
+    weight, levers = magnitude(vector(device.gravity(theta)))[:, :, 0], magnitude(jacobian)
+    room = np.array(device.peak_torque) - weight.max(axis=0)
+    friction = np.array(device.coulomb)
+    return TubeBounds(
+        mass_low=float(1.0 / (eigenvalues[:, -1] + loose).max()),
+        mass_high=float(1.0 / (eigenvalues[:, 0] - loose).min()),
+        mass_slope=slope(by_mass),
+        jacobian_slope=slope([turn @ back for turn in turns]),
+        coriolis=slope(by_coriolis),
+        weight_slope=sup(back.T @ ca.jacobian(vector(device.gravity(theta)), theta) @ back),
+        drag=sup(unit @ ca.diag(ca.DM(device.viscous)) @ unit.T),
+        coulomb=float(np.linalg.norm(magnitude(back.T) @ friction, axis=1).max()),
+        coulomb_metric=float(np.linalg.norm(magnitude(unit) @ friction, axis=1).max()),
+        rounding=float(np.linalg.norm(levers @ (0.5 * np.array(device.encoder_step)), axis=1).max()),
+        motor_force=float((room / np.linalg.norm(levers, axis=1).max(axis=0)).min()),
+        boxes=len(low),
+    )
+
+
+def _cholesky(m: Any) -> Any:
+    """L with L Lᵀ = M, 3 × 3."""
+    a = ca.sqrt(m[0, 0])
+    b, c = m[1, 0] / a, m[2, 0] / a
+    d = ca.sqrt(m[1, 1] - b * b)
+    e = (m[2, 1] - b * c) / d
+    return matrix([[a, 0.0, 0.0], [b, d, 0.0], [c, e, ca.sqrt(m[2, 2] - c * c - e * e)]])
+
+
+def _boxes(device: Device, curve: Trajectory, radius: float, back: Any) -> tuple[Array, Array]:
+    """Boxes of θ that hold the tube, shape (n, 3) each: about each segment's middle, then cut in parts.
+
+    A straight way from the middle stays in the box while the joints' rates on it, at most the rows of J⁻¹ over the
+    box, do: that is checked.
+    """
+    phases = curve.start + curve.duration * (np.arange(SEGMENTS) + 0.5) / SEGMENTS
+    fine = curve.velocity(np.linspace(curve.start, curve.end, 16 * SEGMENTS))
+    reach = radius + 0.51 * curve.duration / SEGMENTS * float(np.linalg.norm(fine, axis=1).max())
+    middles = np.array([device.angles(point) for point in curve.point(phases)])
+    rows = np.linalg.norm(bounds(back, middles, middles)[1], axis=2)
+    cuts = np.array(list(itertools.product(range(PARTS), repeat=3)))
+    for room in (1.1, 1.3, 1.6):
+        half = room * rows * reach
+        corner = (middles - half)[:, None] + 2.0 * half[:, None] * cuts / PARTS
+        low, high = corner.reshape(-1, 3), (corner + 2.0 * half[:, None] / PARTS).reshape(-1, 3)
+        ends = bounds(back, low, high)
+        needed = np.linalg.norm(np.maximum(np.abs(ends[0]), np.abs(ends[1])), axis=2) * reach
+        if np.all(needed.reshape(SEGMENTS, -1, 3).max(axis=1) <= half):
+            return low, high
+    raise CertificateError("the tube comes too near to a singular configuration of the arm")

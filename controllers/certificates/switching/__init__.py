@@ -1,0 +1,1 @@
+"""Certificates of crossing rivers: who keeps the hand, and how often that can change."""

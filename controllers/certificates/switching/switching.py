@@ -1,0 +1,302 @@
+r"""Switching of crossing rivers: when a river keeps the hand that it has, and how fast rivers can change at all.
+
+On river i, with its loop linear across the curve, the hand is off by at most D and its measured velocity by at most E,
+
+.. math:: D = G_d U, \qquad E = G_e U + \nu, \qquad
+          U = U_{max} + U_0 + U_q + (k D + b E)(1 - w(D/\varepsilon))
+
+with G the peak gains of the sampled loop, one multiple Lyapunov function a river in the norm of what matters; U_max the
+hand's force, U_0 inertia and friction, U_q what the rounding of the encoders makes of the law, and ν what it makes of
+the measured velocity. So the mismatch of `HigherOrder` obeys s_i² ≤ S² = E² + g_i(D) with g = −2σ² ln w, as long as the
+river has the hand. A rival's forgiveness takes at most what e has across its tangent, so
+
+.. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E)^2 + g_j(d_j - D)
+
+The discrete field keeps the hand if S < r + h and S < h + s_j: it never changes, and the dwell time is infinite.
+
+Dwell time: between two opposite changes of rivers s_j − s_i moves by 2 h, and from admission to release s_i by h. m is
+the distance of (e, 0) from the line along (Y, |φ̇|), so |Δm| ≤ |Δe| + |e| |ΔY|/|φ̇|; and √g is Lipschitz in d. With
+`hysteresis_dwell` that bounds the dwell time from below wherever the hand is near the curves.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from controllers.certificates.loop.energy import own_force, peak_gain
+from controllers.certificates.loop.linear_loop import LinearLoop
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.stability import River
+from controllers.certificates.report import Verdict
+from controllers.certificates.switching.common_lyapunov import Common
+from controllers.curves.closest_point import closest_phases
+from controllers.fields.window import window
+from controllers.state import Array
+
+CORE = 0.1  # of a tube's radius, within which the hysteresis bounds the dwell time
+_RISE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))  # steepest ε/σ · d√g/dd in the core
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """How rivers share the hand: the numbers of `HigherOrder`.
+
+    Parameters
+    ----------
+    admission, sigma, hysteresis : float
+        r, σ, h [m/s].
+    form : {"smooth", "discrete"}
+        As there.
+    """
+
+    admission: float
+    sigma: float
+    hysteresis: float
+    form: Literal["smooth", "discrete"]
+
+    def cost(self, distance: float, width: float) -> float:
+        """What a place costs, g(d) = −2σ² ln w(d/ε) [m²/s²]; infinite outside the tube."""
+        w = float(window((distance / width) ** 2))
+        return -2.0 * self.sigma**2 * math.log(w) if w > 0.0 else math.inf
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A river seen from another one, at phases of that where it is near.
+
+    Attributes
+    ----------
+    distance : Array, shape (n,)
+        Of the curves [m].
+    least : Array, shape (n,)
+        |φ̇_i · u_j − |φ̇_j||, the mismatch with all that forgiveness takes [m/s].
+    angle : Array, shape (n,)
+        Between the curves [rad].
+    width : float
+        ε_j [m].
+    """
+
+    distance: Array
+    least: Array
+    angle: Array
+    width: float
+
+
+def rival(held: River, other: River) -> Rival:
+    """How another river looks along one, at its phases."""
+    points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
+    phases, distance = closest_phases(other.curve.packed(), points)
+    theirs = other.curve.velocity(phases)
+    speed = np.linalg.norm(theirs, axis=1)
+    along = np.einsum("ni,ni->n", velocity, theirs) / speed
+    return Rival(
+        distance=distance, least=np.abs(along - speed), width=other.width,
+        angle=np.arccos(np.clip(along / np.linalg.norm(velocity, axis=1), -1.0, 1.0)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How far a force brings the hand from the state in which its river carries it.
+
+    Attributes
+    ----------
+    distance, speed : float
+        D [m] and E [m/s]; infinite if there is no bound.
+    score : float
+        S [m/s].
+    room : float
+        Least of r + h − S and h + s_j − S [m/s].
+    """
+
+    distance: float
+    speed: float
+    score: float
+    room: float
+
+
+@dataclass(frozen=True, eq=False)
+class Keeping:
+    """One river of a bundle, the others as rivals, and what a force does to the hand that it has."""
+
+    held: River
+    others: tuple[River, ...]
+    sharing: Sharing
+
+    @cached_property
+    def rivals(self) -> tuple[Rival, ...]:
+        """The others along this one."""
+        return tuple(rival(self.held, other) for other in self.others)
+
+    @cached_property
+    def _still(self) -> LinearLoop:
+        return self.held.still()
+
+    @cached_property
+    def reading(self) -> float:
+        """Largest error of the tip's place by rounding [m]."""
+        half = 0.5 * np.array(self.held.device.encoder_step)
+        return float(np.linalg.norm(np.abs(self._still.jacobian) @ half, axis=1).max())
+
+    @property
+    def noise(self) -> float:
+        """ν [m/s]: the filter's response to rounding by half a step and back, its sum of |impulse response|."""
+        sampling = self.held.sampling
+        return 2.0 * (1.0 - sampling.keep) / sampling.period * self.reading
+
+    @cached_property
+    def _gains(self) -> tuple[float, float, float]:
+        """G_d [m/N], G_e [m/(N s)], U_0 + U_q [N]."""
+        river = self.held
+        loop = SampledLoop(self._still, river.sampling)
+        own = float(own_force(river, river.moving()).max()) + river.k_r * self.reading + river.b_d * self.noise
+        return peak_gain(loop, river.k_r, river.b_d).distance, _speed_gain(loop, river), own
+
+    def bounds(self, push: float) -> Bounds:
+        """D, E and S for |U| ≤ push [N], the least solution, reached from the curve."""
+        river, sharing = self.held, self.sharing
+        by_force, by_speed, own = self._gains
+        lost = Bounds(math.inf, math.inf, math.inf, -math.inf)
+        distance = speed = 0.0
+        for _ in range(2000):
+            if not (math.isfinite(distance + speed) and distance < river.width):
+                return lost
+            share = float(window((distance / river.width) ** 2))
+            own_law = river.k_r * distance + river.b_d * speed
+            force = push + own + own_law * (1.0 - share)
+            after = by_force * force, by_speed * force + self.noise
+            if abs(after[0] - distance) < 1e-12 and abs(after[1] - speed) < 1e-12:
+                break
+            distance, speed = after
+        else:
+            return lost
+        score = math.sqrt(speed**2 + sharing.cost(distance, river.width))
+        return Bounds(distance, speed, score, self._room(distance, speed, score))
+
+    def _room(self, distance: float, speed: float, score: float) -> float:
+        """How far S is from what lets the hand go [m/s]."""
+        least = self.sharing.admission + self.sharing.hysteresis - score
+        for other in self.rivals:
+            inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
+            near = inside > 0.0
+            place = -6.0 * self.sharing.sigma**2 * np.log(inside[near])
+            theirs = np.sqrt(np.maximum(0.0, other.least[near] - speed) ** 2 + place)
+            least = min(least, float(np.min(self.sharing.hysteresis + theirs - score, initial=math.inf)))
+        return least
+
+    def allowed(self, ceiling: float) -> float:
+        """Largest force [N] up to a ceiling with which the river keeps the hand; negative if it may lose it anyway."""
+        if self.bounds(0.0).room <= 0.0:
+            return -1.0
+        low, high = 0.0, ceiling
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.bounds(middle).room > 0.0 else (low, middle)
+        return low
+
+
+def _speed_gain(loop: SampledLoop, river: River) -> float:
+    """Peak gain [m/(N s)] from a force to the measured velocity's error."""
+    maps = loop.frozen(river.k_r, river.b_d)
+    if np.abs(np.linalg.eigvals(maps)).max() >= 1.0:
+        return math.inf
+    basis, projection = loop.across
+    force = projection @ loop.push
+    row, gain = loop.measured_velocity @ basis, np.zeros(len(maps))
+    for _ in range(200_000):
+        part = np.linalg.norm(row @ force, ord=2, axis=(1, 2))
+        gain += part
+        if np.all(part < 1e-9 * gain):
+            break
+        row = row @ maps
+    return float(gain.max())
+
+
+def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
+    r"""Lower bound [s] of the time between two changes, within `CORE` of a tube's radius of the curves.
+
+    .. math:: \tau_d = \frac{h - 2 (\nu + c\,\delta)}{a + c\,|e|}, \qquad
+              c = \frac{|e|}{\tau |\dot\varphi|} + \kappa\frac{\sigma}{\varepsilon}, \qquad
+              |e| \le (r + h)\sqrt{1 + (d/\tau|\dot\varphi|)^2}
+
+    with a the largest acceleration, (U + f_c + k d + b |e|) over the least inertia felt at the tip, |e| also the
+    greatest speed across, κ the steepest rise of √g in the core, ν and δ what rounding makes of velocity and place.
+    A wider h admits faster hands, so that the bound does not grow without end. It is never below a period,
+    since the field is told once a period; where h ≤ 2ν that is all that can be said.
+    """
+    longest, period = math.inf, keepings[0].held.sampling.period
+    for keeping in keepings:
+        river, sharing = keeping.held, keeping.sharing
+        linear = river.still()
+        inertia = np.linalg.eigvalsh(linear.jacobian @ np.linalg.inv(linear.mass) @ linear.jacobian.transpose(0, 2, 1))
+        speeds = np.linalg.norm(river.curve.velocity(river.phases()), axis=1)
+        drawn = CORE * river.width * river.k_r / river.b_d
+        off = (sharing.admission + sharing.hysteresis) * math.sqrt(1.0 + (drawn / speeds.min()) ** 2)
+        joints = np.linalg.norm(np.linalg.inv(linear.jacobian), 2, axis=(1, 2)).max()
+        friction = float(joints * np.linalg.norm(river.device.coulomb))
+        force = push + friction + river.k_r * CORE * river.width + river.b_d * off
+        by_place = off * river.k_r / river.b_d / float(speeds.min()) + _RISE * sharing.sigma / river.width
+        rounding = keeping.noise + by_place * keeping.reading
+        rate = float(inertia.max()) * force + by_place * off
+        longest = min(longest, max(0.0, sharing.hysteresis - 2.0 * rounding) / rate)
+    return max(period, longest)
+
+
+def switching(
+    keepings: Sequence[Keeping], push: float, ceiling: float, found: Mapping[str, object], common: Common | None
+) -> Verdict:
+    """Verdict on the switching of a bundle's rivers, for hands that push with at most `push` newtons.
+
+    Certified: every river keeps the hand that it has, so that the field never changes. Refuted: with what a search has
+    found. The margin is how much more the hand might push [N].
+
+    Parameters
+    ----------
+    keepings : sequence of Keeping
+        A river each.
+    push, ceiling : float
+        U_max, and the largest force that is looked at [N].
+    found : mapping
+        Counterexample; empty if there is none.
+    common : Common, optional
+        Common Lyapunov function of the rivers and of none, for a hand that holds the stylus where rivers meet.
+    """
+    sharing = keepings[0].sharing
+    allowed = min((keeping.allowed(ceiling) for keeping in keepings), default=-1.0)
+    bounds = [keeping.bounds(push) for keeping in keepings]
+    rivals = [other for keeping in keepings for other in keeping.rivals]
+    least = min((float(r.least[r.distance < 2.0 * r.width].min(initial=math.inf)) for r in rivals), default=math.inf)
+    figures: dict[str, object] = {
+        "push_allowed": allowed,
+        "score_bound": max(bound.score for bound in bounds),
+        "distance_bound": max(bound.distance for bound in bounds),
+        "velocity_noise": max(keeping.noise for keeping in keepings),
+        "hysteresis": sharing.hysteresis,
+        "hysteresis_dwell": hysteresis_dwell(keepings, push),
+        "least_mismatch": least,
+        "rival_weight": math.exp(-0.5 * (least / sharing.sigma) ** 2),
+        "common_rate": None if common is None else common.rate,
+        "common_p": None if common is None else common.p,
+    }
+    assumptions = (
+        "the loop is linear across the curve; kinematics and inertia off the curve are those on it",
+        "the hand begins where its river carries it; its force is bounded and has no impedance",
+        "phases: a grid of the curves; forces below the limiter's",
+    )
+    if found:
+        said = f"a hand {found['kind']} at {found['time']:.3g} s, pushed with {found['force']} N"
+        return Verdict("refuted", said, -push, assumptions, found, figures)
+    if sharing.form == "discrete" and allowed > push:
+        said = f"|U| ≤ {push:g} N never changes the river (up to {allowed:.3g} N): the dwell time is infinite"
+        return Verdict("certified", said, allowed - push, assumptions, {}, figures)
+    said = (
+        f"the bounds let a hand go that pushes with {push:g} N, and a search found none that is lost"
+        if sharing.form == "discrete"
+        else "smooth weights have no hysteresis and so no dwell time, and a search found no hand that is lost"
+    )
+    said += f"; a rival weighs up to {figures['rival_weight']:.2g}"
+    return Verdict("unknown", said, None, assumptions, {}, figures)

@@ -1,0 +1,255 @@
+r"""Arrangement of curves round the z axis: sites (r_i(θ), z_i(θ)) in a rectangle, optimised all together.
+
+.. math:: E = \sum_{i<j} \Bigl\langle w\, \frac{(D_{ij} - T_{ij})^2}{\bar T^2}
+          + \Bigl(1 - \frac{D_{ij}}{S_{ij}}\Bigr)_+^2 + v\, |q_i' - q_j'|^2 \Bigr\rangle
+          + \sum_i \langle |q_i''|^2 + limits \rangle
+
+D is the distance of two sites at an angle, T = κ d the distance of the two poses there brought to the size of the
+rectangle (multidimensional scaling, but at every angle and smooth in it): moving the hand by a
+millimetre then changes the figure as much in one place as in another, which is what a well-conditioned h_* asks. At a
+transition T falls to the approach, and v makes the curves parallel; elsewhere S keeps them apart. Limits are those of
+speed and acceleration. Sites are periodic cubic B-splines whose
+control points lie in the rectangle, hence so do they.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.sparse import csr_array
+
+from controllers.haptic_map.lifting.layouts import on_lattice, scaled
+from controllers.haptic_map.lifting.room import Rectangle
+from controllers.haptic_map.lifting.transitions import Transition
+from controllers.state import Array
+
+ROWS = 64  # control points round the lap
+_PER_ROW = 3
+SAMPLES = ROWS * _PER_ROW  # angles at which the energy is taken
+WINDOW = 0.9  # [rad] from a transition within which two curves may be nearer than the separation
+_FILL = 0.8  # of the rectangle's diagonal, that the most different motions are apart
+_STEEP = 0.2  # of the distance that their poses ask for, that curves approach to at a transition
+_SEPARATION, _APPROACH, _TANGENT, _BEND, _LIMIT = 40.0, 250.0, 0.7, 0.015, 40.0  # weights
+_LENGTH = 0.02  # [m] in which slopes and bends are counted
+_MARGIN = 1.1  # on the separation and the limits, for what lies between the samples
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be arranged.
+
+    Attributes
+    ----------
+    rectangle : Rectangle
+    separation : float
+        Least distance of two curves away from their transitions [m].
+    approach : float
+        What they approach to at a transition of equal poses [m].
+    speed, acceleration : float
+        Of the hand along a curve, at most [m/s, m/s²].
+    distance : Array, shape (SAMPLES, n, n)
+        Between poses [m].
+    transitions : list of Transition
+    rate, change : Array, shape (SAMPLES, n)
+        θ̇ and θ̈ of each clip at its own pace [rad/s, rad/s²].
+    """
+
+    rectangle: Rectangle
+    separation: float
+    approach: float
+    speed: float
+    acceleration: float
+    distance: Array
+    transitions: list[Transition]
+    rate: Array
+    change: Array
+
+    @property
+    def scale(self) -> float:
+        """κ: distance in the rectangle over distance of poses."""
+        size = float(np.linalg.norm(self.rectangle.high - self.rectangle.low))
+        return _FILL * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
+
+    def targets(self) -> tuple[Array, Array, Array]:
+        """T, S and w of the energy, each of shape (SAMPLES, n, n)."""
+        wanted = np.maximum(self.scale * self.distance, _MARGIN * self.separation)
+        least = np.full(wanted.shape, _MARGIN * self.separation)
+        weight = np.ones(wanted.shape)
+        for first, second, near in self.windows():
+            nearest = np.maximum(self.approach, _STEEP * self.scale * self.distance[:, first, second])
+            target = nearest + (wanted[:, first, second] - nearest) * near
+            floor = self.approach + (least[:, first, second] - self.approach) * near
+            for i, j in ((first, second), (second, first)):
+                wanted[:, i, j] = target
+                least[:, i, j] = np.minimum(least[:, i, j], floor)
+                weight[:, i, j] += _APPROACH * np.maximum(1.0 - 3.0 * near, 0.0)
+        return wanted, least, weight
+
+    def windows(self) -> list[tuple[int, int, Array]]:
+        """Pairs with a transition, and a smooth step of the angle (SAMPLES,): 0 at it, 1 from `WINDOW` on."""
+        angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+        found: list[tuple[int, int, Array]] = []
+        for at in self.transitions:
+            x = np.minimum(np.abs(np.remainder(angle - at.angle + np.pi, 2.0 * np.pi) - np.pi) / WINDOW, 1.0)
+            found.append((at.first, at.second, x * x * (3.0 - 2.0 * x)))
+        return found
+
+
+class _Splines(NamedTuple):
+    """Value and derivatives by θ at the samples, of periodic cubic B-splines: matrices (SAMPLES, ROWS)."""
+
+    value: csr_array
+    slope: csr_array
+    bend: csr_array
+
+
+def _splines() -> _Splines:
+    matrices = np.zeros((3, SAMPLES, ROWS))
+    rate = ROWS / (2.0 * np.pi)
+    for k in range(SAMPLES):
+        row, u = k // _PER_ROW, (k % _PER_ROW) / _PER_ROW
+        value = [(1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3]
+        slope = [-3 * (1 - u) ** 2, 9 * u**2 - 12 * u, -9 * u**2 + 6 * u + 3, 3 * u**2]
+        bend = [6 * (1 - u), 18 * u - 12, -18 * u + 6, 6 * u]
+        columns = (row + np.arange(-1, 3)) % ROWS
+        for matrix, numbers, unit in zip(matrices, (value, slope, bend), (1.0, rate, rate**2), strict=True):
+            matrix[k, columns] = unit * np.array(numbers) / 6.0
+    return _Splines(*(csr_array(matrix) for matrix in matrices))
+
+
+_SPLINES = _splines()
+_UNIT = SAMPLES * _LENGTH**2
+
+
+def sites_of(controls: Array) -> Array:
+    """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), of control points of the same shape."""
+    return on_lap(controls)[0][::_PER_ROW]
+
+
+def on_lap(controls: Array) -> tuple[Array, Array, Array]:
+    """Sites at the samples of the lap and their first and second derivatives by θ, each (SAMPLES, n, 2)."""
+    flat = controls.reshape(ROWS, -1)
+    q, dq, ddq = ((matrix @ flat).reshape(SAMPLES, -1, 2) for matrix in _SPLINES)
+    return q, dq, ddq
+
+
+class Energy:
+    """E and its gradient by the control points."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._wanted, self._least, self._weight = task.targets()
+        n = task.distance.shape[1]
+        self._pairs = i, j = np.triu_indices(n, 1)
+        self._ends = np.equal.outer(np.arange(n), i).astype(float) - np.equal.outer(np.arange(n), j)
+        square = self._wanted[:, self._pairs[0], self._pairs[1]] ** 2
+        self._unit = float(square.mean()) if n > 1 else 1.0
+
+    def __call__(self, flat: Array) -> tuple[float, Array]:
+        """E and its gradient at control points (ROWS · n · 2,)."""
+        task = self._task
+        controls = flat.reshape(ROWS, -1, 2)
+        q, dq, ddq = on_lap(controls)
+        apart, g_q = self._apart(q)
+        bend, g_ddq = _BEND * (ddq**2).sum() / _UNIT, 2.0 * _BEND * ddq / _UNIT
+        slant, g_slant = self._slant(dq)
+        r, dr, dz, ddr, ddz = q[..., 0], dq[..., 0], dq[..., 1], ddq[..., 0], ddq[..., 1]
+        w, a = task.rate, task.change
+        # Velocity and acceleration in the directions of r, θ and z.
+        v = np.stack([w * dr, w * r, w * dz])
+        u = np.stack([w * w * (ddr - r) + a * dr, 2.0 * w * w * dr + a * r, w * w * ddz + a * dz])
+        fast, g_v = _excess(v, task.speed / _MARGIN)
+        hard, g_u = _excess(u, task.acceleration / _MARGIN)
+        g_dq = np.stack([w * g_v[0] + a * g_u[0] + 2.0 * w * w * g_u[1], w * g_v[2] + a * g_u[2]], axis=-1)
+        g_dq = g_dq + g_slant
+        g_q = g_q + np.stack([w * g_v[1] - w * w * g_u[0] + a * g_u[1], np.zeros_like(r)], axis=-1)
+        g_ddq = g_ddq + np.stack([w * w * g_u[0], w * w * g_u[2]], axis=-1)
+        gradient = np.zeros((ROWS, controls.shape[1] * 2))
+        for matrix, g in zip(_SPLINES, (g_q, g_dq, g_ddq), strict=True):
+            gradient += matrix.T @ g.reshape(SAMPLES, -1)
+        return float(apart + slant + bend + fast + hard), gradient.ravel()
+
+    def _apart(self, q: Array) -> tuple[float, Array]:
+        """Stress and separation, and their gradient by the sites (SAMPLES, n, 2)."""
+        i, j = self._pairs
+        if not len(i):
+            return 0.0, np.zeros_like(q)
+        step = q[:, i] - q[:, j]
+        distance = np.sqrt((step**2).sum(axis=2) + 1e-12)
+        missed = distance - self._wanted[:, i, j]
+        weight = self._weight[:, i, j] / self._unit
+        short = np.maximum(1.0 - distance / self._least[:, i, j], 0.0)
+        share = 1.0 / SAMPLES
+        total = share * (weight * missed**2).sum() / q.shape[1] + share * _SEPARATION * (short**2).sum()
+        slope = share * 2.0 * (weight * missed / q.shape[1] - _SEPARATION * short / self._least[:, i, j])
+        pull = (slope / distance)[..., None] * step
+        return float(total), self._ends @ pull
+
+    def _slant(self, dq: Array) -> tuple[float, Array]:
+        """Penalty of curves that are not parallel where they meet, and its gradient by the slopes."""
+        total, gradient = 0.0, np.zeros_like(dq)
+        for first, second, near in self._task.windows():
+            meets = _TANGENT * np.maximum(1.0 - 3.0 * near, 0.0)[:, None] / _UNIT
+            step = dq[:, first] - dq[:, second]
+            total += float((meets * step**2).sum())
+            gradient[:, first] += 2.0 * meets * step
+            gradient[:, second] -= 2.0 * meets * step
+        return total, gradient
+
+
+def _excess(v: Array, most: float) -> tuple[float, Array]:
+    """Penalty of vectors (3, SAMPLES, n) longer than allowed, and its gradient."""
+    size = np.sqrt((v**2).sum(axis=0) + 1e-24)
+    over = np.maximum(size / most - 1.0, 0.0)
+    return _LIMIT * float((over**2).sum()) / SAMPLES, 2.0 * _LIMIT / SAMPLES * (over / (most * size)) * v
+
+
+def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Array, Array]:
+    """Control points (ROWS, n, 2) of the arrangement, and of the one that it began with.
+
+    The energy is minimised (L-BFGS-B) from places scaled after the motions' mean distances, from a lattice, and from
+    perturbations of the first; the least that keeps the curves apart is taken. If none does, it is the lattice.
+
+    Parameters
+    ----------
+    task : Task
+        There must be room: as many places on `lattice` as clips.
+    rng : numpy.random.Generator
+    starts : int
+        How often to begin.
+    """
+    n = task.distance.shape[1]
+    rectangle = task.rectangle
+    first = scaled(task.scale * task.distance.mean(axis=0), task.rate.mean(axis=0), rectangle)
+    kept = on_lattice(first, rectangle, task.separation)
+    jitter = 0.1 * (rectangle.high - rectangle.low)
+    layouts = [first, kept, *(first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter for _ in range(starts - 2))]
+    energy = Energy(task)
+    bounds = list(zip(np.tile(rectangle.low, ROWS * n), np.tile(rectangle.high, ROWS * n), strict=True))
+    best, least = np.tile(kept, (ROWS, 1, 1)), np.inf
+    for layout in layouts:
+        # Sites on top of each other have no direction in which to part.
+        noise = 1e-4 * rng.uniform(-1.0, 1.0, (n, 2))
+        start = np.clip(layout + noise, rectangle.low, rectangle.high)
+        found = minimize(
+            energy, np.tile(start, (ROWS, 1, 1)).ravel(), jac=True, method="L-BFGS-B", bounds=bounds,
+            options={"maxiter": 200, "maxcor": 20},
+        )  # fmt: skip
+        controls = np.asarray(found.x).reshape(ROWS, n, 2)
+        if float(found.fun) < least and is_apart(task, controls):
+            best, least = controls, float(found.fun)
+    return best, np.tile(first, (ROWS, 1, 1))
+
+
+def is_apart(task: Task, controls: Array) -> bool:
+    """Whether sites keep the separation at every angle but near their transitions, and the approach there."""
+    q, _, _ = on_lap(controls)
+    n = q.shape[1]
+    least = np.full((SAMPLES, n, n), task.separation)
+    for first, second, near in task.windows():
+        allowed = np.where(near < 1.0, 0.5 * task.approach, task.separation)
+        least[:, first, second] = least[:, second, first] = np.minimum(least[:, first, second], allowed)
+    distance = np.linalg.norm(q[:, :, None] - q[:, None], axis=3)
+    i, j = np.triu_indices(n, 1)
+    return bool((distance[:, i, j] >= least[:, i, j]).all())

@@ -1,0 +1,207 @@
+"""The common lap of clips: which frame of each clip is at which angle, so that like moments are at like angles.
+
+Each clip is shifted, and warped where it pays, to the clips most like it, by dynamic programming over the lead of its
+phase. What is compared are poses, velocities, and which feet bear load, so that contacts meet. A mismatch counts only
+up to a scale: a lap in which two motions nearly agree at one moment is better than one that is mediocre all round.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
+from controllers.state import Array
+
+SAMPLES = 385  # of a motion's time, for features
+_STEPS = 96  # of the lap, in the dynamic programme
+_FINE = 4  # leads per step: paces change by quarters of the clip's own
+_BAND = _STEPS * _FINE // 8  # the warp leads or lags by at most an eighth of the lap
+_CHANGES = np.arange(-2, 3)  # of the lead in a step: paces 0.5 to 1.5
+_STEEPEST = 0.4  # change of the pace that is left after smoothing
+_COST = 0.02  # of a change of pace by a quarter, squared, of the mean mismatch
+_WORTH = 0.95  # a warp that leaves more of the mismatch is not made
+_NEIGHBOURS = 6  # clips that another is aligned to
+_SHIFTS = 6  # places to begin that are tried with a warp
+_REACTION = 0.1  # [s] velocities count as far as they carry in this time
+_FOOT = 0.1  # [m] that a foot which bears is from one that does not
+_GAP = (0.1, 0.3)  # share of the lap in which an open clip returns: least, most
+
+
+class Phase(NamedTuple):
+    """Where a clip is in the lap: s = (θ/2π − start)/(1 − gap) + lead(θ), from 0 to 1 along the clip.
+
+    Attributes
+    ----------
+    start : float
+        Share of the lap before the clip's first frame.
+    gap : float
+        Share of the lap in which an open clip returns to its start; 0 for a closed one.
+    lead : CubicSpline
+        Over laps since `start`, periodic.
+    """
+
+    start: float
+    gap: float
+    lead: CubicSpline
+
+    def share(self, lap: Array) -> Array:
+        """Share s of the clip's time at shares of the lap; beyond 1 in the gap of an open clip."""
+        since = np.mod(lap - self.start, 1.0)
+        return since / (1.0 - self.gap) + self.lead(since)
+
+    def angles(self, frames: int) -> Array:
+        """Angle θ of each frame [rad], shape (frames,), strictly increasing: the inverse of `share`."""
+        wanted = np.linspace(0.0, 1.0, frames)
+        since = wanted * (1.0 - self.gap)
+        for _ in range(60):
+            missed = since / (1.0 - self.gap) + self.lead(since) - wanted
+            since = since - missed / (1.0 / (1.0 - self.gap) + self.lead(since, 1))
+        # Its ends are where they are, to the last bit.
+        since[0], since[-1] = 0.0, 1.0 - self.gap
+        return 2.0 * np.pi * (self.start + since)
+
+
+def _unwarped(start: float, gap: float) -> Phase:
+    knots = np.linspace(0.0, 1.0, 9)
+    return Phase(start, gap, CubicSpline(knots, np.zeros(9), bc_type="periodic"))
+
+
+def _return_gap(motion: Motion, own: Features) -> float:
+    """Share of the lap in which an open clip returns: as long as it takes at the motion's own mean speed."""
+    if motion.closed:
+        return 0.0
+    speed = float(np.linalg.norm(own.velocity[:, 3:], axis=1).mean())
+    way = float(np.linalg.norm(own.pose[-1] - own.pose[0]))
+    seconds = 1.5 * way / max(speed, 1e-3)
+    return float(np.clip(seconds / (seconds + motion.duration), *_GAP))
+
+
+def _points(own: Features) -> Array:
+    return np.concatenate([own.pose, _REACTION * own.velocity, _FOOT * own.support], axis=1)
+
+
+class _Costs(NamedTuple):
+    """Mismatch of a clip's samples (columns) with other clips at steps of the lap (rows); zero in their gaps."""
+
+    table: Array
+
+    def at(self, lap: Array, s: Array) -> Array:
+        rows = np.round(lap * _STEPS).astype(np.int64) % _STEPS
+        columns = np.round(np.clip(s, 0.0, 1.0) * (SAMPLES - 1)).astype(np.int64)
+        return np.where(s <= 1.0, self.table[rows, columns], 0.0)
+
+
+def _costs(own: Array, others: list[tuple[Array, Phase]], scale: float) -> _Costs:
+    lap = np.arange(_STEPS) / _STEPS
+    table = np.zeros((_STEPS, SAMPLES))
+    for points, phase in others:
+        s = phase.share(lap)
+        there = points[np.round(np.minimum(s, 1.0) * (SAMPLES - 1)).astype(np.int64)]
+        square = squared_distances(there, own)
+        table += np.where(s[:, None] <= 1.0, square / (square + scale**2), 0.0)
+    return _Costs(table / len(others))
+
+
+def _warped(costs: _Costs, start: float, gap: float) -> Phase:
+    """The phase with the cheapest lead that is zero at start and end."""
+    lap = np.arange(_STEPS) / _STEPS
+    leads = np.arange(-_BAND, _BAND + 1) / (_STEPS * _FINE)
+    s = lap[:, None] / (1.0 - gap) + leads
+    # A closed clip goes on with its next lap, an open one stays within itself.
+    s = np.mod(s, 1.0) if gap == 0.0 else np.where(lap[:, None] < 1.0 - gap, np.clip(s, 0.0, 1.0), 2.0)
+    table = costs.at((start + lap)[:, None] + 0.0 * leads, s)
+    total = np.full(len(leads), np.inf)
+    total[_BAND] = 0.0
+    steps = np.zeros((_STEPS, len(leads)), dtype=np.int64)
+    price = _COST * table.mean() * _CHANGES.astype(float) ** 2
+    reach = int(_CHANGES[-1])
+    for k in range(_STEPS):
+        padded = np.pad(total, reach, constant_values=np.inf)
+        options = np.stack(
+            [padded[reach - c : reach - c + len(leads)] + p for c, p in zip(_CHANGES, price, strict=True)]
+        )
+        steps[k] = _CHANGES[options.argmin(axis=0)]
+        total = options.min(axis=0) + table[k]
+    lead, at = np.zeros(_STEPS), _BAND
+    for k in range(_STEPS - 1, -1, -1):
+        lead[k] = leads[at]
+        at -= int(steps[k, at])
+    return Phase(start, gap, _smoothed(lead, gap))
+
+
+def _smoothed(lead: Array, gap: float) -> CubicSpline:
+    """C² lead that is zero at the ends, no steeper than allowed."""
+    knots = np.arange(_STEPS + 1) / _STEPS
+    frequency = np.fft.rfftfreq(_STEPS)
+    smooth = np.fft.irfft(np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _STEPS / 24.0) ** 2), _STEPS)
+    smooth = np.append(smooth, smooth[0])
+    if gap > 0.0:
+        # Within the gap nothing is led, and at its edges pace and acceleration are the clip's own.
+        x = np.clip(np.minimum(knots, 1.0 - gap - knots) / 0.1, 0.0, 1.0)
+        smooth = smooth * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+    smooth = smooth - smooth[0]
+    steepest = float(np.abs(np.diff(smooth)).max()) * _STEPS * (1.0 - gap)
+    return CubicSpline(knots, smooth * min(1.0, _STEEPEST / max(steepest, 1e-12)), bc_type="periodic")
+
+
+def _mismatch(costs: _Costs, phase: Phase) -> float:
+    lap = np.arange(_STEPS) / _STEPS
+    s = phase.share(lap)
+    return float(costs.at(lap, np.mod(s, 1.0) if phase.gap == 0.0 else s).mean())
+
+
+def _placed(costs: _Costs, gap: float) -> Phase:
+    """Best shift and, if it is worth it, warp of a clip."""
+    # The gap of every open clip holds the angle 0, where the lap ends.
+    starts = np.arange(_STEPS) / _STEPS if gap == 0.0 else gap * np.linspace(0.1, 0.9, 9)
+    straight = [_unwarped(float(start), gap) for start in starts]
+    found = [_mismatch(costs, phase) for phase in straight]
+    if max(found) - min(found) <= 1e-9 + 0.01 * float(np.mean(found)):
+        # A motion that does not tell one phase from another keeps its own, or lies in the middle of its room.
+        return straight[0] if gap == 0.0 else straight[len(straight) // 2]
+    best, least = straight[int(np.argmin(found))], min(found)
+    for k in np.argsort(found, kind="stable")[:_SHIFTS]:
+        warped = _warped(costs, straight[k].start, gap)
+        left = _mismatch(costs, warped)
+        if left < min(least, _WORTH * min(found)):
+            best, least = warped, left
+    return best
+
+
+def common_lap(motions: list[Motion], own: list[Features]) -> list[Phase]:
+    """Where each clip is in the lap.
+
+    The clip that is most like the others keeps its own phase (if it closes); the others are placed one after the
+    other, the nearest first, and then once more against all.
+
+    Parameters
+    ----------
+    motions : list of Motion
+    own : list of Features
+        Theirs, at `SAMPLES` steps.
+    """
+    points = [_points(each) for each in own]
+    gaps = [_return_gap(motion, each) for motion, each in zip(motions, own, strict=True)]
+    coarse = [each[::16] for each in points]
+    n = len(motions)
+    apart = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i):
+            square = squared_distances(coarse[i], coarse[j])
+            apart[i, j] = apart[j, i] = np.sqrt(square.min(axis=0)).mean() + np.sqrt(square.min(axis=1)).mean()
+    everything = np.concatenate(coarse)
+    scale = 0.5 * float(np.sqrt(2.0 * everything.var(axis=0).sum())) + 1e-6
+    first = int(apart.sum(axis=1).argmin())
+    phases: dict[int, Phase] = {first: _unwarped(0.5 * gaps[first], gaps[first])}
+
+    def place(i: int) -> None:
+        near = sorted((j for j in phases if j != i), key=lambda j: (apart[i, j], j))[:_NEIGHBOURS]
+        phases[i] = _placed(_costs(points[i], [(points[j], phases[j]) for j in near], scale), gaps[i])
+
+    while len(phases) < n:
+        place(min((i for i in range(n) if i not in phases), key=lambda i: (min(apart[i, j] for j in phases), i)))
+    for i in range(n):
+        if n > 1 and i != first:
+            place(i)
+    return [phases[i] for i in range(n)]

@@ -1,0 +1,115 @@
+"""What authored curves are like: how far apart, how bent, how fast, and how well they mirror the motions."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, on_lap
+from controllers.haptic_map.lifting.transitions import Transition
+from controllers.state import Array
+
+
+class CurveMeasure(NamedTuple):
+    """One curve, its clip at its own pace.
+
+    Attributes
+    ----------
+    radius : float
+        Least radius of curvature [m].
+    speed, acceleration : float
+        Greatest of the hand on it [m/s, m/s²].
+    """
+
+    radius: float
+    speed: float
+    acceleration: float
+
+
+class Meeting(NamedTuple):
+    """A transition and how the two curves pass each other there.
+
+    Attributes
+    ----------
+    transition : Transition
+    distance : float
+        Of the curves at its angle [m].
+    slant : float
+        Angle between their tangents [rad].
+    speeds : (float, float)
+        Of the hand on either [m/s].
+    """
+
+    transition: Transition
+    distance: float
+    slant: float
+    speeds: tuple[float, float]
+
+
+class ArrangementMeasure(NamedTuple):
+    """All curves together.
+
+    Attributes
+    ----------
+    separation : float
+        Least distance of two curves at one angle, `WINDOW` or further from their transitions [m]; infinite for one.
+    nearest : float
+        The same in space: from any point of the one to any of the other, both so far from the transitions [m].
+    stress : float
+        How far distances of curves are from those of the poses, brought to one scale: √(Σ (D − κd)² / Σ D²).
+    curves : tuple of CurveMeasure
+    meetings : tuple of Meeting
+    """
+
+    separation: float
+    nearest: float
+    stress: float
+    curves: tuple[CurveMeasure, ...]
+    meetings: tuple[Meeting, ...]
+
+
+def measure(task: Task, controls: Array) -> ArrangementMeasure:
+    """Measure an arrangement of control points (ROWS, n, 2)."""
+    q, dq, ddq = on_lap(controls)
+    n = q.shape[1]
+    angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    r, z, rate, change = q[..., 0], q[..., 1], task.rate, task.change
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    points = np.stack([r * c, r * s, z], axis=-1)
+    # Velocity and acceleration in the directions of r, θ and z.
+    v = np.stack([rate * dq[..., 0], rate * r, rate * dq[..., 1]], axis=-1)
+    u = np.stack(
+        [
+            rate**2 * (ddq[..., 0] - r) + change * dq[..., 0],
+            2.0 * rate**2 * dq[..., 0] + change * r,
+            rate**2 * ddq[..., 1] + change * dq[..., 1],
+        ],
+        axis=-1,
+    )
+    speed, pull = np.linalg.norm(v, axis=-1), np.linalg.norm(u, axis=-1)
+    bend = np.linalg.norm(np.cross(v, u), axis=-1) / speed**3
+    curves = [
+        CurveMeasure(float(1.0 / bend[:, i].max()), float(speed[:, i].max()), float(pull[:, i].max())) for i in range(n)
+    ]
+    apart = np.linalg.norm(q[:, :, None] - q[:, None], axis=-1)
+    away = np.ones((SAMPLES, n, n), dtype=np.bool_)
+    for first, second, near in task.windows():
+        away[:, first, second] &= near >= 1.0
+    meetings: list[Meeting] = []
+    for at in task.transitions:
+        k, i, j = round(at.angle / (2.0 * np.pi) * SAMPLES) % SAMPLES, at.first, at.second
+        along = float(np.clip(v[k, i] @ v[k, j] / (speed[k, i] * speed[k, j]), -1.0, 1.0))
+        meetings.append(
+            Meeting(at, float(apart[k, i, j]), float(np.arccos(along)), (float(speed[k, i]), float(speed[k, j])))
+        )
+    pairs = list(zip(*np.triu_indices(n, 1), strict=True))
+    separation = min((float(apart[away[:, i, j], i, j].min()) for i, j in pairs), default=np.inf)
+    nearest = np.inf
+    for i, j in pairs:
+        keep = away[:, i, j]
+        nearest = min(nearest, float(KDTree(points[keep, j]).query(points[keep, i])[0].min()))
+    i, j = np.triu_indices(n, 1)
+    d, wanted = apart[:, i, j], task.distance[:, i, j]
+    kappa = float((d * wanted).sum() / max(float((wanted**2).sum()), 1e-300))
+    stress = float(np.sqrt(((d - kappa * wanted) ** 2).sum() / max(float((d**2).sum()), 1e-300)))
+    return ArrangementMeasure(separation, nearest, stress, tuple(curves), tuple(meetings))

@@ -1,0 +1,235 @@
+r"""Clips over the angle of the hand: splines with a knot at every frame, so that no frame is altered.
+
+Frame k of a clip is at the angle θ_k, which increases. Its channels are what `combination` reads: the remainder
+ρ = exp(−(θ_k/2π) ξ) X_root of the root, the joints, and the ends of limbs. Through them goes one periodic C² cubic
+spline of θ, kept as values and slopes at its knots (Hermite's form: at a knot the value is exactly what is stored).
+
+An open clip leaves a gap in the lap. Over it goes a return segment, from the last frame to the first of the next lap:
+it coasts out of the one and into the other, and eases between; rotations take the shorter way. Nothing but the gap
+is changed by it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numba import njit
+from scipy.interpolate import CubicSpline
+
+from controllers.errors import ParameterError
+from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
+from controllers.state import Array
+
+CLOSES = 1e-6  # [m], in quaternions half of [rad]: how nearly the frames of a closed clip must close
+LEAST_GAP = 0.05  # [rad] that an open clip leaves of the lap
+WIDEST_STEP = 0.5 * np.pi  # [rad] between two frames
+
+_TURN = 2.0 * np.pi
+_COAST = 0.4  # [rad] of θ over which an open clip coasts out and in, at most the gap
+_KNOTS, _START, _FIRST_KNOT, _FIRST_ROW, _HEADER = range(5)
+
+
+@njit
+def _hermite(u: float, width: float) -> tuple[float, float, float, float]:
+    """Weights of value and slope at the left end of an interval, and at the right, at u in [0, 1]."""
+    v = 1.0 - u
+    return v * v * (1.0 + 2.0 * u), width * u * v * v, u * u * (3.0 - 2.0 * u), -width * u * u * v
+
+
+@njit
+def interpolate_frames(clips: Array, clip: int, angle: float, value: Array, slope: Array) -> None:
+    """Channels of a clip at an angle, and their derivatives by it.
+
+    Parameters
+    ----------
+    clips : Array
+        `packed_frames`.
+    clip : int
+        Which.
+    angle : float
+        θ in [0, 2π].
+    value, slope : Array, shape (channels,)
+        Written.
+    """
+    header, channels = clip * _HEADER, value.shape[0]
+    pieces, start = int(clips[header + _KNOTS]) - 1, clips[header + _START]
+    knots, rows = int(clips[header + _FIRST_KNOT]), int(clips[header + _FIRST_ROW])
+    if angle < start:
+        angle += _TURN
+    low, high = 0, pieces
+    while high - low > 1:
+        middle = (low + high) // 2
+        if clips[knots + middle] <= angle:
+            low = middle
+        else:
+            high = middle
+    width = clips[knots + low + 1] - clips[knots + low]
+    u = (angle - clips[knots + low]) / width
+    v = 1.0 - u
+    y0, m0, y1, m1 = _hermite(u, width)
+    d, d0, d1 = 6.0 * u * v / width, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
+    first = rows + 2 * channels * low
+    a, da = clips[first : first + channels], clips[first + channels : first + 2 * channels]
+    first += 2 * channels
+    b, db = clips[first : first + channels], clips[first + channels : first + 2 * channels]
+    for k in range(channels):
+        value[k] = y0 * a[k] + m0 * da[k] + y1 * b[k] + m1 * db[k]
+        slope[k] = d * (b[k] - a[k]) + d0 * da[k] + d1 * db[k]
+
+
+def frames_at(spline: tuple[Array, Array, Array], angles: Array) -> Array:
+    """Channels (n, channels) of one clip's `lap_spline` at angles θ (n,) in [0, 2π]: `interpolate_frames` in NumPy."""
+    knots, values, slopes = spline
+    around = np.where(angles < knots[0], angles + _TURN, angles)
+    low = np.clip(np.searchsorted(knots, around, "right") - 1, 0, len(knots) - 2)
+    width = knots[low + 1] - knots[low]
+    weights = cast(Callable[[Array, Array], tuple[Array, ...]], _hermite.py_func)
+    y0, m0, y1, m1 = (weight[:, None] for weight in weights((around - knots[low]) / width, width))
+    return y0 * values[low] + m0 * slopes[low] + y1 * values[low + 1] + m1 * slopes[low + 1]
+
+
+def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array:
+    """Angles of a clip's frames [rad], or what is wrong with them."""
+    array = np.array(angles, dtype=np.float64)
+    if array.shape != (frames,):
+        raise ParameterError(f"{name} has {frames} frames, its angles have shape {array.shape}; expected ({frames},)")
+    if not (np.isfinite(array).all() and (np.diff(array) > 0.0).all()):
+        raise ParameterError(f"{name}: the angles of its frames must be finite and increase")
+    if np.diff(array).max() > WIDEST_STEP:
+        raise ParameterError(
+            f"{name}: two of its frames are {np.diff(array).max():.2f} rad apart, and a curve must go round the axis "
+            f"between them; expected {WIDEST_STEP:.2f} rad or less: give it a shorter arc, or more frames"
+        )
+    span = float(array[-1] - array[0])
+    if closed:
+        if frames < 4:
+            raise ParameterError(f"{name}: a closed clip needs 4 frames or more, got {frames}")
+        if not 0.0 <= array[0] < _TURN or abs(span - _TURN) > 1e-9:
+            raise ParameterError(
+                f"{name} is closed: its angles must go once round, from 0 to 2π on, got {array[0]} to {array[-1]} rad"
+            )
+    elif array[0] < 0.0 or array[-1] > _TURN or span > _TURN - LEAST_GAP:
+        raise ParameterError(
+            f"{name} is open: its angles must lie within 0 and 2π and leave a gap of {LEAST_GAP} rad or more, got "
+            f"{array[0]:.4f} to {array[-1]:.4f} rad"
+        )
+    return array
+
+
+def closing_gap(poses: Array) -> float:
+    """How far the remainder of a clip (n, nq) is from closing: the largest difference in a position or quaternion."""
+    ends = remainder(poses, np.linspace(0.0, 1.0, len(poses)), drift_of(poses))[[0, -1]]
+    rotations = ends[:, 3:].reshape(2, -1, 4)
+    signs = np.where((rotations[0] * rotations[1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    turned_back = np.abs(rotations[1] * signs[:, None] - rotations[0]).max()
+    return float(max(turned_back, np.abs(ends[1, :3] - ends[0, :3]).max()))
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedClip:
+    """A clip at the angles of the hand, moved over the ground such that its remainder is at the origin, facing +x.
+
+    Attributes
+    ----------
+    poses : Array, shape (n, nq)
+        Its frames where they were moved to.
+    angles : Array, shape (n,)
+        θ_k [rad].
+    closed : bool
+        Whether the last frame is the first of the next lap.
+    drift : Array, shape (3,)
+        ξ of a lap.
+    duration : float
+        [s].
+    """
+
+    poses: Array
+    angles: Array
+    closed: bool
+    drift: Array
+    duration: float
+
+    @staticmethod
+    def of(poses: Array, fps: float, angles: Array, closed: bool) -> "PlacedClip":
+        """Clip of poses that passed `checked_clip` and angles that passed `checked_angles`."""
+        placed = placed_at_origin(poses, (angles - angles[0]) / _TURN)
+        drift = drift_of(placed)
+        # At the angle θ₀ the drift has already gone its share of the lap.
+        shift, heading = plane_exponential(angles[0] / _TURN * drift)
+        placed[:, :2] = turned(heading, placed[:, :2]) + shift
+        placed[:, 3:7] = yawed(heading, placed[:, 3:7])
+        return PlacedClip(placed, angles, closed, drift, (len(poses) - 1) / fps)
+
+    @property
+    def remainder(self) -> Array:
+        """ρ and the joints at the frames, shape (n, nq)."""
+        return remainder(self.poses, self.angles / _TURN, self.drift)
+
+
+def lap_spline(angles: Array, channels: Array, rotations: int, closed: bool) -> tuple[Array, Array, Array]:
+    """Periodic C² spline through the frames of a clip, with a return segment over the gap of an open one.
+
+    Parameters
+    ----------
+    angles : Array, shape (n,)
+        θ_k [rad].
+    channels : Array, shape (n, channels)
+        Position, unit quaternions, then anything that repeats.
+    rotations : int
+        How many quaternions.
+    closed : bool
+
+    Returns
+    -------
+    knots : Array, shape (k + 1,)
+        Angles of a lap, the first again at the end.
+    values, slopes : Array, shape (k + 1, channels)
+    """
+    signs = np.ones(channels.shape[1])
+    for column in range(3, 3 + 4 * rotations, 4):
+        if channels[-1, column : column + 4] @ channels[0, column : column + 4] < 0.0:
+            signs[column : column + 4] = -1.0
+    if closed:
+        knots, values = angles[:-1], channels[:-1]
+    else:
+        between, back = _return_segment(angles, channels, rotations, signs)
+        knots, values = np.concatenate([angles, between]), np.concatenate([channels, back])
+    n = len(knots)
+    # A quaternion that comes back with the opposite sign is periodic over two laps.
+    twice = np.concatenate([values, signs * values, values[:1]])
+    spline = CubicSpline(np.concatenate([knots, knots + _TURN, [knots[0] + 2.0 * _TURN]]), twice, bc_type="periodic")
+    slopes = spline(spline.x[: n + 1], 1)
+    return spline.x[: n + 1], twice[: n + 1], slopes
+
+
+def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array) -> tuple[Array, Array]:
+    """Angles and channels between the last frame of an open clip and the first of the next lap."""
+    gap = angles[0] + _TURN - angles[-1]
+    count = max(3, round(gap / 0.1))
+    u = np.arange(1, count) / count
+    coast = min(_COAST, gap)
+    # One-sided slopes, damped to nothing over the coast.
+    out = (channels[-1] - channels[-2]) / (angles[-1] - angles[-2])
+    back = signs * (channels[1] - channels[0]) / (angles[1] - angles[0])
+    rest_out, rest_back = (np.maximum(1.0 - gap * s / coast, 0.0) ** 3 * gap * s for s in (u, 1.0 - u))
+    leaving = channels[-1] + rest_out[:, None] * out
+    arriving = signs * channels[0] - rest_back[:, None] * back
+    ease = (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
+    values = (1.0 - ease) * leaving + ease * arriving
+    quaternions = values[:, 3 : 3 + 4 * rotations].reshape(len(u), rotations, 4)
+    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
+    values[:, 3 : 3 + 4 * rotations] = quaternions.reshape(len(u), -1)
+    return angles[-1] + gap * u, values
+
+
+def packed_frames(splines: list[tuple[Array, Array, Array]]) -> Array:
+    """What `interpolate_frames` reads: knots, values and slopes of each clip (`lap_spline`)."""
+    headers: list[float] = []
+    blocks: list[Array] = []
+    at = _HEADER * len(splines)
+    for knots, values, slopes in splines:
+        headers += [len(knots), knots[0], at, at + len(knots)]
+        blocks += [knots, np.stack([values, slopes], axis=1).ravel()]
+        at += len(knots) + 2 * values.size
+    return np.concatenate([headers, *blocks])

@@ -1,0 +1,154 @@
+"""Transitions: moments of the common lap at which two motions nearly agree in pose, velocity and standing feet.
+
+What counts as near is relative: the distance of the poses to that of two moments of these motions picked at random, the
+distance of the velocities to how fast the two motions are, and of the feet as many as bear load in one motion only. As
+in motion graphs (Kovar, Gleicher & Pighin 2002) what is compared are windows of frames, about as long as a hand takes
+to change over: a figure that walks breaks into a run where its feet are in step for a while, and falls where two poses
+agree for a moment by chance.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.haptic_map.lifting.motion_features import Features, Mask
+from controllers.state import Array, IntArray
+
+SAME = 0.02  # mismatch, on average over the lap, of two clips that are the same motion
+_APART = 1.2  # [rad] between two transitions of one clip
+_WINDOW = 0.2  # [s] before and after a transition, over which motions are compared
+
+
+class Transition(NamedTuple):
+    """Where a hand may change over from one curve to another.
+
+    Attributes
+    ----------
+    first, second : int
+        The clips, first < second.
+    angle : float
+        θ [rad], 0 to 2π.
+    pose, velocity, support : float
+        Relative distances of poses, velocities and standing feet, RMS over the window.
+    speeds : tuple of two floats
+        Of the two figures' roots, mean over the window [m/s].
+    """
+
+    first: int
+    second: int
+    angle: float
+    pose: float
+    velocity: float
+    support: float
+    speeds: tuple[float, float]
+
+
+class Comparison(NamedTuple):
+    """Pairs of motions moment by moment of the lap, at m equal steps of θ.
+
+    Attributes
+    ----------
+    distance : Array, shape (m, n, n)
+        Between poses [m] (see `motion_features`).
+    pose, velocity, support : Array, shape (m, n, n)
+        Relative distances; see the module.
+    speed : Array, shape (m, n)
+        Of the root [m/s].
+    inside : Mask, shape (m, n)
+        Whether each clip has a frame there, or is in the gap where an open one returns.
+    laps : Array, shape (n,)
+        Time of a lap of each clip [s].
+    """
+
+    distance: Array
+    pose: Array
+    velocity: Array
+    support: Array
+    speed: Array
+    inside: Mask
+    laps: Array
+
+    def window(self, i: int, j: int) -> IntArray:
+        """Steps before and after a moment at which two clips are compared there."""
+        reach = round(_WINDOW / float(self.laps[[i, j]].mean()) * len(self.pose))
+        return np.arange(-reach, reach + 1)
+
+
+def _pairwise(points: Array) -> Array:
+    """Distances (m, n, n) between points (m, n, p)."""
+    square = (points * points).sum(axis=2)
+    both = square[:, :, None] + square[:, None, :] - 2.0 * points @ points.transpose(0, 2, 1)
+    return np.sqrt(np.maximum(both, 0.0))
+
+
+def compare(moments: list[Features], inside: Mask, laps: Array) -> Comparison:
+    """Compare motions at equal steps of the common lap.
+
+    Parameters
+    ----------
+    moments : list of Features
+        Of each clip, at the same m angles.
+    inside, laps
+        See `Comparison`.
+    """
+    poses = np.stack([each.pose for each in moments], axis=1)
+    velocities = np.stack([each.velocity for each in moments], axis=1)
+    bears = np.stack([each.support for each in moments], axis=1)
+    distance, change = _pairwise(poses), _pairwise(velocities)
+    alone = _pairwise(bears) / np.sqrt(max(bears.shape[2], 1))
+    spread = np.sqrt(2.0 * poses.reshape(-1, poses.shape[2]).var(axis=0).sum())
+    square = (velocities**2).sum(axis=2).mean(axis=0)
+    speed = np.sqrt(square[:, None] + square)
+    return Comparison(
+        distance, distance / max(float(spread), 1e-9), change / np.maximum(speed, 1e-9), alone,
+        np.linalg.norm(velocities[:, :, :3], axis=2), inside, laps,
+    )  # fmt: skip
+
+
+def same_motions(compared: Comparison) -> list[tuple[int, int]]:
+    """Pairs of clips that hold the same motion all round the lap."""
+    mean = np.hypot(compared.pose, compared.velocity).mean(axis=0) / np.sqrt(2.0)
+    return [(i, j) for j in range(len(mean)) for i in range(j) if mean[i, j] < SAME]
+
+
+def find_transitions(compared: Comparison, most: float) -> list[Transition]:
+    """Transitions that can be had together, the best first.
+
+    Candidates are the least mismatches in time of all pairs of clips that are not the same motion. They are taken
+    best first, if no transition of either clip is nearer than 1.2 rad, one for each pair.
+
+    Parameters
+    ----------
+    compared : Comparison
+    most : float
+        Mismatch up to which two motions nearly agree: RMS of the three relative distances over the window.
+    """
+    steps, n, _ = compared.pose.shape
+    same = set(same_motions(compared))
+    candidates: list[tuple[float, Transition]] = []
+    for j in range(n):
+        for i in range(j):
+            if (i, j) in same:
+                continue
+            around = (np.arange(steps)[:, None] + compared.window(i, j)) % steps
+            parts = [part[:, i, j][around] for part in (compared.pose, compared.velocity, compared.support)]
+            over = np.sqrt([np.square(part).mean(axis=1) for part in parts])
+            row = np.sqrt(np.square(over).mean(axis=0))
+            row[~(compared.inside[:, i] & compared.inside[:, j])] = np.inf
+            least = (row <= np.roll(row, 1)) & (row < np.roll(row, -1)) & (row <= most)
+            for k in np.flatnonzero(least):
+                pose, velocity, support = (float(value) for value in over[:, k])
+                here, there = (float(value) for value in compared.speed[around[k]][:, [i, j]].mean(axis=0))
+                angle = 2.0 * np.pi * float(k) / steps
+                candidates.append((float(row[k]), Transition(i, j, angle, pose, velocity, support, (here, there))))
+    taken: list[Transition] = []
+    for _, found in sorted(candidates):
+        meets = [other for other in taken if {found.first, found.second} & {other.first, other.second}]
+        near = any(_between(found.angle, other.angle) < _APART for other in meets)
+        if not near and not any(other[:2] == found[:2] for other in meets):
+            taken.append(found)
+    return taken
+
+
+def _between(a: float, b: float) -> float:
+    return abs((a - b + np.pi) % (2.0 * np.pi) - np.pi)

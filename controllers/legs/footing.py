@@ -1,0 +1,177 @@
+r"""Ends of limbs that stand keep their footing, whatever the hand does to the blend.
+
+Corrections that belong to a mixture (`pair_corrections`) hold a foot as long as the mixture stays as it is. Where it
+changes on the hand's path, and with it where the mean wants the foot, or between mixtures that were looked at, the foot
+would be dragged. So each end has an offset o over the ground, kept in the memory: of what an end is moved at its points
+that touch, Δp, the offset takes back the share σ by which it stands, and it fades as the end goes on through the air,
+
+.. math:: o \leftarrow o - \sigma\,\Delta p, \qquad \frac{do}{d\theta} = -\kappa\,(1 - \sigma_0)\, o .
+
+σ = σ₀(h) μ(w) falls with the height h of the sole, and to 0 where a clip is alone: its own slides are its, and h∘α̃ = α.
+Headings likewise. A hand that goes back makes the offset grow again, until it has turned; so velocity and acceleration
+of the figure may be differences to either side. h_* is the derivative at a given offset.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from controllers.easing import smooth_step
+from controllers.errors import ParameterError
+from controllers.legs.limbs import Limb
+from controllers.rotations import multiply, rotate
+from controllers.state import Array, Quat
+
+_STANDS, _FREE = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
+_MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0
+_FADE, _FADE_ALONE = 5.0, 1.0  # κ [1/rad], and what a clip that is alone adds
+_MOST, _MOST_TURN = 0.15, 0.8  # [m], [rad] that no offset exceeds
+_TOUCH = 1e-3  # [m] of the heights by which it is weighed which points touch
+_TURNED = 0.15  # [rad] that a hand has to go back to go backwards
+_JUMP = 1.0  # [rad] that no hand goes between two ticks
+_WAY, _BEHIND, _ANGLE, _ENDS = range(4)
+_OFFSET, _PLACE, _TURN, _HELD, _STOOD, _END = 0, 3, 5, 9, 10, 11
+
+
+def fresh_footing(limbs: int) -> Array:
+    """Memory of the footing of some limbs at the start of a run."""
+    memory = np.zeros(_ENDS + _END * limbs)
+    memory[_WAY], memory[_ANGLE] = 1.0, np.nan
+    return memory
+
+
+def packed_soles(limbs: Sequence[Limb]) -> Array:
+    """Points of limbs that may touch, from their centre [m], one after the other: what `keep_footing` is given.
+
+    Raises
+    ------
+    ParameterError
+        If one limb has more of them than another.
+    """
+    if len({len(limb.points) for limb in limbs}) > 1:
+        raise ParameterError(f"limbs must have equally many points, got {[len(limb.points) for limb in limbs]}")
+    return np.concatenate([np.zeros(0), *((limb.points - limb.points.mean(axis=0)).ravel() for limb in limbs)])
+
+
+@njit
+def _step_down(x: float, low: float, high: float) -> float:
+    """C² step from 1 at `low` to 0 at `high`."""
+    return smooth_step((high - x) / (high - low))
+
+
+@njit
+def go_on(footing: Array, angle: float) -> float:
+    """Note the angle of the hand; returns how far it went on [rad], negative if back from where it goes to."""
+    step = angle - footing[_ANGLE]
+    footing[_ANGLE] = angle
+    if not np.isfinite(step):
+        return 0.0
+    step -= 2.0 * np.pi * np.round(step / (2.0 * np.pi))
+    ahead = footing[_WAY] * step
+    footing[_BEHIND] = max(footing[_BEHIND] - ahead, 0.0)
+    if footing[_BEHIND] > _TURNED:
+        footing[_WAY], footing[_BEHIND] = -footing[_WAY], 0.0
+    return ahead
+
+
+@njit
+def mixed(weights: Array) -> float:
+    """μ of weights (m,): 1 for a mixture, 0 for a clip alone."""
+    square = 0.0
+    for w in weights:
+        square += w * w
+    return _step_down(square, _MIXED, _ALONE)
+
+
+@njit
+def _levers(sole: Array, q: tuple[float, float, float, float], levers: Array) -> float:
+    """Points of a sole (k, 3) turned by q, written; returns the height of the lowest."""
+    least = np.inf
+    for i in range(sole.shape[0]):
+        x, y, z = rotate(q[0], q[1], q[2], q[3], sole[i, 0], sole[i, 1], sole[i, 2])
+        levers[i, 0], levers[i, 1], levers[i, 2] = x, y, z
+        least = min(least, z)
+    return least
+
+
+@njit
+def _yawed(angle: float, q: Array) -> tuple[float, float, float, float]:
+    return multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
+
+
+@njit
+def keep_footing(
+    footing: Array, limb: int, ahead: float, mixture: float, sole: Array, ground: float, frame: Array, end: Array,
+    q: Quat,
+) -> None:  # fmt: skip
+    """Move and turn an end by its offset.
+
+    Parameters
+    ----------
+    footing : Array
+        The memory; updated.
+    limb : int
+        Which.
+    ahead : float
+        How far the hand went on (`go_on`) [rad].
+    mixture : float
+        μ.
+    sole : Array, shape (k, 3)
+        Points that may touch, from their centre, in the frame of the end [m].
+    ground : float
+        Height of the ground [m].
+    frame : Array, shape (3,)
+        Frame in which the end is, over the ground (x, y [m], heading [rad]).
+    end : Array, shape (3,)
+        Position of the centre [m]; changed.
+    q : Quat
+        Orientation of the end; changed.
+    """
+    state = footing[_ENDS + _END * limb : _ENDS + _END * (limb + 1)]
+    points, cosine, sine = sole.shape[0], np.cos(frame[2]), np.sin(frame[2])
+    levers, before = np.empty((points, 3)), np.empty((points, 3))
+    turn = _yawed(frame[2] + state[_OFFSET + 2], q)
+    low = _levers(sole, turn, levers)
+    x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
+    stands = _step_down(end[2] + low - ground, _STANDS, _FREE)
+    size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MOST**2 + (state[_OFFSET + 2] / _MOST_TURN) ** 2
+    held = stands * mixture * max(1.0 - size, 0.0)
+    known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0
+    if known and abs(ahead) < _JUMP:
+        # Over a step half of it is as it was, else a difference to either side would count a change twice.
+        share = 0.5 * (held + state[_HELD])
+        last = state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3]
+        low_before = _levers(sole, last, before)
+        w, _, _, z = multiply(turn[0], turn[1], turn[2], turn[3], last[0], -last[1], -last[2], -last[3])
+        back = -2.0 * share * (np.arctan2(z, w) if w >= 0.0 else np.arctan2(-z, -w))
+        turned_c, turned_s = np.cos(back), np.sin(back)
+        total, moved_x, moved_y = 0.0, 0.0, 0.0
+        for i in range(points):
+            touch = np.exp((low - levers[i, 2]) / _TOUCH) + np.exp((low_before - before[i, 2]) / _TOUCH)
+            moved_x += touch * (turned_c * levers[i, 0] - turned_s * levers[i, 1] - before[i, 0])
+            moved_y += touch * (turned_s * levers[i, 0] + turned_c * levers[i, 1] - before[i, 1])
+            total += touch
+        moved_x = moved_x / total + frame[0] + cosine * x - sine * y - state[_PLACE]
+        moved_y = moved_y / total + frame[1] + sine * x + cosine * y - state[_PLACE + 1]
+        state[_OFFSET] -= share * (cosine * moved_x + sine * moved_y)
+        state[_OFFSET + 1] -= share * (cosine * moved_y - sine * moved_x)
+        state[_OFFSET + 2] += back
+        fade = _FADE * (1.0 - 0.5 * (stands + state[_STOOD])) + _FADE_ALONE * (1.0 - mixture)
+        left = np.exp(-fade * ahead)
+        for i in range(3):
+            state[_OFFSET + i] *= left
+    elif known:
+        state[_OFFSET : _OFFSET + 3] = 0.0
+    way = np.sqrt(state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2)
+    if way > _MOST:
+        state[_OFFSET] *= _MOST / way
+        state[_OFFSET + 1] *= _MOST / way
+    state[_OFFSET + 2] = min(max(state[_OFFSET + 2], -_MOST_TURN), _MOST_TURN)
+    end[0] += state[_OFFSET]
+    end[1] += state[_OFFSET + 1]
+    q[0], q[1], q[2], q[3] = _yawed(state[_OFFSET + 2], q)
+    state[_PLACE] = frame[0] + cosine * end[0] - sine * end[1]
+    state[_PLACE + 1] = frame[1] + sine * end[0] + cosine * end[1]
+    state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3] = _yawed(frame[2], q)
+    state[_HELD], state[_STOOD] = held, stands

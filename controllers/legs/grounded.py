@@ -1,0 +1,115 @@
+r"""A gait that flies, kept on the ground: what a body does that goes too slowly to fly.
+
+A flight lasts as long as gravity lets it, whatever the pace; so a gait with flights cannot be played slowly as it is.
+Here each flight is shared out between the foot that pushed off and the one that lands: the first stands longer, the
+other lands sooner, both where they stand in the clip. A leg goes through its motion at a phase ψ(s) instead of s,
+
+.. math:: \psi(b - \sigma_+ g_-) = b, \qquad \psi(a + \sigma_- g_+) = a
+
+for a stance from b to a with flights g₋ before and g₊ after it: it stands longer, and swings faster. The root is
+lowered until both legs reach the ground, and keeps its height.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import convolve1d, minimum_filter1d
+
+from controllers.curves.splines import round_lap
+from controllers.legs.limbs import END, Limb
+from controllers.legs.reaching import extension, shortfall
+from controllers.state import Array
+
+Mask = npt.NDArray[np.bool_]
+
+_AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
+_LOWEST = 0.3  # by which the root may be lowered [m]: who leaps farther than that cannot step
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First sample of each run of a mask that goes round, and the first sample after it, which may be beyond the end.
+
+    A mask without an end has none.
+    """
+    n = len(mask)
+    first = np.flatnonzero(mask & ~np.roll(mask, 1))
+    last = np.flatnonzero(mask & ~np.roll(mask, -1)) + 1
+    return [(int(start), int(np.append(last, last + n)[np.append(last, last + n) > start][0])) for start in first]
+
+
+def grounded(
+    rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
+) -> Array | None:
+    """Rows of a led clip (`led`) on which no flight is left, or None: it does not fly, hops on one foot, or leaps far.
+
+    Parameters
+    ----------
+    rows : Array, shape (n, nq + 5 limbs)
+        Channels at equal steps of the lap: remainder, then each limb's end.
+    signs : Array, shape (nq + 5 limbs,)
+        −1 where a channel comes back with the opposite sign after a lap.
+    stride : float
+        Way of a lap [m], along x.
+    limbs : sequence of Limb
+    standing : array of bool, shape (n, limbs)
+        Which of them stand.
+    sway : Array, shape (m, 2)
+        By which the root is moved over the floor [m], at m equal steps of the lap.
+    """
+    flights = runs(~np.any(standing, axis=1))
+    warps = [_warp(standing, j, flights) for j in range(len(limbs))]
+    if not flights or any(warp is None for warp in warps):
+        return None
+    n, result = len(rows), rows.copy()
+    twice = np.concatenate([rows, signs * rows, rows[:1]])
+    spline = CubicSpline(np.arange(2 * n + 1), twice, bc_type="periodic")
+    first = rows.shape[1] - END * len(limbs)
+    for j, (limb, warp) in enumerate(zip(limbs, warps, strict=True)):
+        assert warp is not None
+        joints = [np.arange(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints]
+        columns = np.concatenate([*joints, np.arange(first + END * j, first + END * (j + 1))])
+        result[:, columns] = spline(np.mod(warp, 2 * n))[:, columns]
+        for joint in joints:
+            result[:, joint] /= np.linalg.norm(result[:, joint], axis=1, keepdims=True)
+            # The same rotation as in the clip, so that both can be mixed.
+            result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
+        result[:, first + END * j + 3] += (warp - np.arange(n)) / n
+    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
+    short = np.zeros(n)
+    for j, limb in enumerate(limbs):
+        at = first + END * j
+        # As straight as in the clip.
+        short = np.maximum(short, shortfall(result, stride, limb, at, extension(rows, stride, limb, at)))
+    width = max(3, round(n / len(flights)))
+    window = np.hanning(width + 2)[1:-1]
+    ceiling = minimum_filter1d(rows[:, 2] - short, width, mode="wrap")
+    result[:, 2] = convolve1d(ceiling, window / window.sum(), mode="wrap")
+    if np.max(rows[:, 2] - result[:, 2]) > _LOWEST:
+        return None
+    return result
+
+
+def hastened(standing: Mask) -> float:
+    """Largest ψ' of limbs that stand as `standing` (n, limbs) says: how much faster one swings than in its clip."""
+    flights, n = runs(~np.any(standing, axis=1)), len(standing)
+    warps = [_warp(standing, j, flights) for j in range(standing.shape[1])]
+    return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
+
+
+def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
+    """ψ n of a limb at the samples of the lap; None if it never stands, or would land before it has left."""
+    n, own = len(standing), runs(standing[:, j])
+    if not own:
+        return None
+    before = {end % n: end - start for start, end in flights}
+    after = {start: end - start for start, end in flights}
+    here, there = list[float](), list[float]()
+    for start, end in own:
+        here += [start - _BEFORE * before.get(start, 0), end + _AFTER * after.get(end % n, 0)]
+        there += [float(start), float(end)]
+    if np.any(np.diff([*here, here[0] + n]) <= 0.0):
+        return None
+    laps = np.arange(-2, 3) * n
+    return PchipInterpolator(np.add.outer(laps, here).ravel(), np.add.outer(laps, there).ravel())(np.arange(n))

@@ -1,0 +1,83 @@
+r"""Joints of a limb that is led to where its end should be stay within limits while that is in the air, smoothly.
+
+With v the rotation vector of a joint, and c(v) its components clamped to an interval each (`saturation`), the joint
+becomes
+
+.. math:: v' = v + A\,S(|v|)\,(c(v) - v)
+
+A rises from 0 to 1 with the height of the end: on the ground a foot that stays where it stands counts for more than a
+joint that is a few degrees off. S is 1, and falls to 0 as |v| goes to π, where v jumps to its opposite: what turns so
+far is no limb's pose, and is at least continuous. Within the limits nothing is changed, to the last bit.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.easing import smooth_step
+from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
+from controllers.saturation import clamped
+from controllers.state import Array, Quat
+
+MARGIN = 0.1  # [rad] over which a joint that leaves its limits comes to rest, half of that beyond them
+_FROM, _TO = 2.9, 3.13  # [rad] between which S falls
+_LOW, _HIGH = 0.15, 0.35  # height of the end [m] between which A rises
+
+
+@njit
+def _step(x: float) -> tuple[float, float]:
+    """C² step from 0 to 1 on [0, 1], and its derivative."""
+    x = min(max(x, 0.0), 1.0)
+    return smooth_step(x), 30.0 * (x * (1.0 - x)) ** 2
+
+
+@njit
+def in_the_air(height: float) -> tuple[float, float]:
+    """A of an end at a height over the ground [m], and its derivative [1/m]."""
+    share, slope = _step((height - _LOW) / (_HIGH - _LOW))
+    return share, slope / (_HIGH - _LOW)
+
+
+@njit
+def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int) -> None:
+    """Hold a joint near its limits.
+
+    Parameters
+    ----------
+    limits : Array, shape (3, 2)
+        Of the components of its rotation vector [rad].
+    height : Array, shape (1 + k,)
+        Of the limb's end over the ground [m], and its derivatives by k parameters.
+    q : Quat
+        Its rotation; changed.
+    rate : Array, shape (3, k)
+        Local angular velocities with respect to the k parameters; changed.
+    tangents : int
+        k, or 0 to leave the rates alone.
+    """
+    air, rise = in_the_air(height[0])
+    if air == 0.0:
+        return
+    x, y, z = logarithm(q[0], q[1], q[2], q[3])
+    (cx, sx), (cy, sy), (cz, sz) = (
+        clamped(x, limits[0, 0], limits[0, 1], MARGIN),
+        clamped(y, limits[1, 0], limits[1, 1], MARGIN),
+        clamped(z, limits[2, 0], limits[2, 1], MARGIN),
+    )
+    if cx == x and cy == y and cz == z:
+        return
+    size = np.sqrt(x * x + y * y + z * z)
+    turned, slope = _step((size - _FROM) / (_TO - _FROM))
+    left, slope = 1.0 - turned, -slope / (_TO - _FROM)
+    share = air * left
+    ax, ay, az = cx - x, cy - y, cz - z
+    hx, hy, hz = x + share * ax, y + share * ay, z + share * az
+    q[0], q[1], q[2], q[3] = exponential(hx, hy, hz)
+    for k in range(tangents):
+        dx, dy, dz = rotation_vector_rate(x, y, z, rate[0, k], rate[1, k], rate[2, k])
+        change = air * slope * (x * dx + y * dy + z * dz) / size + rise * height[1 + k] * left
+        rate[0, k], rate[1, k], rate[2, k] = angular_velocity(
+            hx, hy, hz,
+            dx + share * (sx - 1.0) * dx + change * ax,
+            dy + share * (sy - 1.0) * dy + change * ay,
+            dz + share * (sz - 1.0) * dz + change * az,
+        )  # fmt: skip

@@ -1,0 +1,214 @@
+r"""Clips in which a limb is given by its end: where it is, how it is turned, and how high above the ground.
+
+A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
+drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while
+it moves; λ is common to all clips, and of no consequence unless some clip turns.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.legs.limbs import END, Limb
+from controllers.motion.loops import plane_exponential, turned, yawed
+from controllers.state import Array
+
+_SOFTNESS = 0.003  # [m] of the minimum of heights
+_HARD = 5e-4  # [m] likewise, where they tell where the ground is
+_RARE = 0.02  # share of frames in which a clip may be below the ground on which it stands
+
+
+def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
+    """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq), and height (n, m)."""
+    n, m, numbers = channels.shape
+    if max(limb.joints) > (numbers - 7) // 4:
+        raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb wants {limb.joints}")
+    place, turn = channels[..., :3].reshape(-1, 3), _rotations(channels, 0)
+    for joint, offset in zip(limb.joints, limb.offsets, strict=True):
+        place = place + turn.apply(offset)
+        turn = turn * _rotations(channels, joint)
+    height = place[:, 2] + _lowest(turn, limb.points, _SOFTNESS)
+    place = place + turn.apply(limb.points.mean(axis=0))
+    quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
+    dots = np.einsum("nmx,nmx->nm", quaternions[:-1], quaternions[1:])
+    quaternions[1:] *= np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[:, :, None]
+    return place.reshape(n, m, 3), quaternions, height.reshape(n, m)
+
+
+def _lowest(turn: Rotation, points: Array, softness: float) -> Array:
+    """Height of the lowest of points over the origin of their frame, turned; a soft minimum: no kinks."""
+    heights = np.stack([turn.apply(point)[..., 2] for point in points])
+    return -softness * np.log(np.exp(-heights / softness).sum(axis=0))
+
+
+def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
+    """Height of a limb's lowest point over the centre of its points, with the end's orientations (..., 4)."""
+    turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
+    return _lowest(turn, limb.points - limb.points.mean(axis=0), softness).reshape(quaternions.shape[:-1])
+
+
+def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
+    """How an end moves over the ground from each sample to the next: at the points that touch, so a foot may roll.
+
+    Parameters
+    ----------
+    places : Array, shape (n, k, 2)
+        Of the centre of the limb's points, over the ground [m].
+    quaternions : Array, shape (n, k, 4)
+        Orientations of the end over the ground.
+    headings : Array, shape (n, k)
+        Their turns about the vertical [rad], continuous along n.
+    limb : Limb
+    softness : float
+        Of the minimum that tells which points touch [m].
+
+    Returns
+    -------
+    Array, shape (n - 1, k, 3)
+        Movements (x, y) of the points, weighed by how low they are, but for what the turning does to them, and the
+        turning itself.
+    """
+    turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
+    offsets = limb.points - limb.points.mean(axis=0)
+    levers = np.stack([turn.apply(p).reshape(*headings.shape, 3) for p in offsets], axis=-2)
+    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / softness)
+    weights /= weights.sum(axis=-1, keepdims=True)
+    share, lever = 0.5 * (weights[1:] + weights[:-1])[..., None], 0.5 * (levers[1:] + levers[:-1])
+    turning = np.diff(headings, axis=0)
+    swept = turning[..., None, None] * np.stack([-lever[..., 1], lever[..., 0]], axis=-1)
+    rolled = (share * (np.diff(levers[..., :2], axis=0) - swept)).sum(axis=-2)
+    return np.concatenate([np.diff(places, axis=0) + rolled, turning[..., None]], axis=-1)
+
+
+def _rotations(channels: Array, joint: int) -> Rotation:
+    return Rotation.from_quat(channels[..., 3 + 4 * joint : 7 + 4 * joint].reshape(-1, 4), scalar_first=True)
+
+
+def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array:
+    """λ of an end at equal steps of the lap: the share of the lap's movement that it has done, less that of the lap.
+
+    Parameters
+    ----------
+    places : Array, shape (n, m, 3)
+        Of the end in the remainders of m clips [m].
+    drifts : Array, shape (m, 3)
+        Their ξ.
+    weights : Array, shape (m,), optional
+        How much each clip counts; by default as much as it turns, for only then does λ matter to a blend.
+
+    Returns
+    -------
+    Array, shape (n,)
+    """
+    n = len(places)
+    weights = np.abs(drifts[:, 2]) if weights is None else weights
+    if not weights.any():
+        return np.zeros(n)
+    rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]
+    across = np.stack([-places[..., 1], places[..., 0]], axis=-1)
+    # Over the ground an end moves with the drift of its clip, and in its frame.
+    square = ((rate + drifts[:, :2] + drifts[:, 2:] * across) ** 2).sum(axis=2)
+    pace = square / np.maximum(square.mean(axis=0), 1e-12)
+    pace = pace @ weights / weights.sum()
+    lag = (np.cumsum(pace) - 0.5 * pace - np.arange(n) - 0.5) / n
+    return lag - lag.mean()
+
+
+def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tuple[Array, Array]:
+    """Orientation and channels of a limb's end.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq)
+        Remainders of m clips at n phases.
+    drifts : Array, shape (m, 3)
+        Their ξ.
+    limb : Limb
+    lag : Array, shape (n,)
+        λ at the phases.
+
+    Returns
+    -------
+    quaternions : Array, shape (n, m, 4)
+        Of the end, in the frame that moves by exp(λ ξ).
+    ends : Array, shape (n, m, 5)
+        Its position in that frame, λ, and the height of its lowest point.
+
+    Raises
+    ------
+    ParameterError
+        If the limb has a joint that the poses do not have.
+    """
+    place, quaternions, height = end_poses(channels, limb)
+    shift, angle = plane_exponential(lag[:, None, None] * drifts)
+    place[..., :2] = turned(-angle, place[..., :2] - shift)
+    lags = np.broadcast_to(lag[:, None], height.shape)
+    return yawed(-angle, quaternions), np.concatenate([place, lags[..., None], height[..., None]], axis=2)
+
+
+def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
+    """Channels in which limbs are given by their ends.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq)
+        Remainders of m aligned loops at equal steps of the lap (see `alignment`).
+    drifts : Array, shape (m, 3)
+        Their drifts ξ.
+    limbs : sequence of Limb
+
+    Returns
+    -------
+    Array, shape (n, m, nq + 5 limbs)
+        Each limb's last joint has the end's orientation instead of its own; appended are, limb by limb, the end's
+        position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
+
+    Raises
+    ------
+    ParameterError
+        If a limb has a joint that the poses do not have.
+    """
+    result, ends = channels.copy(), list[Array]()
+    for limb in limbs:
+        quaternions, end = end_channels(channels, drifts, limb, end_lag(end_poses(channels, limb)[0], drifts))
+        column = 3 + 4 * limb.joints[2]
+        result[..., column : column + 4] = quaternions
+        ends.append(end)
+    ground = min((float(end[..., 4].min()) for end in ends), default=0.0)
+    for end in ends:
+        end[..., 4] -= ground
+    return np.concatenate([result, *ends], axis=2)
+
+
+def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> Array:
+    """Height of the lowest point of all limbs [m], a soft minimum over each one's, of channels with ends.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, m, nq + 5 limbs)
+        Of `with_ends`.
+    limbs : sequence of Limb
+        At least one.
+    softness : float
+        [m].
+
+    Returns
+    -------
+    Array, shape (n, m)
+    """
+    first, heights = channels.shape[2] - END * len(limbs), list[Array]()
+    for n, limb in enumerate(limbs):
+        column = 3 + 4 * limb.joints[2]
+        low = lowest_point(channels[..., column : column + 4], limb, softness)
+        heights.append(channels[..., first + END * n + 2] + low)
+    return np.min(heights, axis=0)
+
+
+def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
+    """Height of the ground on which each clip stands [m], shape (m,): few of its frames are below.
+
+    `channels` and `limbs` are as `lowest_of_limbs` takes them.
+    """
+    return np.quantile(lowest_of_limbs(channels, limbs, _HARD), _RARE, axis=0)

@@ -1,0 +1,209 @@
+r"""Limbs whose ends stay where they are put: feet of a blend stand where the feet of its clips stand on average.
+
+A mean of joint angles leaves the feet anywhere. So the pose of the end of a limb (a foot) is blended too, as root
+and joints are, and the limb's three joints are corrected in closed form so that its end is exactly there:
+
+- the middle joint turns by δ about its flexion axis, the law of cosines in the form A + B cos δ + C sin δ = D²;
+- the first joint turns the shortest way, until the last joint lies in the direction where it should;
+- the last joint gives the end its blended orientation.
+
+With c = (D² − A)/√(B² + C²), the cosine of the flexion asked for, and c₀ that of the blended joints, δ = f(c) − f(c₀);
+f is the arc cosine, levelled off near ±1 with two continuous derivatives. A limb asked to be longer than it is stays
+short, by a millimetre for a human leg, and moves smoothly; and δ is zero where nothing is to be corrected, however
+straight: a clip alone is left as it is. In the air, joints that would leave their limits are held (`joint_limits`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import njit
+from scipy.spatial.transform import Rotation
+
+from controllers.errors import ParameterError
+from controllers.legs.joint_limits import hold_joint
+from controllers.motion.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
+from controllers.state import Array, Vec3
+
+LIMB = 36  # numbers of a packed limb
+END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
+
+_STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
+_SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
+_ANY = 2.0 * np.pi  # [rad] that no rotation vector has
+_ROOM = 0.01  # [rad] left to what a clip uses, for what is between its frames
+_SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """Three joints in a row, the first on the root.
+
+    Parameters
+    ----------
+    joints : tuple of three int
+        Their places in a pose: joint k has the numbers 3 + 4k to 6 + 4k, the root is 0.
+    offsets : Array, shape (3, 3)
+        Origin of each in the segment before it, in the rest pose [m].
+    axis : Vec3
+        Flexion axis of the middle joint, in the frame of its own segment.
+    points : Array, shape (k, 3)
+        Of the last segment, those that may touch the ground; their centre is to be where it should [m].
+    limits : Array, shape (3, 3, 2), optional
+        Of the components of the joints' rotation vectors, beyond which they are held (`joint_limits`) [rad]. By
+        default there are none.
+
+    Raises
+    ------
+    ParameterError
+        If numbers are not finite, limits do not increase, or flexion cannot change the limb's length.
+    """
+
+    joints: tuple[int, int, int]
+    offsets: Array
+    axis: Vec3
+    points: Array
+    limits: Array = field(default_factory=lambda: np.tile([-_ANY, _ANY], (3, 3, 1)))
+
+    def __post_init__(self) -> None:
+        numbers = self.packed()
+        if numbers.shape != (LIMB,) or not np.isfinite(numbers).all():
+            raise ParameterError(
+                f"a limb has {LIMB} finite numbers (joints 3, offsets 3 × 3, axis 3, centre 3, limits 3 × 3 × 2), got "
+                f"{numbers.tolist()}"
+            )
+        if not (self.limits[..., 0] <= self.limits[..., 1]).all():
+            raise ParameterError(f"the limits of a limb's joints must increase, got {self.limits.tolist()}")
+        if min(self.joints) < 1 or len(set(self.joints)) != 3:
+            raise ParameterError(f"a limb has three joints, counted from 1; got {self.joints}")
+        for offset in self.offsets[1:]:
+            if np.linalg.norm(np.cross(self.axis, offset)) < 1e-6:
+                raise ParameterError(f"flexion about {self.axis} does not move a limb with offsets {self.offsets}")
+
+    def packed(self) -> Array:
+        """What the kernel reads: joints, offsets, unit axis, centre of the points, limits; shape (36,)."""
+        axis = np.asarray(self.axis, dtype=np.float64)
+        unit = axis / max(float(np.linalg.norm(axis)), 1e-300)
+        centre, limits = np.mean(self.points, axis=0), np.ravel(self.limits)
+        return np.concatenate([self.joints, np.ravel(self.offsets), unit, centre, limits])
+
+    def allowing(self, clips: Sequence[Array]) -> "Limb":
+        """The same limb with limits that hold none of the poses of clips, each of shape (n, nq).
+
+        Raises
+        ------
+        ParameterError
+            If the poses lack one of its joints.
+        """
+        most = min(((poses.shape[1] - 7) // 4 for poses in clips), default=max(self.joints))
+        if max(self.joints) > most:
+            raise ParameterError(f"the poses have {most} joints, a limb wants {self.joints}")
+        limits = self.limits.copy()
+        for joint, interval in zip(self.joints, limits, strict=True):
+            for poses in clips:
+                quaternions = poses[:, 3 + 4 * joint : 7 + 4 * joint]
+                vectors = Rotation.from_quat(quaternions, scalar_first=True).as_rotvec()
+                interval[:, 0] = np.minimum(interval[:, 0], vectors.min(axis=0) - _ROOM)
+                interval[:, 1] = np.maximum(interval[:, 1], vectors.max(axis=0) + _ROOM)
+        return replace(self, limits=limits)
+
+
+@njit
+def flexion(c: float) -> tuple[float, float]:
+    """Angle f(c) [rad] of a cosine, and f': the arc cosine, but levelled off beyond ±cos 0.2; C² for every number."""
+    over = (abs(c) - _SOFT) / (_HARD - _SOFT)
+    soft, slope = c, 1.0
+    if over > 0.0:
+        # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
+        root = np.cbrt(1.0 + over**3)
+        soft, slope = np.copysign(_SOFT + (_HARD - _SOFT) * over / root, c), root**-4
+    return np.arccos(soft), -slope / np.sqrt(1.0 - soft * soft)
+
+
+@njit
+def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
+    """Correct the joints of a limb so that its end is where it should be.
+
+    Parameters
+    ----------
+    limb : Array, shape (36,)
+        `Limb.packed`.
+    rotations : Array, shape (joints, 4)
+        Root orientation, then joint rotations; the limb's last holds the orientation of the end and becomes its
+        joint's rotation, the others are corrected.
+    rates : Array, shape (joints, 3, k)
+        Their local angular velocities with respect to k parameters; updated likewise.
+    root, end : Array, shape (1 + k, 3)
+        Position of root and end, and the derivatives by each parameter.
+    tangents : int
+        k, or 0 to leave the rates alone.
+    """
+    first, second, last = int(limb[0]), int(limb[1]), int(limb[2])
+    a, b, axis, point = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12), vector_at(limb, 15)
+    q_root = rotations[0, 0], rotations[0, 1], rotations[0, 2], rotations[0, 3]
+    q_first = rotations[first, 0], rotations[first, 1], rotations[first, 2], rotations[first, 3]
+    q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
+    q_end = rotations[last, 0], rotations[last, 1], rotations[last, 2], rotations[last, 3]
+
+    # The last joint as the root sees it, from its own origin and from the first joint's.
+    from_root = turned_back(q_root, minus(minus(vector_at(end[0], 0), turned(q_end, point)), vector_at(root[0], 0)))
+    line = minus(from_root, vector_at(limb, 3))
+    m, normal = turned_back(q_second, a), cross(axis, b)
+    b_axis, m_axis = dot(b, axis), dot(m, axis)
+    k_cos, k_sin = 2.0 * (dot(m, b) - m_axis * b_axis), 2.0 * dot(m, normal)
+    size = max(np.sqrt(k_cos * k_cos + k_sin * k_sin), 1e-12)
+    c = (dot(line, line) - dot(a, a) - dot(b, b) - 2.0 * m_axis * b_axis) / size
+    wanted, wanted_slope = flexion(c)
+    blended, blended_slope = flexion(k_cos / size)
+    half = 0.5 * (wanted - blended)
+    sine = np.sin(half)
+    bend = np.cos(half), sine * axis[0], sine * axis[1], sine * axis[2]
+    n_second = product(q_second, bend)
+
+    to_last = plus(a, turned(n_second, b))
+    u = turned(q_first, to_last)
+    length, distance = max(np.sqrt(dot(u, u)), 1e-9), max(np.sqrt(dot(line, line)), 1e-9)
+    # Half-angle form of the shortest rotation from u to the line; not defined half a turn apart.
+    scalar, vector = length * distance + dot(u, line), cross(u, line)
+    norm = max(np.sqrt(scalar * scalar + dot(vector, vector)), 1e-12)
+    swing = scalar / norm, vector[0] / norm, vector[1] / norm, vector[2] / norm
+    n_first = product(swing, q_first)
+    shank = product(product(q_root, n_first), n_second)
+    n_last = product((shank[0], -shank[1], -shank[2], -shank[3]), q_end)
+
+    for k in range(tangents):
+        w_root = rates[0, 0, k], rates[0, 1, k], rates[0, 2, k]
+        w_first = rates[first, 0, k], rates[first, 1, k], rates[first, 2, k]
+        w_second = rates[second, 0, k], rates[second, 1, k], rates[second, 2, k]
+        w_end = rates[last, 0, k], rates[last, 1, k], rates[last, 2, k]
+        v = minus(minus(vector_at(end[1 + k], 0), turned(q_end, cross(w_end, point))), vector_at(root[1 + k], 0))
+        d_line = minus(turned_back(q_root, v), cross(w_root, from_root))
+        d_m = cross(m, w_second)
+        d_axis = dot(d_m, axis)
+        d_cos, d_sin = 2.0 * (dot(d_m, b) - d_axis * b_axis), 2.0 * dot(d_m, normal)
+        d_size = (k_cos * d_cos + k_sin * d_sin) / size
+        d_c = (2.0 * dot(line, d_line) - 2.0 * d_axis * b_axis - c * d_size) / size
+        turn = wanted_slope * d_c - blended_slope * (d_cos - k_cos / size * d_size) / size
+        w_second = plus(turned_back(bend, w_second), (turn * axis[0], turn * axis[1], turn * axis[2]))
+        d_u = turned(q_first, plus(cross(w_first, to_last), turned(n_second, cross(w_second, b))))
+        d_scalar = dot(u, d_u) * distance / length + dot(line, d_line) * length / distance
+        d_scalar += dot(d_u, line) + dot(u, d_line)
+        d_vector = plus(cross(d_u, line), cross(u, d_line))
+        # 2 Im(Q⁻¹ ⊗ Q̇), whatever the length of Q.
+        across, share = cross(vector, d_vector), 2.0 / (norm * norm)
+        w_swing = (
+            share * (scalar * d_vector[0] - d_scalar * vector[0] - across[0]),
+            share * (scalar * d_vector[1] - d_scalar * vector[1] - across[1]),
+            share * (scalar * d_vector[2] - d_scalar * vector[2] - across[2]),
+        )
+        w_first = plus(turned_back(q_first, w_swing), w_first)
+        w_shank = plus(turned_back(n_second, plus(turned_back(n_first, w_root), w_first)), w_second)
+        w_last = minus(w_end, turned_back(n_last, w_shank))
+        for i in range(3):
+            rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
+    for i in range(4):
+        rotations[first, i], rotations[second, i], rotations[last, i] = n_first[i], n_second[i], n_last[i]
+    limits = limb[18:36].reshape(3, 3, 2)
+    for n in range(3):
+        joint = int(limb[n])
+        hold_joint(limits[n], end[:, 2], rotations[joint], rates[joint], tangents)

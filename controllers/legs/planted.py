@@ -1,0 +1,192 @@
+r"""Feet of a clip that stand where they stand: in each stance a sole keeps one place on the floor, or rolls on it.
+
+Captured feet slide, hover over the floor and sink into it by centimetres. What they do of that in their stances is
+taken from the path of each foot, smoothly, and little else. With h, which is 1 while a foot stands and 0 while it
+swings, and g, which is the other way round, both C² and never above 0 together:
+
+- Its own clock (`led`) advances at the pace g, so that it rests in a stance to the last bit.
+- Place and heading are p = p̄ − c, with the slip c' = h p̄' − κ g c. Forwards round the lap this holds a foot where it
+  landed, backwards where it will leave; the average of both is taken.
+- It is turned about its length until its breadth is level: on one corner a foot turns and creeps. Of the slope β of
+  its length β³/(β² + β_0²) remains, so that what rolls from heel to toes lies flat in between. Within a hundredth of a
+  second a body's weight does not change ends: its foot lags behind by a degree, and stood on neither.
+- Its height is lessened by what it is in the stance, and by the median of that in the swing, which goes on smoothly
+  from one stance to the next. In a swing it is h_0 over the floor at least.
+
+The root is lower by as much as the legs would be too short for that.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from controllers.curves.splines import round_lap
+from controllers.legs.footfalls import gap, smooth_step
+from controllers.legs.grounded import Mask, runs
+from controllers.legs.limb_ends import contact_moves, end_channels, lowest_point
+from controllers.legs.limbs import END, Limb
+from controllers.legs.reaching import reached, shortfall
+from controllers.motion.loops import plane_exponential, turned, yawed
+from controllers.state import Array
+
+_SWINGS = 0.35  # share of a swing at each end in which g rises
+_STANDS = 0.01  # and of a stance in which h does: feet land and leave with a little speed of their own
+_RESTS, _LONGEST_REST = 0.15, 0.03  # of a stance, and at most [s], in which its height comes to rest
+_LIFTS = 0.12  # of a swing, in which a foot comes to be clear of the floor
+_SMOOTH = 0.0025  # [m]
+_CLEAR = 0.01  # h_0, how high a foot swings at least [m]
+_CATCH_UP = 8.0  # κ ∫ g over a lap
+_NARROW = 0.02  # [m] an end of less breadth has no level
+_LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which on its level counts less, and nothing
+_FLAT = 0.05  # β_0 [rad]
+_SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
+
+
+def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
+    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C².
+
+    At most so many samples `longest` of each run.
+    """
+    n, result = len(mask), np.zeros(len(mask))
+    for start, end in runs(mask):
+        samples = np.arange(start, end)
+        edge = np.minimum(samples - start + 0.5, end - samples - 0.5)
+        result[samples % n] = smooth_step(edge / min(rise * (end - start), longest))
+    return np.ones(n) if mask.all() else result
+
+
+def planted_ends(
+    channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float, duration: float
+) -> tuple[Array, Array]:
+    """Orientation and channels of a limb's end that stands where it stands; see `limb_ends.end_channels`.
+
+    Parameters
+    ----------
+    channels : Array, shape (n, nq)
+        Remainder of the clip at equal steps of the lap.
+    drift : Array, shape (3,)
+        Its ξ.
+    limb : Limb
+    stands : array of bool, shape (n,)
+    radius : float
+        How high its points are that stand [m].
+    duration : float
+        Of the lap [s].
+
+    Returns
+    -------
+    quaternions : Array, shape (n, 4)
+    ends : Array, shape (n, 5)
+    """
+    n, stays, free = len(channels), window(stands, _STANDS), window(~stands, _SWINGS)
+    if stands.all() or not stands.any():
+        # Who never steps, or never stands, has a clock that is always even.
+        free = np.ones(n)
+    lag = (np.cumsum(free) - 0.5 * free) / free.sum() - (np.arange(n) + 0.5) / n
+    lag -= lag.mean()
+    turns, parts = end_channels(channels[:, None], drift[None], limb, lag)
+    quaternions, ends = _level(turns[:, 0], limb, 1.0 - free), parts[:, 0]
+    heights = ends[:, 2] + lowest_point(quaternions, limb, _SOFTNESS) - radius
+    # Over the ground, once round: the last sample is the first one a lap on.
+    shift, angle = plane_exponential((np.arange(n + 1) / n + np.append(lag, lag[0]))[:, None] * drift)
+    places = turned(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
+    # Heading first: how a foot rolls depends on it.
+    for kept in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
+        over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
+        heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
+        moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb, _SOFTNESS)[:, 0]
+        ahead = kept * gap(stays[:, None] * moves, np.exp(-_CATCH_UP * free / free.sum()), drift[2])
+        ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
+        quaternions = yawed(-ahead[:, 2], quaternions)
+    level = levels(heights, stands)
+    low = (1.0 - window(stands, _RESTS, _LONGEST_REST * n / duration)) * _above(0.0, heights - level)
+    ends[:, 2] += low + window(~stands, _LIFTS) * (_above(_CLEAR, low) - low) - heights
+    return quaternions, ends
+
+
+def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
+    """Orientations of an end (n, 4), laid on the floor by a share (n,): its breadth, and its length if it nearly is.
+
+    See the module's text.
+    """
+    _, sizes, axes = np.linalg.svd(limb.points - limb.points.mean(axis=0))
+    if len(sizes) < 2 or sizes[1] < _NARROW:
+        return quaternions
+    turn = Rotation.from_quat(quaternions, scalar_first=True)
+    length, breadth = turn.apply(axes[0]), turn.apply(axes[1])
+    tilt = np.arctan2(breadth[:, 2], np.cross(length, breadth)[:, 2])
+    tilt -= np.pi * np.round(tilt / np.pi)
+    # What is upright has no level.
+    lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
+    slope = np.arctan2(length[:, 2], np.hypot(length[:, 0], length[:, 1]))
+    across = np.cross(length, [0.0, 0.0, 1.0])
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    down = slope * _FLAT**2 / (slope**2 + _FLAT**2)
+    rolls, lays = ((-share * lies * angle)[:, None] * axis for angle, axis in ((tilt, length), (down, across)))
+    levelled = (Rotation.from_rotvec(lays) * Rotation.from_rotvec(rolls) * turn).as_quat(scalar_first=True)
+    same = np.sum(levelled * quaternions, axis=1, keepdims=True) >= 0.0
+    return np.where(same, levelled, -levelled)
+
+
+def levels(heights: Array, stands: Mask) -> Array:
+    """Height at which a foot of the clip stands, shape (n,): in a stance its median, smoothly to the next between."""
+    n, level = len(heights), np.zeros(len(heights))
+    stances = runs(stands)
+    for (start, end), (following, last) in zip(stances, [*stances[1:], *stances[:1]], strict=True):
+        here, there = (np.median(heights[np.arange(a, b) % n]) for a, b in ((start, end), (following, last)))
+        swing = (following - end) % n
+        level[np.arange(start, end) % n] = here
+        level[np.arange(end, end + swing) % n] = here + (there - here) * smooth_step((np.arange(swing) + 0.5) / swing)
+    return level
+
+
+def _above(least: float, heights: Array) -> Array:
+    """The larger of heights and the least [m], smooth within some millimetres."""
+    return 0.5 * (heights + least + np.hypot(heights - least, _SMOOTH))
+
+
+def with_planted_ends(
+    rows: Array,
+    channels: Array,
+    drift: Array,
+    limbs: Sequence[Limb],
+    stands: Mask,
+    radius: float,
+    duration: float,
+    stride: float,
+    sway: Array,
+) -> Array:
+    """Rows of a led clip whose feet stand where they stand, and whose root is low enough for that.
+
+    Parameters
+    ----------
+    rows : Array, shape (n, nq + 5 limbs)
+        Channels at equal steps of the lap: remainder, then each limb's end, as in the clip.
+    channels : Array, shape (n, nq)
+        The remainder, with the limbs' own joints.
+    drift : Array, shape (3,)
+        ξ of the clip, along x.
+    limbs : sequence of Limb
+    stands : array of bool, shape (n, limbs)
+        Which of them stand.
+    radius : float
+        How high over the floor their points are then [m].
+    duration : float
+        Of the lap [s].
+    stride : float
+        Way of a lap [m]; shorter than the clip's, each step is shorter by the same share.
+    sway : Array, shape (m, 2)
+        By which the root is moved over the floor [m], at m equal steps of the lap.
+    """
+    first, result, short = channels.shape[1], rows.copy(), list[Array]()
+    result[:, 0] *= stride / drift[0]
+    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
+    for j, limb in enumerate(limbs):
+        at, column = first + END * j, 3 + 4 * limb.joints[2]
+        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
+        result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
+        short.append(shortfall(result, stride, limb, at))
+    # By the same all the time: a root that bobbed for its legs would weigh more and less.
+    result[:, 2] -= np.max(short)
+    return reached(result, stride, limbs)

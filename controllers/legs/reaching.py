@@ -1,0 +1,92 @@
+"""Limbs of a led clip, at equal steps of its lap: how low the root must be for them to reach their ends, and how bent.
+
+The map corrects limbs as it goes (`limbs`), by little and softly. What is known beforehand is done beforehand, exactly:
+rows whose joints reach the ends already are left as they are where the path is straight.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from controllers.legs.limbs import END, Limb
+from controllers.state import Array
+
+_STRETCHED = 0.99  # of its length a limb may have between its ends: straighter, its joint turns ever faster
+_LEAST_BEND = 0.03  # [rad]
+
+
+def extension(rows: Array, stride: float, limb: Limb, at: int) -> float:
+    """How long a limb is between its first joint and its last at most [m]; parameters as in `shortfall`."""
+    return float(np.linalg.norm(_line(rows, stride, limb, at), axis=1).max())
+
+
+def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 0.0) -> Array:
+    """How much lower the root must be for a limb to reach its end [m], shape (n,).
+
+    Parameters
+    ----------
+    rows : Array, shape (n, nq + 5 limbs)
+        Channels (`led`).
+    stride : float
+        Way of a lap [m], along x.
+    limb : Limb
+    at : int
+        First column of its end.
+    longest : float
+        How long it may be [m], if that is more than what leaves its middle joint well bent.
+    """
+    longest = max(_STRETCHED * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
+    line = _line(rows, stride, limb, at)
+    away = np.linalg.norm(line[:, :2], axis=1)
+    return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - away**2, 0.0)))
+
+
+def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
+    """The same channels (n, nq + 5 limbs), the first two joints of each limb so that its third is where its end asks.
+
+    The middle joint turns about its flexion axis, to the side on which it is bent on average; the first one the
+    shortest way.
+    """
+    result, first = rows.copy(), rows.shape[1] - END * len(limbs)
+    for j, limb in enumerate(limbs):
+        columns = [slice(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints[:2]]
+        upper, middle = (Rotation.from_quat(rows[:, column], scalar_first=True) for column in columns)
+        root = Rotation.from_quat(rows[:, 3:7], scalar_first=True)
+        line = root.inv().apply(_line(rows, stride, limb, first + END * j))
+        a, b = limb.offsets[1:]
+        axis = np.asarray(limb.axis) / np.linalg.norm(limb.axis)
+        # |line|² = |a|² + |b|² + 2 (a·b_axis + B cos δ + C sin δ), with b turned by δ about the axis.
+        m = middle.inv().apply(a)
+        along = (m @ axis) * (b @ axis)
+        cosine, sine = m @ b - along, m @ np.cross(axis, b)
+        size, straight = np.hypot(cosine, sine), np.arctan2(sine, cosine)
+        wanted = (0.5 * ((line**2).sum(axis=1) - a @ a - b @ b) - along) / size
+        bend = np.arccos(np.clip(wanted, -1.0, np.cos(_LEAST_BEND)))
+        # A knee that is overstretched now and then bends like one that is not.
+        turn = straight - np.sign(straight.mean()) * bend
+        middle = middle * Rotation.from_rotvec(turn[:, None] * axis)
+        reach = upper.apply(a + middle.apply(b))
+        upper = _shortest(reach, line) * upper
+        for column, turned in zip(columns, (upper, middle), strict=True):
+            quaternions = turned.as_quat(scalar_first=True)
+            same = np.sum(quaternions * rows[:, column], axis=1, keepdims=True) >= 0.0
+            result[:, column] = np.where(same, quaternions, -quaternions)
+    return result
+
+
+def _line(channels: Array, stride: float, limb: Limb, at: int) -> Array:
+    """From a limb's first joint to its last, in the axes of the path [m], shape (n, 3)."""
+    place = 3 + 4 * limb.joints[2]
+    end = Rotation.from_quat(channels[:, place : place + 4], scalar_first=True)
+    root = Rotation.from_quat(channels[:, 3:7], scalar_first=True)
+    line = channels[:, at : at + 3] - end.apply(limb.points.mean(axis=0))
+    line[:, 0] += stride * channels[:, at + 3]
+    return line - channels[:, :3] - root.apply(limb.offsets[0])
+
+
+def _shortest(u: Array, v: Array) -> Rotation:
+    """Smallest rotations that turn directions u into v (n, 3), less than half a turn apart."""
+    u, v = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (u, v))
+    quaternions = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
+    return Rotation.from_quat(quaternions, scalar_first=True)

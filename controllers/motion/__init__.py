@@ -1,0 +1,1 @@
+"""Motions as functions of time, whatever they drive: loops, means, changes from one to another."""

@@ -1,0 +1,1 @@
+"""The walker that is led: its path over the floor, its gait."""

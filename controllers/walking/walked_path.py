@@ -1,0 +1,115 @@
+r"""A path that grows at its front while it is walked, and is remembered: uniform cubic B-splines in a ring.
+
+.. math:: A(s) = \sum_j B(s/\Delta - j)\,(x_j, y_j, \theta_j, \varphi_j)
+
+s is the arc length [m], (x, y) the place on the floor [m] and θ the heading [rad]. A is C², its arc length is s to
+second order in κΔ, and its heading turns where neighbouring rows differ and nowhere else: between rows j and j + 1
+that is for s from (j − 1) Δ to (j + 2) Δ. φ [rad] is how far one who goes there leans to the left. A row also keeps
+how far the path was meant to bend before it, |κ| [1/m], and the acceleration to the left that this takes [m/s²].
+
+The ring holds the last `ROWS` rows, 61 m: an endless walk needs no more memory, and what lies farther back is
+forgotten. A packed path is ``[front, rows (ROWS × 6)]``; row j is at ``j mod ROWS``, front is the last j.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.splines import basis
+from controllers.state import Array
+
+STEP = 0.03  # Δ [m]
+GRAVITY = 9.81  # g [m/s²]
+ROWS = 2048
+PATH_X, PATH_Y, PATH_HEADING, PATH_LEAN, PATH_BEND, PATH_SIDEWARDS, ROW = range(7)
+PACKED_PATH = 1 + ROW * ROWS
+
+
+def straight_path(x: float, y: float, heading: float, ahead: float) -> Array:
+    """Packed path straight on through (x, y) [m] at s = 0, laid up to `ahead` [m] of it; so was it always before."""
+    last = int(np.ceil(ahead / STEP)) + 1
+    rows = np.arange(last - ROWS + 1, last + 1)
+    path = np.zeros((ROWS, ROW))
+    path[rows % ROWS, PATH_X], path[rows % ROWS, PATH_Y] = (
+        x + rows * STEP * np.cos(heading),
+        y + rows * STEP * np.sin(heading),
+    )
+    path[:, PATH_HEADING] = heading
+    return np.concatenate([[last], path.ravel()])
+
+
+@njit
+def path_front(memory: Array, path: int) -> float:
+    """Largest s [m] at which the path at ``memory[path:]`` is laid."""
+    return (memory[path] - 1.0) * STEP
+
+
+@njit
+def path_back(memory: Array, path: int) -> float:
+    """Least s [m] that is remembered."""
+    return (memory[path] - ROWS + 3.0) * STEP
+
+
+@njit
+def path_value(memory: Array, path: int, s: float, channel: int) -> tuple[float, float]:
+    """A channel of A(s) and its derivative by s; behind the back and beyond the front, those there."""
+    place = min(max(s, path_back(memory, path)), path_front(memory, path)) / STEP
+    row = min(np.floor(place), memory[path] - 2.0)
+    u = place - row
+    j, at = int(row), path + 1 + channel
+    p0, p1 = memory[at + ROW * ((j - 1) % ROWS)], memory[at + ROW * (j % ROWS)]
+    p2, p3 = memory[at + ROW * ((j + 1) % ROWS)], memory[at + ROW * ((j + 2) % ROWS)]
+    b0, b1, _, b3 = basis(u)
+    # By differences, so that a straight path has the same heading everywhere, to the last bit.
+    a, b, c = p1 - p0, p2 - p1, p3 - p2
+    value = p1 - b0 * a + (1.0 - b0 - b1) * b + b3 * c
+    slope = 0.5 * (1.0 - u) * (1.0 - u) * a + (0.5 + u * (1.0 - u)) * b + 0.5 * u * u * c
+    return value, slope / STEP
+
+
+@njit
+def lay_row(memory: Array, path: int, turn: float, bend: float, sidewards: float) -> None:
+    """One more row in front, its heading turned by `turn` [rad] from the last; the oldest row is forgotten."""
+    front = int(memory[path])
+    last, new = path + 1 + ROW * (front % ROWS), path + 1 + ROW * ((front + 1) % ROWS)
+    middle = memory[last + PATH_HEADING] + 0.5 * turn
+    memory[new + PATH_X] = memory[last + PATH_X] + STEP * np.cos(middle)
+    memory[new + PATH_Y] = memory[last + PATH_Y] + STEP * np.sin(middle)
+    memory[new + PATH_HEADING] = memory[last + PATH_HEADING] + turn
+    memory[new + PATH_LEAN], memory[new + PATH_BEND], memory[new + PATH_SIDEWARDS] = 0.0, bend, sidewards
+    memory[path] = front + 1.0
+
+
+@njit
+def lean_row(memory: Array, path: int, back: int, decay: float, past: float) -> float:
+    r"""Lean of the row that lies `back` rows behind the front, from the accelerations before and after it.
+
+    .. math:: \tan\varphi_m = \frac{1}{g N}\sum_j r^{|j - m|}\,a_j
+
+    is how an inverted pendulum, whose foot goes on the path, moves its weight before a bend and after it.
+
+    Parameters
+    ----------
+    memory, path
+        Written: the lean of that row.
+    back : int
+        Rows in front of it that count.
+    decay : float
+        r, from row to row.
+    past : float
+        Σ r^(m − 1 − j) a_j over the rows behind it.
+
+    Returns
+    -------
+    float
+        The same sum for the next row.
+    """
+    front = int(memory[path])
+    row = front - back
+    past = decay * past + memory[path + 1 + ROW * (row % ROWS) + PATH_SIDEWARDS]
+    total, share, norm = past, 1.0, 1.0 / (1.0 - decay)
+    for j in range(row + 1, front + 1):
+        share *= decay
+        total += share * memory[path + 1 + ROW * (j % ROWS) + PATH_SIDEWARDS]
+        norm += share
+    memory[path + 1 + ROW * (row % ROWS) + PATH_LEAN] = np.arctan(total / (norm * GRAVITY))
+    return past

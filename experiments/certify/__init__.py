@@ -1,0 +1,1 @@
+"""Certificates of fields, runs and clips, kept in folders."""

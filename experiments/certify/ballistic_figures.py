@@ -1,0 +1,138 @@
+"""Drawings of flights: a clip against free fall, and what the physical figure makes of it at many rates.
+
+``python -m experiments.certify.ballistic_figures docs ../shared/mocap`` flies the embedded jump and backflip and two
+captured jumps, draws the picture of the docs and prints its table.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from controllers.certificates.flight.ballistic import FlightJudgement
+from controllers.certificates.flight.flight_fit import best_fall
+from controllers.certificates.flight.tolerance import GRAVITY
+from experiments.certify.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
+from models.mocap.library import embedded, load_clip
+
+_COLORS = {"certified": "#2a7f4f", "refuted": "#c2473b", "unknown": "#b98a1d"}
+_RATES = 13  # flown by the physical figure
+
+
+def flights_figure(ballistics: ClipBallistics) -> Figure:
+    """Height of the centre of mass with the nearest free fall of each flight, and every frame's admissible rates."""
+    motion = ballistics.motion
+    times = np.arange(len(ballistics.bounds.low)) / motion.fps
+    drawing = Figure(figsize=(7.2, 4.8), layout="constrained")
+    height, rate = drawing.subplots(2, 1, sharex=True)
+    height.plot(times, motion.com[: len(times), 2], color="#566072", label="centre of mass")
+    for flight in ballistics.flights:
+        a, b = flight.fit.start, flight.fit.end
+        _, (p, v) = best_fall(motion.com[a : b + 1], motion.fps, 1.0)
+        t = np.linspace(0.0, flight.fit.duration, 40)
+        color = _COLORS[flight.verdict]
+        height.axvspan(a / motion.fps, b / motion.fps, color=color, alpha=0.15, lw=0)
+        height.plot(a / motion.fps + t, p[2] + v[2] * t - GRAVITY / 2 * t**2, color=color, ls="--", label="free fall")
+    height.set(ylabel="height [m]", title="flights: green certified, red refuted, yellow unknown")
+    height.legend(*_once(height), frameon=False, fontsize=8)
+    rate.fill_between(
+        times, ballistics.bounds.low, np.minimum(ballistics.bounds.high, 3.0), color="#dbe7f4", step="mid"
+    )
+    rate.axhline(1.0, color="#566072", lw=0.8)
+    rate.set(ylabel="admissible rate σ", xlabel="time [s]", ylim=(0.0, 3.0), xlim=(times[0], times[-1]))
+    return drawing
+
+
+class FlownClip(NamedTuple):
+    """The longest flight of a clip, flown by the physical figure at many rates.
+
+    Attributes
+    ----------
+    name : str
+        Of the clip.
+    ballistics : ClipBallistics
+        What is certified.
+    flight : FlightJudgement
+        The flight.
+    trials : list of FlightTrial
+        One for every rate.
+    """
+
+    name: str
+    ballistics: ClipBallistics
+    flight: FlightJudgement
+    trials: list[FlightTrial]
+
+
+def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
+    """Fly the longest flight of a clip at rates inside and outside of those at which it can be done."""
+    flight = max(ballistics.flights, key=lambda flight: flight.fit.duration)
+    low, high = flight.done or flight.seen
+    rates = np.geomspace(0.8 * low, 1.25 * min(high, 2.0), _RATES)
+    return FlownClip(name, ballistics, flight, [fly(ballistics.clip, flight.fit, float(rate)) for rate in rates])
+
+
+def rates_table(cases: Sequence[FlownClip]) -> str:
+    """Distance of the centres of mass over σ as Markdown: a row a clip and rate, found and predicted."""
+    lines = ["| clip | σ | can be done | strays [cm] | predicted [cm] |", "|---|---|---|---|---|"]
+    for case in cases:
+        low, high = case.flight.done or (np.inf, 0.0)
+        for trial in case.trials:
+            said = "yes" if low <= trial.rate <= high else "no"
+            row = f"{trial.rate:.2f} | {said} | {100 * trial.distance:.1f} | {100 * trial.predicted:.1f}"
+            lines.append(f"| {case.name} | {row} |")
+    return "\n".join(lines)
+
+
+def rates_figure(cases: Sequence[FlownClip]) -> Figure:
+    """How far the physical figure strays from the longest flight of each clip, over the rate at which it is played."""
+    drawing = Figure(figsize=(3.6 * len(cases), 3.2), layout="constrained")
+    for ax, case in zip(drawing.subplots(1, len(cases), squeeze=False)[0], cases, strict=True):
+        _draw_rates(ax, *case)
+    return drawing
+
+
+def _draw_rates(
+    ax: Axes, name: str, ballistics: ClipBallistics, flight: FlightJudgement, trials: list[FlightTrial]
+) -> None:
+    low, high = flight.done or flight.seen
+    rates = [trial.rate for trial in trials]
+    com = ballistics.motion.com[flight.fit.start : flight.fit.end + 1]
+    many = np.geomspace(rates[0], rates[-1], 100)
+    predicted = [100 * best_fall(com, ballistics.motion.fps, float(rate))[0] for rate in many]
+    ax.plot(many, predicted, color="#2f6db3", lw=1.2, label="certificate")
+    ax.plot(rates, [100 * trial.distance for trial in trials], "o", ms=4, color="#c2473b", label="physical figure")
+    ax.axhline(5.0, color="#566072", lw=0.8, ls="--")
+    if flight.done is not None:
+        ax.axvspan(low, min(high, 2.0), color="#dbe7f4", lw=0, label="can be done")
+    ax.axvspan(*flight.seen, color="#e4f1e6", lw=0, label="seen as natural")
+    ax.set(title=name, xlabel="rate σ", xlim=(rates[0], rates[-1]))
+    ax.set_ylabel("distance of centres of mass [cm]")
+    ax.set_ylim(bottom=0)
+    ax.legend(frameon=False, fontsize=7)
+
+
+def _once(ax: Axes) -> tuple[list[object], list[str]]:
+    handles, labels = ax.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    return list(named.values()), list(named)
+
+
+def main(folder: Path, mocap: Path) -> None:
+    """Draw the picture of the docs into a folder, and print its table; `mocap` holds the captured jumps."""
+    clips = {
+        "jump (embedded)": embedded("jump"),
+        "backflip (embedded)": embedded("backflip"),
+        **{f"CMU {name}": load_clip(mocap / "cmu_amc" / f"{name}.amc") for name in ("02_04", "16_09")},
+    }
+    cases = [flown(name, clip_ballistics(clip)) for name, clip in clips.items()]
+    rates_figure(cases).savefig(folder / "ballistics.png", dpi=110)
+    print(rates_table(cases))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

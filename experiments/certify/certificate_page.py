@@ -1,0 +1,113 @@
+"""What people see of a certificate: the boundary of the gains, the region, a clip's flights, and a readable page."""
+
+from collections.abc import Mapping
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.certificates.loop.stability import River, boundary
+from controllers.certificates.report import Certificate, Verdict
+from experiments.certify.ballistics import ClipBallistics
+
+Array = npt.NDArray[np.float64]
+
+_COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
+_RATES = (0.25, 4.0)  # that the picture of admissible rates shows
+
+
+def stability_figure(river: River, verdict: Verdict) -> Figure:
+    """Boundary of the gains with the river's own, and the critical stiffness along the curve."""
+    damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
+    critical = boundary(river, damping)
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    gains, along = figure.subplots(1, 2)
+    gains.fill_between(damping, 1.0, np.maximum(critical, 1.0), color="#dbe7f4", label="stable at every phase, no hand")
+    gains.plot(damping, critical, color="#2f6db3")
+    gains.plot(river.b_d, river.k_r, "o", color="#c2473b", label="this river")
+    gains.set(xscale="log", yscale="log", xlabel="b_d [N s/m]", ylabel="k_r [N/m]", ylim=(10.0, None))
+    gains.set_title("stability boundary", loc="left")
+    gains.legend(frameon=False, fontsize=8, loc="lower center")
+    phases = np.asarray(verdict.figures["phases"], dtype=np.float64)
+    along.plot(phases, np.asarray(verdict.figures["critical_stiffness"], dtype=np.float64), color="#2f6db3")
+    along.axhline(river.k_r, color="#c2473b", label="this river")
+    along.set(yscale="log", xlabel="phase [s]", ylabel="critical k_r [N/m]")
+    along.set_title("along the curve, worst hand", loc="left")
+    along.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def region_figure(verdict: Verdict) -> Figure:
+    """Edge of the region and of the ball over offset and wrong speed, for the lightest and the heaviest hand."""
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
+    masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
+    for axes, (outer, inner), mass in zip(figure.subplots(1, 2), edges, masses, strict=True):
+        label = "region, firm hands" if "firm_hands" in verdict.figures else "region"
+        axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4", label=label)
+        axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3")
+        axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
+        axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
+        axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
+        axes.legend(frameon=False, fontsize=8, loc="upper right")
+    return figure
+
+
+def flights_figure(found: ClipBallistics) -> Figure:
+    """Height of the centre of mass with the free fall nearest to each flight, and the admissible rates of a lap."""
+    motion, lap = found.motion, len(found.bounds.low)
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    height, rates = figure.subplots(1, 2)
+    times = np.arange(lap) / motion.fps
+    height.plot(times, motion.com[:lap, 2], color="#566072", label="centre of mass")
+    for number, flight in enumerate(found.flights):
+        fit = flight.fit
+        t = np.linspace(0.0, fit.duration, 50)
+        height.axvspan(fit.time, fit.time + fit.duration, color=_COLOURS[flight.verdict], alpha=0.15, lw=0)
+        fall = motion.com[fit.start, 2] + fit.take_off_speed * t - 0.5 * GRAVITY * t**2
+        height.plot(
+            fit.time + t,
+            fall,
+            "--",
+            color=_COLOURS[flight.verdict],
+            label=None if number else "free fall between its ends",
+        )
+    height.set(xlabel="time [s]", ylabel="height [m]")
+    height.set_title("flights", loc="left")
+    height.legend(frameon=False, fontsize=8)
+    low, high = (np.clip(np.nan_to_num(rate, posinf=_RATES[1]), *_RATES) for rate in found.bounds[:2])
+    rates.fill_between(
+        times, low, np.maximum(low, high), color="#dbe7f4", label="in flight by gravity, else by friction", step="mid"
+    )
+    rates.axhline(1.0, color="#c2473b", label="as recorded")
+    rates.set(yscale="log", xlabel="time [s]", ylabel="rate σ", ylim=_RATES)
+    rates.set_yticks([0.25, 0.5, 1.0, 2.0, 4.0], ["0.25", "0.5", "1", "2", "4"])
+    rates.minorticks_off()
+    rates.set_title("admissible rates", loc="left")
+    rates.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
+    """A readable page of a certificate; `plots` are files beside it, with what they show."""
+    parts = [
+        "<!doctype html><meta charset='utf-8'><title>Certificate</title>",
+        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#222}"
+        "td{padding:.1rem .8rem .1rem 0;vertical-align:top}img{width:100%}small{color:#666}</style>",
+        f"<h1>Certificate</h1><p><small>inputs {escape(certificate.inputs)}</small></p>",
+    ]
+    for name, verdict in certificate.verdicts.items():
+        numbers = {key: value for key, value in verdict.figures.items() if isinstance(value, float)}
+        rows = "".join(f"<tr><td>{escape(key)}</td><td>{value:.5g}</td></tr>" for key, value in numbers.items())
+        margin = "" if verdict.margin is None else f" <small>margin {verdict.margin:.4g}</small>"
+        parts.append(
+            f"<h2>{escape(name)}: <span style='color:{_COLOURS[verdict.verdict]}'>{verdict.verdict}</span>{margin}</h2>"
+            f"<p>{escape(verdict.reason)}</p><ul>{''.join(f'<li>{escape(a)}</li>' for a in verdict.assumptions)}</ul>"
+            f"<table>{rows}</table>"
+        )
+        if verdict.counterexample:
+            parts.append(f"<p>Counterexample: <code>{escape(str(dict(verdict.counterexample)))}</code></p>")
+    parts += [f"<img src='{escape(file)}' alt='{escape(shows)}'>" for file, shows in plots.items()]
+    return "\n".join(parts)

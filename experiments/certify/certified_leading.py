@@ -1,0 +1,149 @@
+"""Certificate of LEADING: stability in every regime of its force, along the default S, in any direction of the path."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from controllers.certificates.loop.device import Device
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.leading_law import Regime, walking
+from controllers.certificates.loop.passivity import passivity
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.report import Verdict
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.leading import Leading
+from controllers.safety.limiter import ForceLimiter
+from experiments.config.run_config import RunConfig
+from experiments.setups.figure_maps import figure_legs
+from experiments.setups.lead import law, led_map
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+
+QUARTERS = 0.25 * np.pi * np.arange(4)
+_ASSUMPTIONS = (
+    "k_r is LEADING's k_l, with k_z in proportion; b_d is its b",
+    "the figure is frozen: it moves at a speed of its own, at a bound of its speed or its pull; where it follows "
+    "freely (walker_radius) it is part of the state",
+)
+
+
+def leading_field(config: RunConfig, clip: Clip) -> Leading:
+    """The field of a run in the mode "lead".
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval, or the clip cannot be led.
+    """
+    figure = figure_model(config.scene.stature, config.scene.mass)
+    return law(config, led_map(clip, figure_legs(figure), 0)[1])
+
+
+def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
+    """Regimes by what is added to the names of their verdicts, in directions of the path that stand for all.
+
+    On its path, or ahead of it in the reach of an arc (the same with t for n): ""; held back on it: ``_back``; beside
+    what it reaches: ``_aside``; and too far ahead besides, as far as the limiter lets a hand pull: ``_beyond``.
+    """
+    lead = 2.0 * field.gait.speed / field.rate
+    drawn = field.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
+    near, far = field.curvature * lead, field.curvature * (lead + drawn)
+    sides = [(sign, heading) for sign in (1.0, -1.0) for heading in QUARTERS[::2].tolist()]
+    return {
+        "": [Regime(False, True, heading=heading) for heading in QUARTERS.tolist()],
+        "_back": [Regime(True, True)],
+        "_aside": [Regime(False, True, True, sign * near, heading) for sign, heading in sides],
+        "_beyond": [Regime(True, True, True, sign * far, heading) for sign, heading in sides],
+    }
+
+
+def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling) -> River:
+    """LEADING in one regime as certificates know it."""
+    law_there = regime.law(field.scale, field.k_z / max(field.k_l, 1e-3))
+    return River(law_there, field.k_l, field.b, float("inf"), curve, device, sampling)
+
+
+def certify_leading(
+    field: Leading, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange
+) -> dict[str, Verdict]:
+    """Stability in every regime, passivity, the power that the force can give, and why there is no region.
+
+    Parameters
+    ----------
+    field : Leading
+        The law.
+    curve : Trajectory
+        Along which the loop is linearised.
+    device, sampling, hands
+        As in `stability`.
+    """
+    verdicts: dict[str, Verdict] = {}
+    for name, regimes in leading_regimes(field).items():
+        found = [stability(leading_river(field, it, curve, device, sampling), hands.hands()) for it in regimes]
+        verdicts["stability" + name] = _least(found)
+    radius = max(_walker_radius(field, regime, curve, device, sampling, hands) for regime in _FOLLOWED)
+    for name in ("stability", "stability_back"):
+        verdict = verdicts[name]
+        figures = {**verdict.figures, "walker_radius": radius}
+        if radius >= 1.0 and verdict.verdict == "certified":
+            reason = f"stable with the walker frozen, but {radius:.5g} is the spectral radius with it; {verdict.reason}"
+            verdict = Verdict("unknown", reason, verdict.margin, verdict.assumptions, {}, figures)
+        verdicts[name] = replace(verdict, figures=figures)
+    held = leading_river(field, Regime(True, True), curve, device, sampling)
+    return verdicts | {"passivity": passivity(held), "energy": leading_energy(field), "region": _NO_REGION}
+
+
+_NO_REGION = Verdict(
+    "unknown",
+    "no region is sought: a hand within the dead bands feels no spring, so there is no curve to which it is drawn",
+)
+
+
+def leading_energy(field: Leading) -> Verdict:
+    r"""Verdict on the power that the force gives a hand, whatever the hand and the figure do.
+
+    .. math:: F \cdot v = f(p, t) \cdot v - b\,|v|^2 \le |f|^2 / 4 b
+
+    with f what the springs pull. It does not ask for a potential, which the force has none of ahead and aside. The
+    bound is told for springs that pull as much as the limiter lets through.
+    """
+    force = ForceLimiter(1e-3).peak
+    if field.b == 0.0:
+        return Verdict("unknown", "without damping nothing bounds the power: ahead and aside there is no potential")
+    power = force**2 / (4.0 * field.b)
+    reason = (
+        f"while the springs pull at most {force:g} N they give a hand at most {power:.3g} W, and drive it at most at "
+        f"{force / field.b:.3g} m/s; ahead and aside they can do so for as long as it goes round in a loop"
+    )
+    figures: dict[str, object] = {"power_bound": power, "speed_bound": force / field.b}
+    assumptions = ("damping by the hand's own velocity: what sampling, filter and delay add is told by passivity",)
+    return Verdict("certified", reason, None, assumptions, {}, figures)
+
+
+_FOLLOWED = (Regime(True, True), *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()))
+
+
+def _walker_radius(
+    field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange
+) -> float:
+    """Largest spectral radius with the walker as state, over phases and hands."""
+    river = leading_river(field, regime, curve, device, sampling)
+    radii = [
+        np.abs(
+            np.linalg.eigvals(
+                walking(SampledLoop(river.still(hand), sampling), regime, field.scale, field.rate, field.k_l, field.b)
+            )
+        ).max()
+        for hand in hands.hands()
+    ]
+    return float(max(radii))
+
+
+def _least(verdicts: Sequence[Verdict]) -> Verdict:
+    """The worst verdict, and of equal ones that with the least margin."""
+    order = ("refuted", "unknown", "certified")
+    worst = min(verdicts, key=lambda found: (order.index(found.verdict), found.margin or 0.0))
+    return replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))

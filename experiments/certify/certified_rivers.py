@@ -1,0 +1,152 @@
+"""Certificates of the rivers of a run: stability of each, and the switching where they meet."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.certificates.loop.device import Device
+from controllers.certificates.loop.hand import HandImpedance, HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.report import Verdict
+from controllers.certificates.switching.common_lyapunov import Common, common_lyapunov
+from controllers.certificates.switching.switching import Keeping, Sharing, rival, switching
+from controllers.certificates.switching.switching_search import counterexample
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.safety.limiter import ForceLimiter
+from experiments.certify.crossing_simulation import simulated_course
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import default_rivers, law
+
+Array = npt.NDArray[np.float64]
+
+
+class Meeting(NamedTuple):
+    """Where one river is nearest to another.
+
+    Attributes
+    ----------
+    own, other : int
+        Their numbers.
+    phase : float
+        Of the first [s].
+    """
+
+    own: int
+    other: int
+    phase: float
+
+
+def certified_bundle(bundle: RiverBundle, device: Device, sampling: Sampling) -> tuple[River, ...]:
+    """The rivers of a bundle as certificates know them."""
+    return tuple(River(FOLLOW_LAW, r.drag / r.tau, r.drag, r.epsilon, r.curve, device, sampling) for r in bundle.rivers)
+
+
+def meetings(rivers: Sequence[River]) -> list[Meeting]:
+    """Where tubes overlap, for every ordered pair: the phase at which the curves are nearest."""
+    found: list[Meeting] = []
+    for i, j in permutations(range(len(rivers)), 2):
+        distance = rival(rivers[i], rivers[j]).distance
+        if distance.min() < rivers[i].width + rivers[j].width:
+            found.append(Meeting(i, j, float(rivers[i].phases()[int(distance.argmin())])))
+    return found
+
+
+def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, crossing: str) -> Common | None:
+    """Common Lyapunov function where two rivers meet, in the middle hand of a range, which stays there.
+
+    Of each river, of none, and where rivers are summed of both; so any switching and any blending of them decays.
+    """
+    hand = HandImpedance(*(0.5 * (low + high) for low, high in (hands.mass, hands.damping, hands.stiffness)))
+    if hand.stiffness == 0.0:
+        return None
+    maps: list[Array] = []
+    feedback: list[Array] = []
+    for number in (place.own, place.other):
+        river = rivers[number]
+        here = rivers[place.own].curve.point(place.phase)
+        near = int(np.argmin(np.linalg.norm(river.curve.point(river.phases()) - here, axis=1)))
+        loop = SampledLoop(river.still(hand), river.sampling)
+        free = loop.matrices(0.0, 0.0)[near]
+        feedback.append(loop.matrices(river.k_r, river.b_d)[near] - free)
+        maps.append(free)
+    vertices = [maps[0], maps[0] + feedback[0], maps[0] + feedback[1]]
+    return common_lyapunov([*vertices, maps[0] + feedback[0] + feedback[1]] if crossing == "sum" else vertices)
+
+
+def certify_rivers(
+    config: RunConfig, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
+) -> dict[str, Verdict]:
+    """Stability of the rivers of a run besides the first, and the switching between all of them.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Of the run, in the mode of rivers.
+    main : River
+        The one that the run begins on.
+    hands : HandRange
+        As in `stability`.
+    push : float
+        Largest force of the hand [N].
+    curves : mapping of str to Trajectory
+        Of the rivers, the first one's first; one alone stands for the default rivers about it.
+    """
+    sampling, ceiling = main.sampling, ForceLimiter(main.sampling.period).peak
+    own = _lifted_bundle(config, curves) if len(curves) > 1 else None
+    bundle = own or default_rivers(config, main.curve)
+    rivers = certified_bundle(bundle, main.device, sampling)
+    names = tuple(zip(bundle.names, rivers, strict=True))[1:]
+    verdicts = {f"stability_{name}": stability(river, hands.hands()) for name, river in names}
+    places = meetings(rivers)
+    common = held_common(rivers, places[0], hands, config.crossing) if places else None
+    field = law(config, main.curve, rivers=own)
+    if isinstance(field, HigherOrder):
+        found = _search(field, rivers, places, push)
+        sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+        others = [tuple(other for other in rivers if other is not river) for river in rivers]
+        keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
+        return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
+    return verdicts | {"switching": _summed(common)}
+
+
+def _lifted_bundle(config: RunConfig, curves: Mapping[str, Trajectory]) -> RiverBundle:
+    """The rivers of a lifted map, as `lifted_runs.lifted_rivers` has them, the one that the run begins on first."""
+    from experiments.setups.lifted_runs import lifted_river
+
+    rivers = tuple(lifted_river(curve, config) for curve in curves.values())
+    return RiverBundle(rivers, tuple(name.removeprefix("_") or "first" for name in curves))
+
+
+def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float) -> dict[str, object]:
+    """First counterexample: unpushed hands first, at every meeting; none is looked for where torques are late."""
+    if rivers[0].sampling.delay > 0.0:
+        return {}
+    simulate = partial(simulated_course, field, rivers[0].sampling)
+    for newtons in dict.fromkeys((0.0, push)):
+        for place in places:
+            held, other = rivers[place.own], rivers[place.other]
+            grid = other.phases()
+            near = int(np.argmin(np.linalg.norm(other.curve.point(grid) - held.curve.point(place.phase), axis=1)))
+            towards = other.curve.velocity(grid[near])
+            found = counterexample(field, place.own, held, place.phase, towards, (newtons,), simulate)
+            if found:
+                return found
+    return {}
+
+
+def _summed(common: Common | None) -> Verdict:
+    """Verdict on rivers that are summed: nothing switches, but windows come and go."""
+    if common is None:
+        return Verdict("unknown", "no common Lyapunov function of the rivers, of none and of both was found")
+    said = f"a hand that holds on settles however rivers come and go: a common Lyapunov function, ρ = {common.rate:.4g}"
+    assumptions = ("a hand in the middle of its range stays where two rivers are nearest", "linear, in that place")
+    return Verdict("certified", said, 1.0 - common.rate, assumptions, {}, {"common_p": common.p})

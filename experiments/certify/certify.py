@@ -1,0 +1,187 @@
+"""Certificates of a run's field, before it is felt, and of a clip, before it is played; kept in a folder."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.certificates.loop.energy import energy
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS
+from controllers.certificates.loop.passivity import passivity
+from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.region.region import region
+from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
+from controllers.errors import ParameterError
+from controllers.safety.limiter import ForceLimiter
+from experiments.certify.ballistics import clip_ballistics
+from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
+from experiments.certify.certified_clips import certify_clips
+from experiments.certify.certified_device import phantom_device
+from experiments.certify.certified_field import (
+    certificate_inputs,
+    certified_curves,
+    certified_laws,
+    certified_sampling,
+    clip_inputs,
+    read_certificate,
+)
+from experiments.certify.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
+from experiments.certify.certified_rivers import certify_rivers
+from experiments.config.run_config import RunConfig
+from experiments.setups.clips import load_clips
+from models.mocap.clip import Clip
+
+CERTIFICATE, PAGE = "certificate.json", "certificate.html"
+PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
+
+
+def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
+    """The laws of a run as they are certified, with a delay of the torques [s]; named as in `certified_laws`.
+
+    A bunny is taken to run at the clock's pace.
+
+    Raises
+    ------
+    ParameterError
+        If there is no certificate for the run's mode, or a number is out of its interval.
+    """
+    curves, device, sampling = certified_curves(config), phantom_device(), certified_sampling(config, delay)
+    return {
+        name: River(LAWS[law], stiffness, damping, width, curves[""], device, sampling)
+        for name, (law, stiffness, damping, width) in certified_laws(config).items()
+    }
+
+
+def certify(rivers: Mapping[str, River], hands: HandRange, push: float) -> dict[str, Verdict]:
+    """Stability and region with hands within intervals, passivity; and the bound for a push [N], FOLLOW's alone."""
+    verdicts: dict[str, Verdict] = {}
+    for name, river in rivers.items():
+        verdicts["stability" + name] = stability(river, hands.hands())
+        verdicts["passivity" + name] = passivity(river)
+        ceiling = ForceLimiter(river.sampling.period).peak
+        verdicts["region" + name] = region(river, hands, ceiling, verdicts["stability" + name])
+        if river.law is FOLLOW_LAW:
+            verdicts["energy" + name] = energy(river, push, ceiling)
+    return verdicts
+
+
+def certify_into(
+    config: RunConfig,
+    out: Path,
+    delay: float = 0.0,
+    hands: HandRange | None = None,
+    push: float = 1.0,
+    clips: Sequence[Clip] = (),
+    judging: Judging = JUDGING,
+) -> Certificate:
+    """Certify a run's field and clips, or take the certificate that the folder holds if it is of the same inputs.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Of the run.
+    out : Path
+        Folder; written are ``certificate.json``, ``certificate.html``, ``stability.png``, ``region.png``.
+    delay : float
+        Of the torques [s].
+    hands : HandRange, optional
+        Intervals of the hand's impedance.
+    push : float
+        U_max of the bound on the distance [N].
+    clips : sequence of Clip
+        Whose flights are judged besides; in the mode "lead" the first of them is led.
+    judging : Judging
+        What passes for a flight, and the floor's friction.
+
+    Raises
+    ------
+    ControllerError, SimError
+        If a number is out of its interval, or the curve is out of the workspace.
+    """
+    hands = hands or HandRange()
+    inputs = certificate_inputs(config, delay, hands, push, clips, judging)
+    held = _held(out, inputs)
+    if held is not None:
+        return held
+    main, verdicts = _field_verdicts(config, delay, hands, push, clips)
+    if clips:
+        verdicts |= certify_clips(clips, judging)
+    certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
+    plots: dict[str, tuple[Figure, str]] = {PLOT: (stability_figure(main, verdicts["stability"]), "stability boundary")}
+    if "region" in verdicts and "ellipse" in verdicts["region"].figures:
+        plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
+    _write(certificate, plots, out)
+    return certificate
+
+
+def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certificate:
+    """Certify flights and turns of a clip, or take the certificate that the folder holds if it is of the same inputs.
+
+    Parameters
+    ----------
+    name : str
+        An embedded clip, or a motion file.
+    out : Path
+        Folder; written are ``certificate.json``, ``certificate.html``, ``flights.png``.
+    judging : Judging
+        What passes for a flight, and the floor's friction.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or the file cannot be read.
+    """
+    (clip,), remarks = load_clips([name])
+    held = _held(out, clip_inputs(clip, judging))
+    if held is not None:
+        return held
+    scaled = f"lengths, and gravity with them, are scaled to the figure; {remarks[1]}" if remarks else ""
+    found = clip_ballistics(clip, judging, (scaled,) if scaled else ())
+    _write(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
+    return found.certificate
+
+
+def _held(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
+    """The certificate that a folder holds with its page, if it is of these inputs."""
+    if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
+        return None
+    try:
+        held = read_certificate(out / CERTIFICATE)
+        held.check(inputs)
+    except CertificateError:
+        return None  # of something else, or none: certified anew
+    return held
+
+
+def _write(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    for file, (figure, _) in plots.items():
+        figure.savefig(out / file, dpi=150)
+    shown = {file: shows for file, (_, shows) in plots.items()}
+    (out / PAGE).write_text(certificate_page(certificate, shown), encoding="utf-8")
+    text = json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n"
+    (out / CERTIFICATE).write_text(text, encoding="utf-8")
+
+
+def _field_verdicts(
+    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip]
+) -> tuple[River, dict[str, Verdict]]:
+    """The river that is drawn, and all verdicts on the field."""
+    if config.mode == "lead":
+        if not clips:
+            raise ParameterError("a certificate of leading is of a clip that is led; give one")
+        field, curve = leading_field(config, clips[0]), certified_curves(config)[""]
+        device, sampling = phantom_device(), certified_sampling(config, delay)
+        main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
+        return main, certify_leading(field, curve, device, sampling, hands)
+    rivers = certified_rivers(config, delay)
+    verdicts, main = certify(rivers, hands, push), rivers[""]
+    if config.mode == "rivers":
+        return main, verdicts | certify_rivers(config, main, hands, push, certified_curves(config))
+    for name, curve in certified_curves(config).items():
+        if name:
+            verdicts["stability" + name] = stability(main._replace(curve=curve), hands.hands())
+    return main, verdicts

@@ -1,0 +1,57 @@
+"""A hand in crossing rivers on the whole linkage in MuJoCo, from any state and with any push."""
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.switching.switching_search import Course, Push
+from controllers.fields.higher_order import HigherOrder, higher_order_wrench
+from controllers.fields.instructions import TRACE_RIVER
+from experiments.studies.trial_simulation import CLOSURE, trial_model
+from models.phantom.kinematics import jacobian, vector_to_hand_frame
+from models.scene import PHANTOM
+from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense
+from sim.world.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
+
+SUBSTEPS = 8
+
+
+def simulated_course(
+    field: HigherOrder, sampling: Sampling, start: Array, velocity: Array, seconds: float, push: Push | None = None
+) -> Course:
+    """`switching_search.course` on the whole linkage in MuJoCo, with Coulomb friction, weight and encoders.
+
+    Sensing, law and actuation are the servo's kernels, called tick by tick. The push acts as motor torques.
+    """
+    model = trial_model(HandImpedance(), sampling.period / SUBSTEPS, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    data = mujoco.MjData(model)
+    port = phantom_port(model, data, sampling.period, sampling.cutoff)
+    theta = np.array(phantom_angles(start))
+    columns = [vector_to_hand_frame(column) for column in np.array(jacobian(theta)).T]
+    rate = np.linalg.solve(np.array(columns).T, velocity)
+    for i, name in enumerate((*ARM_JOINTS, "elbow", "twin")):
+        joint = data.joint(PHANTOM + name)
+        joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
+    mujoco.mj_forward(model, data)
+    # The filter knows the velocity from before.
+    port.memory[:3], port.memory[6:9], port.memory[12], port.hand[4] = theta, rate, 1.0, 1.0
+    program = field.program()
+    memory, wrench = program.fresh_memory(), np.zeros(6)
+    at, slot = int(program.ops[0, 1]), int(program.ops[0, 2])
+    n = round(seconds / sampling.period)
+    p, river = np.zeros((n, 3)), np.zeros(n)
+    for k in range(n):
+        t = k * sampling.period
+        sense(port, t, 0.0)
+        higher_order_wrench(program.params, at, 0, memory, slot, port.hand, wrench)
+        p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
+        force = wrench[:3].copy()
+        if push is not None and push.start <= t < push.start + push.duration:
+            force += push.force
+        actuate(port, force)
+        mujoco.mj_step(model, data, SUBSTEPS)
+    return Course(p, river)

@@ -1,0 +1,158 @@
+"""``hvf repair``: the nearest motion whose flights can be flown, as a clip."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
+from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
+from experiments.certify.ballistics import ClipBallistics, clip_ballistics
+from models.errors import ModelError
+from models.mocap.clip import Clip
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.momentum import momentum
+from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
+from models.mocap.library import load_clip
+from models.mocap.readers.own_bvh import write_bvh
+from sim.body.clip_motion import clip_motion
+
+Array = npt.NDArray[np.float64]
+
+_AROUND = 1.0  # what may change before the first refuted flight and after the last one [s]
+_RELEASE = 0.1  # in which a foot that leaves the floor takes over the move of the body [s]
+
+
+class Repaired(NamedTuple):
+    """A clip before and after its repair.
+
+    Attributes
+    ----------
+    clip : Clip
+        The nearest feasible one; the same one where nothing had to be repaired.
+    before, after : ClipBallistics
+        What is known of the flights of either.
+    plan : RepairPlan or None
+        The changes; None where there are none.
+    """
+
+    clip: Clip
+    before: ClipBallistics
+    after: ClipBallistics
+    plan: RepairPlan | None
+
+    def lines(self) -> tuple[str, ...]:
+        """What was done, a line each."""
+        verdicts = [b.certificate.verdicts["ballistic"] for b in (self.before, self.after)]
+        if self.plan is None:
+            return (f"nothing to repair: {verdicts[0].verdict}; {verdicts[0].reason}",)
+        longest = 100.0 * float(np.linalg.norm(self.plan.shift, axis=1).max())
+        return (
+            f"before: {verdicts[0].verdict}; {verdicts[0].reason}",
+            f"after: {verdicts[1].verdict}; {verdicts[1].reason}",
+            f"lasts {self.clip.duration:.2f} s instead of {self.before.seconds:.2f} s; "
+            f"the body moves by up to {longest:.1f} cm; {self.plan.iterations} iterations",
+        )
+
+
+def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired:
+    """Repair the flights of the motion in a file and write it as BVH on the figure.
+
+    Raises
+    ------
+    MotionFileError
+        If the source cannot be read.
+    RepairError
+        If there is no feasible motion near it.
+    ModelError
+        If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
+    """
+    if target.suffix.lower() != ".bvh":
+        raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
+    if target.exists() and not overwrite:
+        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    repaired = repair_clip(load_clip(source))
+    try:
+        write_bvh(repaired.clip, target)
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
+    return repaired
+
+
+def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
+    """The nearest motion whose flights fall with g, contacts kept; a clip without refuted flights stays as it is.
+
+    Raises
+    ------
+    RepairError
+        If there is no feasible motion near it.
+    """
+    before = clip_ballistics(clip, judging)
+    n, closed = clip.n_frames, clip.closes()
+    spans = [(f.fit.start, f.fit.end) for f in before.flights if f.verdict != "unknown" and f.fit.end < n]
+    refuted = [f.fit for f in before.flights if f.verdict == "refuted" and f.fit.end < n]
+    if not refuted:
+        return Repaired(clip, before, before, None)
+    around = round(_AROUND * clip.fps)
+    first = max(0, min(fit.start for fit in refuted) - around)
+    last = min(n - 1, max(fit.end for fit in refuted) + around)
+    touched = [(a, b) for a, b in spans if b > first and a < last]
+    first, last = min([first, *(a for a, _ in touched)]), max([last, *(b for _, b in touched)])
+    window = slice(first, last + 1)
+    moved, touching = momentum(clip), contacts(clip)
+    lines, leg = leg_lines(clip.poses)
+    plan = repair(
+        RepairTask(
+            fps=clip.fps, com=moved.com[window], angular=moved.angular[window], clearance=touching.clearance[window],
+            flights=[(a - first, b - first) for a, b in touched], legs=lines[window],
+            standing=touching.standing[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
+        )
+    )  # fmt: skip
+    done = _carried_out(clip, plan, first, touched, touching.standing)
+    return Repaired(done, before, clip_ballistics(done, judging), plan)
+
+
+def _carried_out(
+    clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: npt.NDArray[np.bool_]
+) -> Clip:
+    """The clip with new timing, moved body and feet that stay, at the clip's own frame rate."""
+    n, step = clip.n_frames, 1.0 / clip.fps
+    times: Array = np.arange(n, dtype=np.float64) * step
+    shift = np.zeros((n, 3))
+    last = first + len(plan.times) - 1
+    times[first : last + 1] = times[first] + plan.times
+    times[last + 1 :] += times[last] - last * step
+    shift[first : last + 1] = plan.shift
+    frames = np.arange(round(times[-1] * clip.fps) + 1) * step
+    # The last frame may lie half a step beyond the last recorded one.
+    frames = np.minimum(frames, times[-1])
+    poses = clip_motion(clip, np.asarray(PchipInterpolator(times, np.arange(n) * step)(frames))).poses
+    shifts = np.asarray(PchipInterpolator(times, shift)(frames))
+    planted = np.stack([np.interp(frames, times, _planted(times, foot)) for foot in standing.T], axis=1)
+    for _ in range(3):
+        com = momentum(Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)).com
+        for (start, end), (p, v) in zip(flights, plan.falls, strict=True):
+            t = frames - times[start]
+            fall = p + v * t[:, None] - np.outer(GRAVITY / 2.0 * t**2, (0.0, 0.0, 1.0))
+            flying = np.flatnonzero((frames >= times[start]) & (frames <= times[end]))
+            missed = np.zeros((len(frames), 3))
+            missed[flying] = (fall - com)[flying]
+            for edge, side in ((flying[0], slice(None, flying[0])), (flying[-1], slice(flying[-1] + 1, None))):
+                missed[side] = missed[edge] * _faded(np.abs(frames[side] - frames[edge]))[:, None]
+            shifts = shifts + missed
+    return Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
+
+
+def _planted(times: Array, standing: npt.NDArray[np.bool_]) -> Array:
+    """1 while a foot stands, fading to 0 before and after, shape (n,)."""
+    if not standing.any():
+        return np.zeros(len(times))
+    return _faded(np.abs(times[:, None] - times[standing]).min(axis=1))
+
+
+def _faded(age: Array) -> Array:
+    """1 at 0, 0 from `_RELEASE` on, C¹ between."""
+    x = np.clip(age / _RELEASE, 0.0, 1.0)
+    return (1.0 - x) ** 2 * (1.0 + 2.0 * x)

@@ -1,0 +1,1 @@
+"""Configurations: pure data, from which the command line is made."""

@@ -1,0 +1,63 @@
+"""Haptic maps in files: what a map was made of as a NumPy archive, from which it is made again to the last bit."""
+
+import hashlib
+from pathlib import Path
+
+from controllers.errors import ControllerError
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.lifted import Lifted
+from experiments.files.archives import read_archive, write_archive
+from models.humanoid.skeleton import N_POSE
+from models.mocap.clip import Clip
+from sim.errors import SimError
+
+_KINDS = {"Cylindrical": Cylindrical, "Composite": Composite, "Lifted": Lifted}
+
+
+def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
+    """Write a map; an existing file is replaced.
+
+    Parameters
+    ----------
+    haptic_map : Cylindrical, Composite or Lifted
+        What to keep.
+    path : Path
+        ``.npz`` file.
+    """
+    write_archive(path, type(haptic_map).__name__, haptic_map.arrays())
+
+
+def load_map(path: Path) -> Cylindrical | Composite | Lifted:
+    """Map of a file that `save_map` wrote.
+
+    Raises
+    ------
+    SimError
+        If the file cannot be read, is none of these, or what it holds makes no map.
+    """
+    kind, arrays = read_archive(path, _KINDS, "map")
+    try:
+        return _KINDS[kind].from_arrays(arrays)
+    except ControllerError as error:
+        raise SimError(f"{path}: {error}") from None
+
+
+def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple[Clip, ...]]:
+    """Map of the figure in a file, and the clips that it was made of.
+
+    Raises
+    ------
+    SimError
+        As `load_map`, or if its poses are not the figure's.
+    """
+    haptic_map = load_map(path)
+    if haptic_map.nq != N_POSE:
+        raise SimError(f"{path}: its poses have {haptic_map.nq} numbers, the figure's have {N_POSE}")
+    clips = zip(haptic_map.clips, haptic_map.names, strict=True)
+    return haptic_map, tuple(Clip(poses, fps, name) for (poses, fps), name in clips)
+
+
+def map_digest(path: Path) -> str:
+    """SHA-256 of a map's file, in hexadecimal; raises OSError if it cannot be read."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,1 @@
+"""``hvf lift``, and how good a map of clips is."""

@@ -1,0 +1,91 @@
+"""How well a motion moves that a map has made: joint limits, feet on the floor, flights."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.certificates.flight.flight_fit import best_fall, find_flights
+from models.humanoid.skeleton import (
+    CONTACT_RADIUS,
+    FOOT_CONTACTS,
+    N_JOINTS,
+    figure_model,
+    joint_range,
+    rest_pose,
+)
+from models.mocap.clip import Clip, pose_difference
+from models.mocap.dynamics.contacts import contacts
+from models.mocap.dynamics.momentum import momentum
+
+Array = npt.NDArray[np.float64]
+
+TOUCH = 0.003  # [m] over the floor, at which a sole is taken to stand
+
+
+class MotionMeasure(NamedTuple):
+    """What is wrong with a motion, each at its worst.
+
+    Attributes
+    ----------
+    limits : float
+        How far a joint is beyond its limits [rad].
+    slide : float
+        How far a contact point of a sole is from where it came down, while it is within 3 mm of the floor [m].
+    penetration : float
+        How far the body is below the floor [m].
+    ballistic : float
+        How far the centre of mass is from the nearest free fall in its flights [m]; 0 without a flight.
+    """
+
+    limits: float
+    slide: float
+    penetration: float
+    ballistic: float
+
+    @staticmethod
+    def worst(measures: "list[MotionMeasure]") -> "MotionMeasure":
+        """The worst of each; all zero of none."""
+        return MotionMeasure(*np.max([MotionMeasure(0.0, 0.0, 0.0, 0.0), *measures], axis=0).tolist())
+
+
+def measure_motion(clip: Clip) -> MotionMeasure:
+    """Measure a clip on the default figure."""
+    turns = pose_difference(np.broadcast_to(rest_pose(), clip.poses.shape), clip.poses)[:, 6:]
+    turns = turns.reshape(-1, N_JOINTS, 3)
+    low, high = joint_range()[..., 0], joint_range()[..., 1]
+    touched = contacts(clip)
+    com = momentum(clip).com
+    spans = find_flights(touched.supported, clip.fps)
+    return MotionMeasure(
+        limits=float(np.maximum(low - turns, turns - high).clip(min=0.0).max()),
+        slide=largest_slide(soles(clip.poses)),
+        penetration=float(max(0.0, -touched.clearance.min())),
+        ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
+    )
+
+
+def soles(poses: Array) -> Array:
+    """Lowest points of the contact spheres of the default figure's feet [m], shape (n, 75) → (n, 8, 3)."""
+    model = figure_model()
+    data, geoms = mujoco.MjData(model), [int(model.geom(name).id) for name in FOOT_CONTACTS]
+    points = np.empty((len(poses), len(geoms), 3))
+    for pose, row in zip(poses, points, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        row[:] = data.geom_xpos[geoms]
+    points[..., 2] -= CONTACT_RADIUS
+    return points
+
+
+def largest_slide(points: Array) -> float:
+    """Largest distance over the floor of one of `soles` from where it came down, while it is within 3 mm of it [m]."""
+    came_down, worst = np.full((points.shape[1], 2), np.nan), 0.0
+    for places in points:
+        touches = places[:, 2] < TOUCH
+        fresh = touches & np.isnan(came_down[:, 0])
+        came_down[fresh] = places[fresh, :2]
+        came_down[~touches] = np.nan
+        worst = max(worst, float(np.linalg.norm(places[touches, :2] - came_down[touches], axis=1).max(initial=0.0)))
+    return worst

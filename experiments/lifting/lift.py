@@ -1,0 +1,258 @@
+"""``hvf lift``: from clips alone to a haptic map, written to a file, and a report of what it is like."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
+from controllers.haptic_map.lifting.lift import Lifting, closes, lift
+from controllers.haptic_map.lifting.motion_features import Motion
+from controllers.haptic_map.lifting.room import Room
+from controllers.motion.loops import checked_clip
+from experiments.config.run_config import MAP_SUFFIX
+from experiments.files.map_files import save_map
+from experiments.lifting.in_betweens import MotionMeasure
+from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import figure_legs
+from models.errors import ModelError
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+from models.mocap.dynamics.contacts import contacts
+from sim.errors import SimError
+from sim.world.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedClips:
+    """Clips, their lifting, and the map made of it."""
+
+    clips: tuple[Clip, ...]
+    names: tuple[str, ...]
+    remarks: tuple[str, ...]
+    lifting: Lifting
+    haptic_map: Lifted
+    seconds: float
+
+    def layout(self) -> Layout:
+        """Where the clips are, as `measure_map` takes it."""
+        steps = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+        sites = np.stack([self.haptic_map.site(i, steps) for i in range(len(self.clips))], axis=1)
+        times = [lap_times(angles, clip.duration) for angles, clip in zip(self.lifting.angles, self.clips, strict=True)]
+        return Layout(self.haptic_map, self.names, sites, np.stack(times, axis=1))
+
+
+class LiftReport(NamedTuple):
+    """What `hvf lift` says."""
+
+    lifted: LiftedClips
+    quality: MapQuality
+
+    def lines(self) -> list[str]:
+        """In words."""
+        lifting, names = self.lifted.lifting, self.lifted.names
+        after, before = lifting.after, lifting.before
+        lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
+        if len(names) > 1:
+            lines = [
+                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_apart(after)} (before the arrangement "
+                f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
+                f"(before {100 * before.stress:.0f} %)."
+            ]
+        for name, clip, curve, closed in zip(
+            names, self.lifted.clips, after.curves, self.lifted.haptic_map.closed, strict=True
+        ):
+            lines.append(
+                f"  {name}: {'closed' if closed else 'open'}, {clip.duration:.2f} s, radius of curvature from "
+                f"{1e3 * curve.radius:.0f} mm, up to {curve.speed:.2f} m/s and {curve.acceleration:.2f} m/s²"
+            )
+        for meeting in after.meetings:
+            at = meeting.transition
+            lines.append(
+                f"  transition {names[at.first]} – {names[at.second]} at {np.degrees(at.angle):.0f}°: poses "
+                f"{at.pose:.2f}, velocities {at.velocity:.2f}, standing feet {at.support:.2f} apart (relative), the "
+                f"figures at {at.speeds[0]:.1f} and {at.speeds[1]:.1f} m/s; the curves pass "
+                f"{1e3 * meeting.distance:.1f} mm apart at {np.degrees(meeting.slant):.0f}°, "
+                f"{meeting.speeds[0]:.2f} and {meeting.speeds[1]:.2f} m/s"
+            )
+        if not after.meetings and len(names) > 1:
+            lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
+        lines += [
+            f"  {', '.join(names[i] for i in group)} are the same motion: one of them would do"
+            for group in _groups(lifting.same)
+        ]
+        lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
+        quality = self.quality
+        if len(names) > 1:
+            on, between = quality.conditioning, quality.conditioning_between
+            # Within the core of a curve nothing but its clip plays.
+            along = f"{on[0]:.1f} in the median, 9 of 10 below {on[1]:.0f}" if np.isfinite(on[1]) else "singular"
+            lines += [
+                f"Condition number of h_* along the curves: {along}; half way between: {between[0]:.1f} in the median, "
+                f"9 of 10 below {between[1]:.0f}.",
+                f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
+                f"{100 * quality.roughness[1]:.0f} %.",
+            ]
+        lines += [
+            *(f"  in-between {pair}: {_wrong(measure)}" for pair, measure in quality.between.items()),
+            f"  the clips themselves: {_wrong(quality.clips)}",
+        ]
+        return lines
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON takes it."""
+        lifting = self.lifted.lifting
+        return {
+            "clips": list(self.lifted.names),
+            "closed": list(self.lifted.haptic_map.closed),
+            "seconds": self.lifted.seconds,
+            "before": _arrangement(lifting.before),
+            "after": _arrangement(lifting.after),
+            "same": [list(pair) for pair in lifting.same],
+            "still": list(lifting.still),
+            "quality": self.quality._asdict()
+            | {
+                "between": {pair: measure._asdict() for pair, measure in self.quality.between.items()},
+                "clips": self.quality.clips._asdict(),
+            },
+        }
+
+
+def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Clips that are the same motion, together, by the first of them."""
+    groups: dict[int, list[int]] = {}
+    for first, second in sorted(pairs):
+        if not any(first in others for others in groups.values()):
+            groups.setdefault(first, [first]).append(second)
+    return list(groups.values())
+
+
+def _apart(measure: ArrangementMeasure) -> str:
+    return f"{1e3 * measure.separation:.1f} mm or more apart at one angle, {1e3 * measure.nearest:.1f} mm in space"
+
+
+def _wrong(measure: MotionMeasure) -> str:
+    return (
+        f"joints {np.degrees(measure.limits):.1f}° beyond their limits, soles slide {100 * measure.slide:.1f} cm, "
+        f"{100 * measure.penetration:.1f} cm below the floor, flights {100 * measure.ballistic:.1f} cm from free fall"
+    )
+
+
+def _arrangement(measure: ArrangementMeasure) -> dict[str, object]:
+    return {
+        "separation": measure.separation,
+        "nearest": measure.nearest,
+        "stress": measure.stress,
+        "curves": [curve._asdict() for curve in measure.curves],
+        "transitions": [
+            meeting._asdict() | {"transition": meeting.transition._asdict()} for meeting in measure.meetings
+        ],
+    }
+
+
+def check_workspace(room: Room) -> None:
+    """Whether the Phantom reaches the whole annulus of a room.
+
+    Raises
+    ------
+    SimError
+        If it does not; the message has the point.
+    """
+    for z in np.linspace(*room.z_range, 9):
+        for angle in np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False):
+            for r in room.r_range:
+                try:
+                    phantom_angles(np.array([r * np.cos(angle), r * np.sin(angle), z]))
+                except SimError as error:
+                    raise SimError(
+                        f"{error}; expected r {room.r_range}, z {room.z_range} m to lie within its reach: a smaller "
+                        "--room.r-range or another --room.z-range"
+                    ) from None
+
+
+def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1) -> LiftedClips:
+    """Lift clips by name or file.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of embedded clips, or files.
+    room : Room
+        Where the curves may be.
+    cyclic : sequence of str
+        Of `names`, those that have to close; by default all those are closed that do.
+    seed : int
+        Of the places from which the arrangement begins.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If a clip cannot be read or lifted, or the Phantom does not reach the room.
+    """
+    unknown = [name for name in cyclic if name not in names]
+    if unknown:
+        raise ModelError(f"cyclic names {', '.join(unknown)}; expected some of the clips to lift: {', '.join(names)}")
+    if seed < 0:
+        raise SimError(f"the seed is {seed}; expected 0 or more")
+    check_workspace(room)
+    clips, remarks = load_clips(names)
+    begin = time.perf_counter()
+    labels = _labels(names)
+    motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
+    lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
+    transitions = np.array([transition[:5] for transition in lifting.transitions]).reshape(-1, 5)
+    haptic_map = Lifted(
+        [(clip.poses, clip.fps) for clip in clips], [motion.closed for motion in motions], lifting.angles,
+        lifting.sites, figure_legs(figure_model()), labels, transitions=transitions,
+    )  # fmt: skip
+    return LiftedClips(clips, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
+
+
+def _labels(names: Sequence[str]) -> tuple[str, ...]:
+    """A name of its own for every clip: the file's, and a number where that is there already."""
+    labels: list[str] = []
+    for name in names:
+        stem = Path(name).stem if Path(name).suffix else name
+        count = sum(label == stem or label.rpartition("-")[0] == stem for label in labels)
+        labels.append(stem if count == 0 else f"{stem}-{count + 1}")
+    return tuple(labels)
+
+
+def _motion(clip: Clip, name: str, must_close: bool) -> Motion:
+    closed = must_close or (clip.n_frames > 1 and closes(checked_clip(clip.poses, clip.fps, name)))
+    return Motion(clip.poses, clip.fps, name, closed, contacts(clip).standing)
+
+
+def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:
+    """Measure a lifted map."""
+    return LiftReport(lifted, measure_map(lifted.layout(), lifted.clips, np.random.default_rng(seed)))
+
+
+def lift_into(
+    names: Sequence[str], out: Path, room: Room, cyclic: Sequence[str], seed: int, overwrite: bool
+) -> LiftReport:
+    """Lift clips, write the map into a file, and measure it; arguments as in `lift_clips`.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `lift_clips`; or if the file is no .npz, or exists and is not to be replaced.
+    OSError
+        If it cannot be written.
+    """
+    if out.suffix != MAP_SUFFIX:
+        raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
+    if out.exists() and not overwrite:
+        raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
+    lifted = lift_clips(names, room, cyclic, seed)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_map(lifted.haptic_map, out)
+    return report_lift(lifted, seed)

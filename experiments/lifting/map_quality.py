@@ -1,0 +1,198 @@
+"""How good a map of clips is: conditioning and smoothness of h_*, and the motions between its curves."""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.animation import ClipMap
+from experiments.lifting.in_betweens import MotionMeasure, measure_motion
+from models.humanoid.skeleton import figure_model, rest_pose
+from models.mocap.clip import Clip
+
+Array = npt.NDArray[np.float64]
+
+SAMPLES = 96  # of the lap
+_PROBES = 400
+_STEP = 1e-5  # [m] of the differences of h_*
+_FPS = 60.0
+
+
+def body_weights() -> Array:
+    """By how much a radian of root and joints moves the default figure, RMS over its mass [m], shape (18,).
+
+    √(I_k / M), with I_k the mean moment of inertia of what the joint carries about it, in the rest pose; the root
+    turns the body about its centre of mass.
+    """
+    model = figure_model()
+    data = mujoco.MjData(model)
+    data.qpos = rest_pose()
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mass, middle = model.body_mass, data.xipos
+    weights: list[float] = []
+    for body in range(1, model.nbody):
+        about = data.subtree_com[1] if body == 1 else data.xpos[body]
+        carried = [b for b in range(1, model.nbody) if _carries(model, body, b)]
+        inertia = sum(
+            float(2.0 / 3.0 * mass[b] * ((middle[b] - about) ** 2).sum() + model.body_inertia[b].mean())
+            for b in carried
+        )
+        weights.append(float(np.sqrt(inertia / mass.sum())))
+    return np.array(weights)
+
+
+def _carries(model: mujoco.MjModel, body: int, other: int) -> bool:
+    while other > body:
+        other = int(model.body_parentid[other])
+    return other == body
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A map and where its clips are in it.
+
+    Attributes
+    ----------
+    haptic_map : ClipMap
+    names : tuple of str
+    sites : Array, shape (SAMPLES, n, 2)
+        (r, z) of each clip [m], at equal steps of θ.
+    times : Array, shape (SAMPLES + 1, n)
+        Time in each clip since θ = 0, round the lap [s].
+    """
+
+    haptic_map: ClipMap
+    names: tuple[str, ...]
+    sites: Array
+    times: Array
+
+
+class MapQuality(NamedTuple):
+    """Of a map of clips.
+
+    Attributes
+    ----------
+    separation : float
+        Least distance of two clips' curves at one angle [m].
+    conditioning : (float, float)
+        Condition number of h_* along the curves, poses in metres of the body: median, and 9 of 10 are below.
+    conditioning_between : (float, float)
+        The same half way between neighbours.
+    roughness : (float, float)
+        By which share of itself h_* changes in a millimetre, between neighbours: median, and 9 of 10 are below [1/mm].
+    between : dict of MotionMeasure
+        In-betweens half way between neighbours, by their names.
+    clips : MotionMeasure
+        The worst of the clips themselves.
+    """
+
+    separation: float
+    conditioning: tuple[float, float]
+    conditioning_between: tuple[float, float]
+    roughness: tuple[float, float]
+    between: dict[str, MotionMeasure]
+    clips: MotionMeasure
+
+
+def neighbours(sites: Array) -> list[tuple[int, int]]:
+    """Pairs whose middle is nearer to them than to any other for half of the lap or more (Gabriel & Sokal 1969)."""
+    n = sites.shape[1]
+    found: list[tuple[int, int]] = []
+    for j in range(n):
+        for i in range(j):
+            middle = 0.5 * (sites[:, i] + sites[:, j])
+            half = 0.5 * np.linalg.norm(sites[:, i] - sites[:, j], axis=1)
+            others = [k for k in range(n) if k not in (i, j)]
+            clear = [np.linalg.norm(sites[:, k] - middle, axis=1) > half + 1e-9 for k in others]
+            if np.mean(np.all(clear, axis=0) if clear else np.ones(len(sites))) >= 0.5:
+                found.append((i, j))
+    return found
+
+
+def measure_map(layout: Layout, clips: tuple[Clip, ...], rng: np.random.Generator) -> MapQuality:
+    """Measure a map on the default figure."""
+    scale = np.concatenate([np.ones(3), np.repeat(body_weights(), 3)])[:, None]
+    pairs, sites, n = neighbours(layout.sites), layout.sites, len(layout.names)
+    distance = [np.linalg.norm(sites[:, i] - sites[:, j], axis=1).min() for i, j in combinations(range(n), 2)]
+    angles = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    along = [_condition(layout, scale, angles, sites[:, i]) for i in range(n)]
+    halfway = [_condition(layout, scale, angles, 0.5 * (sites[:, i] + sites[:, j])) for i, j in pairs]
+    return MapQuality(
+        separation=float(min(distance, default=np.inf)),
+        conditioning=_spread(np.concatenate(along)),
+        conditioning_between=_spread(np.concatenate(halfway)) if pairs else (np.nan, np.nan),
+        roughness=_roughness(layout, scale, pairs, rng),
+        between={f"{layout.names[i]} – {layout.names[j]}": measure_motion(in_between(layout, i, j)) for i, j in pairs},
+        clips=MotionMeasure.worst([measure_motion(clip) for clip in clips]),
+    )
+
+
+def _spread(values: Array) -> tuple[float, float]:
+    # Not interpolated: a map may be singular in some places.
+    middle, high = np.quantile(values, [0.5, 0.9], method="higher")
+    return float(middle), float(high)
+
+
+def _stylus(angle: float, site: Array) -> Array:
+    return np.array([site[0] * np.cos(angle), site[0] * np.sin(angle), site[1], 1.0, 0.0, 0.0, 0.0])
+
+
+def _condition(layout: Layout, scale: Array, angles: Array, places: Array) -> Array:
+    numbers: list[float] = []
+    for angle, place in zip(angles, places, strict=True):
+        sizes = np.linalg.svd(scale * layout.haptic_map.jacobian(_stylus(angle, place))[:, :3], compute_uv=False)
+        numbers.append(float(sizes[0] / sizes[2]) if sizes[2] > 1e-9 * sizes[0] else np.inf)
+    return np.array(numbers)
+
+
+def _roughness(
+    layout: Layout, scale: Array, pairs: list[tuple[int, int]], rng: np.random.Generator
+) -> tuple[float, float]:
+    if not pairs:
+        return np.nan, np.nan
+    changes: list[float] = []
+    for _ in range(_PROBES):
+        i, j = pairs[int(rng.integers(len(pairs)))]
+        row, share = int(rng.integers(SAMPLES)), float(rng.uniform())
+        place = (1.0 - share) * layout.sites[row, i] + share * layout.sites[row, j]
+        x = _stylus(2.0 * np.pi * row / SAMPLES, place)
+        way = np.concatenate([rng.normal(size=3), np.zeros(4)])
+        way *= _STEP / np.linalg.norm(way)
+        here, there = (scale * layout.haptic_map.jacobian(x + side * way)[:, :3] for side in (-0.5, 0.5))
+        changes.append(float(np.linalg.norm(there - here) / (np.linalg.norm(here) * _STEP)) / 1e3)
+    return _spread(np.array(changes))
+
+
+def in_between(layout: Layout, i: int, j: int) -> Clip:
+    """A lap half way between two clips, at the mean of their paces."""
+    lap = 0.5 * (layout.times[:, i] + layout.times[:, j])
+    frames = max(8, round(float(lap[-1]) * _FPS))
+    # The seam itself belongs to the next lap.
+    at = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(SAMPLES + 1))
+    closed = np.concatenate([layout.sites, layout.sites[:1]])
+    middle = 0.5 * (closed[:, i] + closed[:, j])
+    places = np.stack([np.interp(at, np.arange(SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
+    memory = layout.haptic_map.compiled().memory
+    poses = [
+        layout.haptic_map.pose(_stylus(2.0 * np.pi * row / SAMPLES, place), memory)
+        for row, place in zip(at, places, strict=True)
+    ]
+    return Clip(np.array(poses), frames / float(lap[-1]), f"{layout.names[i]}-{layout.names[j]}")
+
+
+def lap_times(angles: Array, duration: float) -> Array:
+    """Time in a clip since θ = 0, at SAMPLES + 1 equal steps of θ to 2π, of its frames' angles; even in a gap."""
+    share = np.linspace(0.0, 1.0, len(angles))
+    step = 2.0 * np.pi * np.arange(SAMPLES + 1) / SAMPLES
+    lap = duration * 2.0 * np.pi / (angles[-1] - angles[0])
+    # Two laps, so that any frame may be the first.
+    knots = np.concatenate([angles - 2.0 * np.pi, angles])
+    times = np.concatenate([share * duration - lap, share * duration])
+    keep = np.concatenate([[True], np.diff(knots) > 0.0])
+    knots, times = np.append(knots[keep], knots[-1] + 2.0 * np.pi), np.append(times[keep], times[-1] + lap)
+    found = np.interp(step, knots, times)
+    return found - found[0]

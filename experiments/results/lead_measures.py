@@ -1,0 +1,191 @@
+"""What happened in a run in which a figure was led, from its recording and the path in the field's memory."""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.leading import PATH, Leading
+from controllers.walking.walked_path import PATH_HEADING, path_value
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_POSE, figure_model
+from models.scene import SceneConfig
+from sim.recording.recording import Recording
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+TOUCH = 0.003  # [m] a sole's point that is lower touches
+BLOCK_FRAMES = 2000
+_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] that count as much, in looking for the place where it was
+_REMEMBERED = 6000  # places of the way forward, one for each centimetre
+
+
+@dataclass(frozen=True)
+class LeadSummary:
+    """How a figure was led.
+
+    Attributes
+    ----------
+    length_m : float
+        Of the path that it walked.
+    turn_deg_per_s : tuple of three float
+        Largest turn rates of the path while the figure went over it on no foot, on one and on two.
+    force_max : float
+        Largest force of the field in the plane [N].
+    slide_cm, physical_slide_cm : float
+        Largest way over the floor of a point of the animation's soles while it touched; and of the physical figure's
+        while it pressed on the floor, until it fell, if it did.
+    retrace_cm, retrace_deg : float or None
+        Backwards, how far the animation's root was from its way forwards at most, where it had been; None if it never
+        went back.
+    physical_retrace_cm, physical_retrace_deg : float or None
+        Likewise the physical figure's, until it fell, if it did.
+    """
+
+    length_m: float
+    turn_deg_per_s: tuple[float, float, float]
+    force_max: float
+    slide_cm: float
+    physical_slide_cm: float
+    retrace_cm: float | None
+    retrace_deg: float | None
+    physical_retrace_cm: float | None
+    physical_retrace_deg: float | None
+
+    def lines(self) -> list[str]:
+        """What happened, a sentence each."""
+        none, one, two = self.turn_deg_per_s
+        back = "The figure was not led back."
+        if self.retrace_cm is not None:
+            back = f"Back it retraced its way within {self.retrace_cm:.2f} cm and {self.retrace_deg:.2f}°"
+            if self.physical_retrace_cm is not None:
+                back += (
+                    f", the physical figure within {self.physical_retrace_cm:.1f} cm and "
+                    f"{self.physical_retrace_deg:.1f}°"
+                )
+            back += "."
+        return [
+            f"The figure was led {self.length_m:.1f} m, turning by up to {two:.0f}°/s on two feet, {one:.0f}°/s on one "
+            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm, the physical figure's by up "
+            f"to {self.physical_slide_cm:.1f} cm.",
+            f"{back} The hand felt up to {self.force_max:.1f} N.",
+        ]
+
+
+def lead_summary(
+    recording: Recording, field: Leading, memory: Array, scene: SceneConfig, fell_at: float | None
+) -> LeadSummary:
+    """Measure a run whose field is `field` and ended with this memory, in memory that does not grow with it."""
+    ticks, frames = recording.groups["ticks"], recording.groups["frames"]
+    every = round(recording.rates["ticks"] / recording.rates["frames"])
+    root = frames["qpos"].shape[1] - N_POSE
+    soles, pressing, shown, physical = _Soles(scene), _Soles(scene, 0.0), _Retrace(), _Retrace()
+    farthest, force, turns = -math.inf, 0.0, np.zeros(3)
+    for first in range(0, len(frames["t"]), BLOCK_FRAMES):
+        rows = slice(first, first + BLOCK_FRAMES)
+        t, reference, poses = frames["t"][rows], frames["reference"][rows], frames["qpos"][rows][:, root:]
+        s = ticks["phase"][first * every : (first + len(t)) * every : every]
+        if len(t) > 1:
+            turns = np.maximum(turns, turn_rates(field, memory, s, np.gradient(s, t)))
+        force = max(force, _largest(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
+        soles.add(reference)
+        standing = t < (math.inf if fell_at is None else fell_at)
+        shown.add(s, reference, farthest)
+        pressing.add(poses[standing])
+        physical.add(s[standing], poses[standing], farthest)
+        farthest = max(farthest, float(s.max()))
+    none, one, two = (math.degrees(rate) for rate in turns)
+    return LeadSummary(
+        farthest, (none, one, two), force, 100.0 * soles.slide, 100.0 * pressing.slide, *shown.result(),
+        *physical.result(),
+    )  # fmt: skip
+
+
+def _largest(vectors: Array) -> float:
+    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
+
+
+def support_at(field: Leading, s: Array) -> IntArray:
+    """Feet that bear at arc lengths s [m], shape (n,)."""
+    lap = s / field.gait.stride
+    counts = field.gait.support
+    return counts[(len(counts) * (lap - np.floor(lap))).astype(int) % len(counts)]
+
+
+def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
+    """Largest turn rates [rad/s] of the path at places s [m] passed at speeds [m/s]: on no foot, one, two."""
+    path = TRACE_SIZE + PATH
+    rates = np.abs(speed * [path_value(memory, path, float(place), PATH_HEADING)[1] for place in s])
+    feet = support_at(field, s)
+    return np.array([rates[feet == count].max(initial=0.0) for count in range(3)])
+
+
+class _Soles:
+    """How far points of the soles slide while they are lower than `touch` [m], of poses that come in blocks."""
+
+    def __init__(self, scene: SceneConfig, touch: float = TOUCH):
+        self._touch = touch
+        self._model = figure_model(scene.stature, scene.mass)
+        self._data = mujoco.MjData(self._model)
+        self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
+        self._since = np.full((len(self._geoms), 2), np.nan)
+        self.slide = 0.0
+
+    def add(self, poses: Array) -> None:
+        for pose in poses:
+            self._data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            places = self._data.geom_xpos[self._geoms]
+            touching = places[:, 2] - CONTACT_RADIUS < self._touch
+            begins = touching & np.isnan(self._since[:, 0])
+            self._since[begins] = places[begins, :2]
+            self._since[~touching] = np.nan
+            way = np.linalg.norm(places[:, :2] - self._since, axis=1)
+            self.slide = max(self.slide, float(np.max(way[touching], initial=0.0)))
+
+
+class _Retrace:
+    """How far a figure that goes back is from the way on which it came."""
+
+    def __init__(self) -> None:
+        self._way = np.empty((0, 4))
+        self._distance, self._turn = -1.0, 0.0
+
+    def add(self, s: Array, poses: Array, farthest: float) -> None:
+        """Take a block of arc lengths and poses; `farthest` is the largest s before it."""
+        if len(s) == 0:
+            return
+        front = np.maximum.accumulate(np.concatenate(([farthest], s)))
+        w, x, y, z = poses[:, 3:7].T
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        rows = np.stack([s, poses[:, 0], poses[:, 1], yaw], axis=1)
+        new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
+        self._way = np.concatenate([self._way, rows[new]])[-_REMEMBERED:]
+        for place, ahead in zip(rows, front[1:], strict=True):
+            # Where the figure turns round its filter has not come up with it: the way there is not recorded yet.
+            if ahead - place[0] > 0.1:
+                self._compare(place)
+
+    def _compare(self, place: Array) -> None:
+        near = self._way[np.abs(self._way[:, 0] - place[0]) < 0.3]
+        # Behind where it began there is no way forwards.
+        if len(near) < 2 or place[0] < self._way[0, 0]:
+            return
+        start, step = near[:-1], np.diff(near, axis=0)
+        step[:, 3] = np.remainder(step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
+        length = np.maximum((step[:, 1:3] ** 2).sum(axis=1), 1e-12)
+        share = np.clip(((place[1:3] - start[:, 1:3]) * step[:, 1:3]).sum(axis=1) / length, 0.0, 1.0)
+        apart = np.linalg.norm(start[:, 1:3] + share[:, None] * step[:, 1:3] - place[1:3], axis=1)
+        turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
+        # A pelvis that sways comes by one place more than once, or turns on the spot.
+        k = int(np.argmin(np.hypot(apart / _FAR, turn / _TURNED)))
+        self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
+
+    def result(self) -> tuple[float | None, float | None]:
+        """Largest distance [cm] and turn [degrees]."""
+        if self._distance < 0.0:
+            return None, None
+        return 100.0 * self._distance, math.degrees(self._turn)

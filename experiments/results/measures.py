@@ -1,0 +1,255 @@
+"""A recording measured block by block, in memory that does not grow with the run."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.results.changes import river_changes
+from experiments.results.summary import RunSummary
+from experiments.results.summary_parts import (
+    AnimationSummary,
+    FigureSummary,
+    PathSummary,
+    PushSummary,
+    SpeedSummary,
+    TankSummary,
+    TraceSummary,
+)
+from models.humanoid.skeleton import N_TANGENT
+from models.mocap.clip import pose_difference
+from sim.recording.recording import Recording
+
+Array = npt.NDArray[np.float64]
+Span = tuple[float, float]
+"""From and until when [s]."""
+
+SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
+HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
+FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
+TOUCH = 1.0  # [N] from which the ground bears the figure
+BLOCK_FRAMES = 2000  # of the figure, read at a time
+BLOCK_ROWS = 16_000  # of the ticks, likewise
+_TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
+_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
+
+
+def summarise(
+    recording: Recording,
+    default_poses: Callable[[Array, Array, Array], Array],
+    speed: SpeedSummary,
+    warnings: dict[str, int],
+    handled: Sequence[Span] = (),
+) -> RunSummary:
+    """Measure a run, in memory that does not grow with it.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the channels of `sim.loop.loop.groups`, and arrays ``curve_span`` (start and end of the phase),
+        ``curve_closed`` and ``body_weight``.
+    default_poses : callable
+        Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,) on rivers (k,); called
+        in order of time.
+    speed, warnings
+        Taken over.
+    handled : sequence of Span
+        When the hand does something else than push: it grabs, traces, leads.
+    """
+    path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
+    return RunSummary(path, animation, figure, tank, speed, warnings, changes=river_changes(recording))
+
+
+def measured(
+    recording: Recording, default_poses: Callable[[Array, Array, Array], Array], span: Span,
+    handled: Sequence[Span] = (),
+) -> tuple[PathSummary, AnimationSummary, FigureSummary, TankSummary]:  # fmt: skip
+    """Measure the part of a run between two times; the other arguments are those of `summarise`."""
+    path, animation, figure = (
+        PathMeasure(recording, span[0], handled),
+        AnimationMeasure(span[0]),
+        FigureMeasure(recording),
+    )
+    tank = TankSummary(math.inf, 0)
+    per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
+    rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
+    begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)
+    for start in range(begin, end, BLOCK_FRAMES):
+        stop = min(start + BLOCK_FRAMES, end)
+        rows = slice(start * per_frame, stop * per_frame)
+        ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
+        frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
+        pushed = path.add(ticks)
+        default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
+        animation.add(frames, default, pushed[::per_frame])
+        figure.add(frames)
+        least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
+        tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
+    return path.summary(), animation.summary(), figure.summary(), tank
+
+
+def trace_summary(recording: Recording) -> TraceSummary:
+    """Measure a hand that traces."""
+    ticks, distance, force = recording.groups["ticks"], _MeanSquare(), 0.0
+    for first in range(0, len(ticks["t"]), BLOCK_ROWS):
+        rows = slice(first, first + BLOCK_ROWS)
+        distance.add(ticks["distance"][rows][ticks["t"][rows] >= SETTLING])
+        force = max(force, float(np.linalg.norm(ticks["user"][rows], axis=1).max()))
+    return TraceSummary(1e3 * distance.root, force)
+
+
+class _MeanSquare:
+    """Root mean square and largest of numbers that come in blocks."""
+
+    def __init__(self) -> None:
+        self._sum, self.count, self.largest = 0.0, 0, 0.0
+
+    def add(self, values: Array) -> None:
+        self._sum += float(np.sum(values**2))
+        self.count += values.size
+        self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
+
+    @property
+    def root(self) -> float:
+        return math.sqrt(self._sum / self.count) if self.count else 0.0
+
+
+class PathMeasure:
+    """`PathSummary` of ticks that come in blocks, the first at `since` [s]; `handled` as for `summarise`."""
+
+    def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
+        self._since, self._handled = since, tuple(handled)
+        start, end = recording.array("curve_span")
+        self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
+        self._alone = _MeanSquare()
+        self._phase: float | None = None
+        self._turned, self._first, self._time = 0.0, 0.0, 0.0
+        self._released = -math.inf
+        self._pushes: list[PushSummary] = []
+        self._pushing = False
+
+    def add(self, ticks: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
+        """Take a block; returns at which ticks the hand pushes, or did so less than `SETTLING` ago."""
+        t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
+        at_work = size > HAND_AT_WORK
+        last = np.maximum.accumulate(np.where(at_work, t, self._released))
+        pushed = t - last <= SETTLING
+        self._released = float(last[-1])
+        self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
+        self._add_phase(t, ticks["phase"])
+        handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
+        self._add_pushes(ticks, size, at_work & ~handled)
+        return pushed
+
+    def _add_phase(self, t: Array, phase: Array) -> None:
+        if self._phase is None:
+            self._phase, self._first = float(phase[0]), float(t[0])
+        steps = np.diff(phase, prepend=self._phase)
+        if self._closed:
+            steps -= self._span * np.round(steps / self._span)
+        self._turned += float(np.sum(steps))
+        self._phase, self._time = float(phase[-1]), float(t[-1])
+
+    def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: npt.NDArray[np.bool_]) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], at_work.astype(int), [0]))))
+        for first, last in zip(edges[::2], edges[1::2], strict=True):
+            block = slice(int(first), int(last))
+            away = ticks["p"][block] - ticks["nearest"][block]
+            distance = np.linalg.norm(away, axis=1)
+            k = int(np.argmax(distance))
+            cosine = float(away[k] @ ticks["user"][block][k] / max(distance[k] * size[block][k], 1e-12))
+            t = ticks["t"][block]
+            push = PushSummary(
+                float(t[0]), float(t[-1] - t[0]), float(np.max(size[block])), 1e3 * float(distance[k]), cosine
+            )
+            if first == 0 and self._pushing:
+                push = _joined(self._pushes.pop(), push)
+            self._pushes.append(push)
+        self._pushing = bool(at_work[-1])
+
+    def summary(self) -> PathSummary:
+        """What was taken so far."""
+        laps = self._turned / self._span
+        lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else None
+        alone = 1e3 * self._alone.root if self._alone.count else None
+        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes))
+
+
+def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
+    """One push that was seen in two blocks."""
+    further = max(before, after, key=lambda push: push.deviation_mm)
+    return PushSummary(
+        before.start, after.start + after.seconds - before.start, max(before.peak_force, after.peak_force),
+        further.deviation_mm, further.along_push,
+    )  # fmt: skip
+
+
+class AnimationMeasure:
+    """`AnimationSummary` of frames that come in blocks, the first at `since` [s]."""
+
+    def __init__(self, since: float = 0.0) -> None:
+        self._since = since
+        self._pushed, self._unpushed = 0.0, 0.0
+
+    def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
+        """Take a block of frames, their poses at the curve, and at which the hand pushes."""
+        turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
+        largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
+        settled = frames["t"] >= self._since + SETTLING
+        self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
+        self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
+
+    def summary(self) -> AnimationSummary:
+        """What was taken so far."""
+        return AnimationSummary(math.degrees(self._pushed), math.degrees(self._unpushed))
+
+
+class FigureMeasure:
+    """`FigureSummary` of frames that come in blocks."""
+
+    def __init__(self, recording: Recording):
+        self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
+        self._joints, self._root, self._force, self._moment, self._flying = (_MeanSquare() for _ in range(5))
+        self._frames, self._flight, self._grounded, self._saturated, self._ground = 0, 0, 0, 0.0, 0.0
+        self._fell_at: float | None = None
+
+    def add(self, frames: Mapping[str, Array]) -> None:
+        """Take a block of frames; those after a fall do not count."""
+        if self._fell_at is not None:
+            return
+        fallen = frames["root_error"] > FALLEN
+        if np.any(fallen):
+            fall = int(np.argmax(fallen))
+            self._fell_at = float(frames["t"][fall])
+            frames = {name: channel[:fall] for name, channel in frames.items()}
+        flight = frames["flight"] > 0.0
+        residual = frames["residual"]
+        self._joints.add(frames["joint_error"])
+        self._root.add(frames["root_error"])
+        self._force.add(np.linalg.norm(residual[~flight, :3], axis=1))
+        self._moment.add(np.linalg.norm(residual[~flight, 3:], axis=1))
+        self._flying.add(residual[flight])
+        self._frames += len(flight)
+        self._flight += int(np.sum(flight))
+        self._grounded += int(np.sum(~flight & (frames["ground"][:, 2] > TOUCH)))
+        self._saturated += float(np.sum(frames["saturated"]))
+        self._ground += float(np.sum(frames["ground"][:, 2]))
+
+    def summary(self) -> FigureSummary:
+        """What was taken so far."""
+        frames = max(self._frames, 1)
+        return FigureSummary(
+            fell_at=self._fell_at,
+            joint_error_rms_deg=math.degrees(self._joints.root),
+            root_error_rms_cm=100.0 * self._root.root,
+            root_error_max_cm=100.0 * self._root.largest,
+            residual_force_rms=self._force.root / self._weight,
+            residual_force_max=self._force.largest / self._weight,
+            residual_moment_rms=self._moment.root / self._weight,
+            residual_in_flight_max=self._flying.largest,
+            flight_seconds=self._flight / self._rate,
+            saturated=self._saturated / frames / (N_TANGENT - 6),
+            grounded=self._grounded / max(self._frames - self._flight, 1),
+            ground_force_mean=self._ground / frames / self._weight,
+        )

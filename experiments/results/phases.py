@@ -1,0 +1,137 @@
+"""The two parts of a run on a curve that is bent: editing and performing, in numbers and in words."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
+
+Doing = Literal["held", "pushed", "undo", "redo", "nothing"]
+
+
+@dataclass(frozen=True)
+class PressSummary:
+    """What the hand did between a press of the switch and letting go of it.
+
+    Attributes
+    ----------
+    start, seconds : float
+        [s]
+    what : {"held", "pushed", "undo", "redo", "nothing"}
+        Whether the curve was held and dragged, or its tube was pushed from outside, or an edit was taken back or made
+        again by a click.
+    lap : float or None
+        Where along the curve, as a share of it: of the grabbed point φ(t_j), or the one that was pushed.
+    dragged_mm : float
+        How far that point went during the press, to a tick's way.
+    deviation_mm : float
+        How far it then was from where the curve has it that was given.
+    peak_force : float
+        Of the hand [N].
+    """
+
+    start: float
+    seconds: float
+    what: Doing
+    lap: float | None
+    dragged_mm: float
+    deviation_mm: float
+    peak_force: float
+
+    def line(self) -> str:
+        """The press in words."""
+        where = "" if self.lap is None else f" at {100.0 * self.lap:.0f} % of the curve"
+        return {
+            "held": f"grabbed{where} and dragged {self.dragged_mm:.1f} mm",
+            "pushed": f"pushed{where} by {self.dragged_mm:.1f} mm from outside",
+            "undo": "undone",
+            "redo": "redone",
+            "nothing": "pressed in vain",
+        }[self.what]
+
+
+@dataclass(frozen=True)
+class EditingSummary:
+    """The part of a run in which the curve can be bent.
+
+    Attributes
+    ----------
+    seconds : float
+        How long [s]; it begins with the run.
+    until : float or None
+        When the curve was to be performed from [s], if it was.
+    presses : tuple of PressSummary
+    pushes : tuple of PushSummary
+        Of a hand that does not reach for the curve, hold it or carry it.
+    animation : AnimationSummary
+        Against the animation of the curve that was given at the same phase.
+    figure : FigureSummary
+    """
+
+    seconds: float
+    until: float | None
+    presses: tuple[PressSummary, ...]
+    pushes: tuple[PushSummary, ...]
+    animation: AnimationSummary
+    figure: FigureSummary
+
+    def lines(self) -> list[str]:
+        """What happened, a sentence or two."""
+        done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
+        changed = max(self.animation.pushed_deg, self.animation.unpushed_deg)
+        return [
+            f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
+            *pushes_line(self.pushes),
+            f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}.",
+            *(
+                []
+                if self.until is None or self.seconds >= self.until
+                else [f"It was to be performed from {self.until:.1f} s on, but the run ended before."]
+            ),
+        ]
+
+
+@dataclass(frozen=True)
+class PerformanceSummary:
+    """The part of a run in which the bent curve is performed.
+
+    Attributes
+    ----------
+    start, seconds : float
+        [s]
+    path : PathSummary
+        Of the stylus against the bent curve.
+    animation : AnimationSummary
+        Against the animation of the curve that was given at the same phase.
+    figure : FigureSummary
+    """
+
+    start: float
+    seconds: float
+    path: PathSummary
+    animation: AnimationSummary
+    figure: FigureSummary
+
+    def lines(self) -> list[str]:
+        """What happened, a sentence or two."""
+        alone, pushed, bent = self.path.deviation_rms_mm, self.animation.pushed_deg, self.animation.unpushed_deg
+        left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
+        by = f"{pushed:.1f}° a joint where it was pushed, {bent:.1f}° elsewhere" if self.path.pushes else f"{bent:.1f}°"
+        return [
+            f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
+            *pushes_line(self.path.pushes),
+            f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}.",
+        ]
+
+
+def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
+    """What is said of pushes, if there were any."""
+    return [f"Pushes: {'; '.join(push.line() for push in pushes)}."] if pushes else []
+
+
+def _residual(figure: FigureSummary) -> str:
+    """What is said of the residual, unless the figure fell: that is said of the whole run."""
+    return (
+        ""
+        if figure.fell_at is not None
+        else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"
+    )

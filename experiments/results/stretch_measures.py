@@ -1,0 +1,123 @@
+"""What happened while a curve was bent, press by press of the switch, from the recording; and how it was performed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
+from experiments.results.measures import Span, measured
+from experiments.results.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
+from sim.recording.recording import Channel, Recording
+
+Array = npt.NDArray[np.float64]
+
+_ROWS = 100_000  # of the recording, read at a time
+_CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
+_HELD = 1e-9  # [m] a held point is nearer to the stylus
+
+
+def editing_summary(
+    recording: Recording, tubes: StretchyTubes, default_poses: Callable[[Array, Array, Array], Array],
+    handled: tuple[Span, ...] = (),
+) -> EditingSummary:  # fmt: skip
+    """Measure the part of a run before the curve is performed; arguments as for `results.measures.summarise`."""
+    span = (0.0, tubes.until)
+    path, animation, figure, _ = measured(recording, default_poses, span, handled)
+    last = float(recording.channel("ticks", "t")[-1])
+    presses = press_summaries(recording, tubes.curve, tubes.epsilon, tubes.until)
+    until = tubes.until if np.isfinite(tubes.until) else None
+    return EditingSummary(min(last, tubes.until), until, presses, path.pushes, animation, figure)
+
+
+def performance_summary(
+    recording: Recording, tubes: StretchyTubes, default_poses: Callable[[Array, Array, Array], Array],
+    handled: tuple[Span, ...] = (),
+) -> PerformanceSummary | None:  # fmt: skip
+    """Measure the part in which the curve is performed; None if the run ended before, or has none."""
+    last = float(recording.channel("ticks", "t")[-1])
+    if last <= tubes.until:
+        return None
+    path, animation, figure, _ = measured(recording, default_poses, (tubes.until, np.inf), handled)
+    return PerformanceSummary(tubes.until, last - tubes.until, path, animation, figure)
+
+
+def press_summaries(
+    recording: Recording, curve: Trajectory, epsilon: float, until: float = np.inf
+) -> tuple[PressSummary, ...]:
+    """What was done at each press of the switch before a time [s], by the law's own rules.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the channels t, p, switch, user, phase, nearest and distance in the group ``ticks``.
+    curve : Trajectory
+        That was given.
+    epsilon : float
+        Radius of its tube [m].
+    until : float
+        [s]
+    """
+    ticks = recording.groups["ticks"]
+    presses: list[PressSummary] = []
+    done = taken_back = 0
+    for first, end in _presses(ticks["switch"], ticks["t"], until):
+        press = _press({name: ticks[name][max(first - 1, 0) : end] for name in _CHANNELS}, curve, epsilon, first > 0)
+        if press.what in ("held", "pushed"):
+            done, taken_back = done + 1, 0
+        elif press.what in ("undo", "redo"):
+            step = -1 if press.what == "undo" else 1
+            if (done if step < 0 else taken_back) == 0:
+                press = replace(press, what="nothing")
+            else:
+                done, taken_back = done + step, taken_back - step
+        presses.append(press)
+    return tuple(presses)
+
+
+def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]:
+    """First tick of every press, and the first after it."""
+    edges: list[int] = []
+    pressed = False
+    for first in range(0, len(switch), _ROWS):
+        down = (switch[first : first + _ROWS] > 0.5) & (t[first : first + _ROWS] < until)
+        edges.extend(int(edge) + first for edge in np.flatnonzero(np.diff(down, prepend=pressed)))
+        pressed = bool(down[-1])
+    if len(edges) % 2:
+        edges.append(len(switch))
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: bool) -> PressSummary:
+    """One press, of rows of which the first is the tick before it, if there is one."""
+    k = int(before)
+    t, p, phase, nearest = ticks["t"][k:], ticks["p"][k:], ticks["phase"][k:], ticks["nearest"]
+    seconds = float(2.0 * t[-1] - t[0] - ticks["t"][len(ticks["t"]) - 2]) if len(ticks["t"]) > 1 else 0.0
+    force = float(np.linalg.norm(ticks["user"][k:], axis=1).max())
+    lap, since, what = (
+        float((phase[-1] - curve.start) / curve.duration),
+        0,
+        _what(p, seconds, ticks["distance"][k], epsilon),
+    )
+    if what == "pushed":
+        changes = np.flatnonzero(np.diff(phase))
+        since = k + int(changes[-1]) if len(changes) else 0
+        # A tube that is pushed keeps its phase while its point moves; a probe that touches nothing is over φ itself.
+        if np.all(nearest[since + 1 :] == nearest[-1]):
+            what = "nothing"
+    if what not in ("held", "pushed"):
+        return PressSummary(float(t[0]), seconds, what, None, 0.0, 0.0, force)
+    dragged = float(np.linalg.norm(nearest[-1] - nearest[since]))
+    deviation = float(np.linalg.norm(nearest[-1] - curve.point(float(phase[-1]))))
+    return PressSummary(float(t[0]), seconds, what, lap, 1e3 * dragged, 1e3 * deviation, force)
+
+
+def _what(p: Array, seconds: float, distance: float, epsilon: float) -> Doing:
+    """What a press may be that began at a distance [m] from the curve; a held point is at the stylus."""
+    if distance > epsilon:
+        return "pushed"
+    if np.linalg.norm(p - p[0], axis=1).max() < CLICK_DISTANCE:
+        return "undo" if seconds < CLICK_TIME else "redo"
+    return "held" if distance < _HELD else "nothing"

@@ -1,0 +1,88 @@
+"""What happened in a run, in numbers and in a few lines."""
+
+from dataclasses import dataclass
+
+from experiments.results.changes import RiverChange
+from experiments.results.lead_measures import LeadSummary
+from experiments.results.phases import EditingSummary, PerformanceSummary
+from experiments.results.summary_parts import (
+    AnimationSummary,
+    FigureSummary,
+    PathSummary,
+    SpeedSummary,
+    TankSummary,
+    TraceSummary,
+)
+from experiments.setups.stretch import StretchSummary
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """All of it, as summary.json has it; `lines` says it in a few sentences.
+
+    Attributes
+    ----------
+    path, animation, figure, tank, speed
+        Of the whole run.
+    warnings : dict of str to int
+        MuJoCo's, and how often.
+    stretch : StretchSummary or None
+        How the curve was bent, in the modes that bend one.
+    editing, performance : EditingSummary, PerformanceSummary or None
+        In these modes, the part of the run in which it was bent, and the part in which it was performed.
+    changes : tuple of RiverChange
+        Where rivers give the hand to one another.
+    lead : LeadSummary or None
+        Where a figure was led.
+    trace : TraceSummary or None
+        Where the hand traced the curve by itself.
+    """
+
+    path: PathSummary
+    animation: AnimationSummary
+    figure: FigureSummary
+    tank: TankSummary
+    speed: SpeedSummary
+    warnings: dict[str, int]
+    stretch: StretchSummary | None = None
+    changes: tuple[RiverChange, ...] = ()
+    lead: LeadSummary | None = None
+    editing: EditingSummary | None = None
+    performance: PerformanceSummary | None = None
+    trace: TraceSummary | None = None
+
+    def lines(self) -> list[str]:
+        """What happened, a sentence each."""
+        figure = self.figure
+        warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
+        bent = [] if self.stretch is None else [self.stretch.line()]
+        changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
+        held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
+        return [
+            *bent,
+            *changed,
+            *([held] if self.tank.scaled_ticks else []),
+            *self._of_the_hand(),
+            ("" if figure.fell_at is None else f"The physical figure fell at {figure.fell_at:.1f} s. Until then: ")
+            + f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
+            f"{figure.root_error_rms_cm:.2f} cm at the root; residual force {100 * figure.residual_force_rms:.1f} % "
+            f"of body weight RMS, feet on the ground {100 * figure.grounded:.0f} % of stance.",
+            f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
+            f"MuJoCo's warnings: {warned}.",
+        ]
+
+    def _of_the_hand(self) -> list[str]:
+        """How stylus and animation went: of a figure that was led, of a curve that was bent, or of neither."""
+        if self.lead is not None:
+            return self.lead.lines()
+        if self.editing is not None:
+            return [*self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
+        path, animation = self.path, self.animation
+        alone = path.deviation_rms_mm
+        left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"
+        pushes = "; ".join(push.line() for push in path.pushes)
+        worked = self.trace.line() if self.trace else f"Pushes: {pushes}." if pushes else "The hand did not push."
+        by = f"{max(animation.pushed_deg, animation.unpushed_deg):.2f}° a joint"
+        if pushes:
+            by = f"{animation.pushed_deg:.1f}° a joint where it was pushed, {animation.unpushed_deg:.2f}° elsewhere"
+        return [f"The stylus ran {path.laps:.2f} laps, {left}.", worked, f"The animation changed by up to {by}."]

@@ -1,0 +1,169 @@
+r"""Blends that stand on their feet: the root of a map's in-betweens sways so that the zero-moment point is supported.
+
+A mean of motions that are each balanced is not: its weight is where the clips' weights are on average, and so are its
+feet, but not the foot that happens to stand. At every mixture of the clips the zero-moment point p of a lap is held
+against the nearest supported point p* of the floor (`models.mocap.authoring.balance`), and the root is moved by the
+sway δ of the cart-table model (Kajita et al. 2003), which for a lap is solved harmonic by harmonic:
+
+.. math:: \hat\delta = \widehat{(p^* - p)} / (1 + h \omega^2 / g)
+
+What the clips themselves are out of balance is left to their blends: a clip alone does not sway.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.cylindrical import Cylindrical
+from experiments.files.kept import kept_array
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
+from models.mocap.authoring.balance import GRAVITY
+from sim.compilation.compiled import CACHE_FOLDER
+from sim.reference.reference import poses_along
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+_ROWS = 96  # of a lap
+_ROUNDS = 3
+_CUTOFF = 6.0  # highest frequency of the sway [Hz]
+_TOUCH = 0.008  # a contact point so near the floor can push [m]
+_SHARE = 0.6  # of the support, about its middle, in which the zero-moment point is asked to lie
+_FARTHEST = 0.2  # sway at most [m]
+
+
+class Laps(NamedTuple):
+    """Laps of k motions: zero-moment points (k, n, 2), load (k, n), contact points (k, n, 8, 3), mean height."""
+
+    zmp: Array
+    load: Array
+    contacts: Array
+    height: float
+
+
+def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
+    """The same map with a root that sways between the clips; what was found once is kept beside the compiled code.
+
+    Parameters
+    ----------
+    haptic_map : Cylindrical
+        With limbs.
+    figure : mujoco.MjModel
+        Whose poses they are, alone.
+    lap : float
+        Time of a lap [s].
+    """
+    shape = (_ROWS, len(haptic_map.mixtures), 2)
+    model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
+    mujoco.mj_saveModel(figure, None, model)
+    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
+    made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]), code)
+    return haptic_map.with_sway(
+        kept_array(CACHE_FOLDER, "sway", made_of, shape, lambda: _sway(haptic_map, figure, lap))
+    )
+
+
+def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
+    weights = haptic_map.mixtures
+    corners = weights.argmax(axis=0)
+    # The laps begin a row before the seam, so they are measured in the second one.
+    turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_ROWS) / _ROWS)
+    sway = np.zeros((_ROWS, len(weights), 2))
+    for k in range(_ROUNDS):
+        laps = _laps(haptic_map.with_sway(sway) if k > 0 else haptic_map, figure, lap)
+        outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
+        own = outside[corners]
+        outside -= np.einsum("km,mnx->knx", weights, own)
+        c, s = np.cos(turn), np.sin(turn)
+        x, y = outside[..., 0], outside[..., 1]
+        error = np.stack([c * x - s * y, s * x + c * y], axis=-1).transpose(1, 0, 2)
+        sway += sway_of(error, laps.height, lap)
+        size = np.linalg.norm(sway, axis=-1, keepdims=True)
+        sway *= np.minimum(1.0, _FARTHEST / np.maximum(size, 1e-12))
+    return sway
+
+
+def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
+    """Points of the support nearest to points on the floor.
+
+    Parameters
+    ----------
+    point : Array, shape (..., 2)
+        [m].
+    contacts : Array, shape (..., c, 3)
+        Lowest points of the contact spheres [m]; those near the floor span the support.
+    share : float
+        How far the support is shrunk towards its middle.
+
+    Returns
+    -------
+    Array, shape (..., 2)
+        The point itself where it lies inside, or where nothing touches the floor.
+    """
+    touching = contacts[..., 2] < _TOUCH
+    count = touching.sum(axis=-1)[..., None]
+    middle = (contacts[..., :2] * touching[..., None]).sum(axis=-2) / np.maximum(count, 1)
+    # What does not touch is put where the middle is, so that every point has as many corners.
+    corners = np.where(touching[..., None], share * (contacts[..., :2] - middle[..., None, :]), 0.0)
+    corners += middle[..., None, :] - point[..., None, :]
+    angles = np.sort(np.arctan2(corners[..., 1], corners[..., 0]), axis=-1)
+    gaps = np.diff(angles, axis=-1, append=angles[..., :1] + 2.0 * np.pi)
+    free = (gaps.max(axis=-1) < np.pi) | (count[..., 0] == 0)
+    # Outside a convex hull, the nearest of the segments between any two of its points is an edge.
+    first, second = np.triu_indices(contacts.shape[-2], 1)
+    start, along = corners[..., first, :], corners[..., second, :] - corners[..., first, :]
+    length = np.maximum((along**2).sum(axis=-1), 1e-12)
+    at = start + np.clip(-(start * along).sum(axis=-1) / length, 0.0, 1.0)[..., None] * along
+    best = np.argmin((at**2).sum(axis=-1), axis=-1)[..., None, None]
+    return point + np.where(free[..., None], 0.0, np.take_along_axis(at, best, axis=-2)[..., 0, :])
+
+
+def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
+    kind, params, memory = haptic_map.compiled()
+    angles = 2.0 * np.pi * np.arange(-1, _ROWS + 1) / _ROWS
+    poses = np.empty((len(haptic_map.mixtures), len(angles), haptic_map.nq))
+    for node, places in enumerate(haptic_map.places(angles)):
+        poses_along(kind, params, memory.copy(), places, poses[node])
+    return measured_laps(poses, lap / _ROWS, figure)
+
+
+def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
+    """Dynamics of laps of poses (k, n + 2, 75) at equal steps of time [s], with one before and one after each lap."""
+    data = mujoco.MjData(figure)
+    feet = [figure.geom(name).id for name in FOOT_CONTACTS]
+    k, n = poses.shape[:2]
+    com, spin, contacts = np.empty((k, n, 3)), np.empty((k, n, 3)), np.empty((k, n, len(feet), 3))
+    velocity = np.empty(figure.nv)
+    for node in range(k):
+        for i in range(n):
+            mujoco.mj_differentiatePos(figure, velocity, step, poses[node, max(i - 1, 0)], poses[node, i])
+            data.qpos, data.qvel = poses[node, i], velocity
+            mujoco.mj_kinematics(figure, data)
+            mujoco.mj_comPos(figure, data)
+            mujoco.mj_comVel(figure, data)
+            mujoco.mj_subtreeVel(figure, data)
+            com[node, i], spin[node, i] = data.subtree_com[1], data.subtree_angmom[1]
+            contacts[node, i] = data.geom_xpos[feet]
+    acceleration = (com[:, 2:] - 2.0 * com[:, 1:-1] + com[:, :-2]) / step**2
+    force = acceleration + np.array([0.0, 0.0, GRAVITY])
+    torque = (spin[:, 2:] - spin[:, 1:-1]) / (step * figure.body_subtreemass[1])
+    com = com[:, 1:-1]
+    lever = np.stack(
+        [com[..., 2] * force[..., 0] + torque[..., 1], com[..., 2] * force[..., 1] - torque[..., 0]], axis=-1
+    )
+    up = np.maximum(force[..., 2], 0.1 * GRAVITY)
+    contacts[..., 2] -= CONTACT_RADIUS
+    zmp = com[..., :2] - lever / up[..., None]
+    return Laps(zmp, up / GRAVITY, contacts[:, 1:-1], float(com[..., 2].mean()))
+
+
+def sway_of(error: Array, height: float, lap: float) -> Array:
+    """Sway (n, …) that moves the zero-moment point of a lap by `error` (n, …), of a body so high [m]: cart-table."""
+    frequency = np.arange(len(error) // 2 + 1) / lap
+    spectrum = np.fft.rfft(error, axis=0)
+    spectrum[frequency > _CUTOFF] = 0.0
+    resistance = 1.0 + height / GRAVITY * (2.0 * np.pi * frequency) ** 2
+    return np.fft.irfft(spectrum / resistance.reshape(-1, *[1] * (error.ndim - 1)), len(error), axis=0)

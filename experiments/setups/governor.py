@@ -1,0 +1,118 @@
+"""How fast a stylus may go along a curve for the flights of the animation under it, and a field that says so."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.governor import Governor
+from controllers.fields.instructions import Program
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.river_clips import RiverClips, change_clip
+from controllers.state import HandState, Wrench
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import Field, law
+from models.mocap.clip import Clip
+from sim.reference.reference import poses_along
+
+Array = npt.NDArray[np.float64]
+
+_FPS = 120.0  # of the animation whose flights are judged [1/s]
+_FASTEST = 10.0  # [m/s], for where nothing bounds the speed: no hand is faster
+
+
+def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:
+    """The animation h∘φ of one pass of a curve at the pace of the map's clips, in a map of rivers at that of its own.
+
+    Parameters
+    ----------
+    haptic_map : ClipMap
+        h, of the figure.
+    curve : Trajectory
+        φ, in the hand frame H.
+    river : int
+        Which river of the map the curve is, if it is a map of rivers.
+    """
+    (kind, params, memory), seconds = haptic_map.compiled(), haptic_map.lap_seconds
+    if isinstance(haptic_map, RiverClips):
+        change_clip(memory, float(river), curve.start)
+        seconds = haptic_map.loops[river].duration
+    frames = max(64, round(_FPS * seconds)) + 1
+    points = curve.point(np.linspace(curve.start, curve.end, frames))
+    stylus = np.hstack((points, np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))))
+    poses = np.empty((frames, haptic_map.nq))
+    poses_along(kind, params, memory, stylus, poses)
+    return Clip(poses, (frames - 1) / seconds, "along the curve")
+
+
+def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Array:
+    """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
+
+    What is judged is the animation h∘φ that the map makes of the curve: the clip itself where the curve is in a place
+    of one clip only, and the blend, in the map's own time alignment, where it is between several. A blend in which
+    nobody leaves the floor has no flight, whatever its clips do. Parameters are those of `animation_along`.
+
+    Returns
+    -------
+    Array, shape (m, 2)
+        At m phases equally spaced from the curve's start to its end.
+
+    Raises
+    ------
+    ModelError
+        If the map's poses are not the figure's.
+    """
+    from experiments.certify.ballistics import (
+        clip_ballistics,  # statistics take long to import, for a run without a governor
+    )
+
+    clip = animation_along(haptic_map, curve, river)
+    share = np.linspace(0.0, 1.0, clip.n_frames)
+    # |φ̇| when a pass takes as long as the clips do.
+    recorded = np.linalg.norm(curve.velocity(curve.start + share * curve.duration), axis=1) * curve.duration
+    low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration)
+    # What rises for ever falls at no rate: nothing can be asked of the hand.
+    low = np.where(np.isfinite(low), low, 0.0)
+    return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
+
+
+def governed_law(
+    config: RunConfig, curve: Trajectory, haptic_map: ClipMap, rivers: RiverBundle | None = None
+) -> tuple[Field, float]:
+    """Field of a mode over a curve, or over rivers of a map's own, governed if the run says so.
+
+    Returned with the speed [m/s] to which it urges a hand.
+
+    Rivers of higher order are gated: `River.speeds` of each are those of its own curve, and a hand that misses them by
+    more than `modes.GATE` of the curve's pace is not taken. To any other field the governor is added.
+
+    Raises
+    ------
+    ModelError, ControllerError
+        If there is no such field, or the map's poses are not the figure's.
+    """
+    if not config.governor:
+        return law(config, curve, rivers=rivers), 0.0
+    if config.mode == "rivers" and config.crossing != "sum":
+        return law(config, curve, lambda i, river: speeds_along(haptic_map, river, i), rivers), 0.0
+    speeds = speeds_along(haptic_map, curve)
+    governor = Governor(curve, speeds, config.governor_drag, config.reach)
+    return Governed(law(config, curve, rivers=rivers), governor), float(speeds[:, 0].max())
+
+
+@dataclass(frozen=True, eq=False)
+class Governed:
+    """A field over a curve together with the governor of the animation under it."""
+
+    field: Field
+    governor: Governor
+
+    def program(self) -> Program:
+        """Compiled form of the sum."""
+        return self.field.program() + self.governor.program()
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Sum of both at one hand state."""
+        return Wrench(self.field.wrench(hand).force + self.governor.wrench(hand).force, np.zeros(3))

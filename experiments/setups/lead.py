@@ -1,0 +1,202 @@
+"""LEADING as a run: gait, field, and the hand that leads forward along an S and then straight back."""
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.leading import Gait, Leading
+from controllers.haptic_map.led import Led
+from controllers.legs.grounded import runs
+from controllers.legs.limbs import Limb
+from controllers.motion.captures import Capture
+from experiments.config.run_config import RunConfig
+from models.humanoid.skeleton import CONTACT_RADIUS
+from models.mocap.clip import Clip
+from models.mocap.dynamics.contacts import Contacts, contacts
+from models.mocap.laps import CLOSES, lap_of
+from sim.users.arm import Arm
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+FORTH = 5.0  # [s] along the S at the clip's own pace
+PAUSE, BACK_PACE = 0.8, 0.5
+STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
+_BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
+_FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
+_PHASES = 256
+_UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
+_BLINK, _SWING = 0.05, 0.15  # [s] a flight from foot to foot lasts longer, and a foot swings for longer, or hops
+# Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
+_FLYING_LATERAL = 1.2
+# And its largest pace: who is faster than its clip lands late, for he falls no faster. So is that of a run that steps:
+# its limbs swing as fast as they do in the run, and if they swing faster, motors of the leg that stands give in.
+_RUNNING_FORWARD = 1.0
+
+
+def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
+    """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
+
+    Raises
+    ------
+    ParameterError
+        If the clip does not travel, or has no frame in which a foot stands.
+    """
+    clip, made = lap_of(clip).clip, clip.closes(CLOSES)
+    marks = contacts(clip)
+    phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
+    frames = np.round(phases * steps).astype(int) % steps
+    # What closes was made for the floor and is led as it is; a capture's feet have to be held.
+    standing = marks.planted[frames] if made else stances(marks, clip.fps)
+    support = (standing if made else standing[frames]).sum(axis=1).astype(np.int64)
+    if not support.any():
+        raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
+    first = _middle_of_longest(support == support.max())
+    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
+    if not led.flies:
+        support = np.maximum(support, 1)
+    speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
+    return led, Gait(led.stride, speed, np.roll(support, -first), led.reach, grounded)
+
+
+def lap_remark(clip: Clip) -> tuple[str, ...]:
+    """What is said of a capture of which a part is led, or that does not repeat itself."""
+    lap, remarks = lap_of(clip), list[str]()
+    if lap.clip.n_frames < clip.n_frames:
+        remarks.append(
+            f"of the clip {clip.name!r} the lap that repeats itself best is led, {lap.start:.2f} to {lap.end:.2f} s"
+        )
+    if lap.gap > _UNLIKE:
+        remarks.append(
+            f"the clip {clip.name!r} does not repeat itself (its ends are {np.degrees(lap.gap):.0f}° apart): it is "
+            "closed over its ends, and the physical figure may fall there"
+        )
+    return tuple(remarks)
+
+
+def stances(marks: Contacts, fps: float) -> npt.NDArray[np.bool_]:
+    """Which feet of a capture stand, shape (n − 1, 2), of n frames whose last is the first of the next lap.
+
+    A foot that is up for less than a swing lasts stood all the time, and so did one of two that are up for less than a
+    flight lasts. One that goes on to rest, when no foot has settled, has not left the floor: it had sunk into it.
+    """
+    stands, rests = marks.settled[:-1], marks.planted[:-1]
+    n = len(stands)
+    for foot in range(stands.shape[1]):
+        for start, end in runs(~stands[:, foot]):
+            if end - start < _SWING * fps:
+                stands[np.arange(start, end) % n, foot] = True
+    for start, end in runs(~np.any(stands, axis=1)):
+        for sample in range(start, end):
+            stands[sample % n] = stands[sample % n - 1] & rests[sample % n]
+            if not stands[sample % n].any():
+                break
+    for start, end in runs(~np.any(stands, axis=1)):
+        if end - start < _BLINK * fps:
+            stands[np.arange(start, end) % n] = stands[start - 1]
+    return stands
+
+
+def gait_remark(name: str, led: Led) -> tuple[str, ...]:
+    """What is said of a clip that flies: a body in the air falls with g, at whatever pace it is led."""
+    if led.flies and led.grounds:
+        return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
+    if led.grounds:
+        return (
+            f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
+            f"{led.pace * led.stride / led.duration:.1f} m/s",
+        )
+    if led.flies:
+        return (
+            f"the clip {name!r} lands on the foot with which it leaves the ground: the animation can be led at any "
+            "pace, the physical figure may fall where it is slow",
+        )
+    return ()
+
+
+def _middle_of_longest(mask: npt.NDArray[np.bool_]) -> int:
+    """Middle of the longest run of a mask that goes round."""
+    n = len(mask)
+    if mask.all():
+        return 0
+    start = int(np.argmin(mask))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], np.roll(mask, -start).astype(int), [0]))))
+    k = int(np.argmax(edges[1::2] - edges[::2]))
+    return int((edges[2 * k] + edges[2 * k + 1]) // 2 + start) % n
+
+
+def s_curve() -> Trajectory:
+    """The S along which the default hand leads, in the plane z = 0 of H: two arcs, by arc length [m]."""
+    radius = (_TO - _FROM) / (4.0 * np.sin(_BEND))
+    turn = np.linspace(-_BEND, _BEND, 65)
+    headings = np.concatenate([turn, turn[-2::-1]])
+    steps = radius * (turn[1] - turn[0])
+    middle = 0.5 * (headings[1:] + headings[:-1])
+    ways = np.stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))], axis=1) * steps
+    points = np.array([_FROM, 0.0, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(ways, axis=0)])
+    return Trajectory(steps * np.arange(len(points)), points)
+
+
+def law(config: RunConfig, gait: Gait) -> Leading:
+    """Field of the mode "lead".
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval, or an option has no meaning here.
+    """
+    given = {
+        f"--map {config.map}": config.map != "cylindrical",
+        f"--user {config.user}": config.user != "relaxed",
+        "--walls": config.walls,
+        "--governor": config.governor,
+        "--expressive": config.expressive,
+    }
+    if any(given.values()):
+        raise ParameterError(
+            "in the mode lead the map is the led figure's and the hand leads; leave out "
+            + ", ".join(option for option, is_given in given.items() if is_given)
+        )
+    curve = s_curve()
+    x, y, _ = curve.point(curve.start)
+    scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
+    flying = {"lateral": _FLYING_LATERAL} if gait.flies else {}
+    running = {"forward": _RUNNING_FORWARD} if gait.flies or gait.grounded else {}
+    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, **flying, **running)
+
+
+def leading_hand(field: Leading, period: float = 0.01) -> Arm:
+    """The default hand: a pause, along the S at the gait's own pace, a pause, straight back more slowly."""
+    curve = s_curve()
+    seconds = field.scale * curve.length / field.gait.speed
+    start, end = curve.point(curve.start), curve.point(curve.end)
+    away = float(np.linalg.norm(end - start)) / curve.length
+    forth, back = _eased(seconds, period), _eased(seconds * away / BACK_PACE, period)
+    path = np.concatenate([
+        np.tile(start, (round(PAUSE / period), 1)), curve.point(curve.start + curve.duration * forth),
+        np.tile(end, (round(PAUSE / period), 1)), end + back[:, None] * (start - end),
+    ])  # fmt: skip
+    return Arm(STIFFNESS, path=path, period=period)
+
+
+def walker_argument(s: Array) -> Array:
+    """What the led figure's map is evaluated at, for arc lengths s (n,); shape (n, 7)."""
+    argument = np.zeros((len(s), 7))
+    argument[:, 0], argument[:, 3] = s, 1.0
+    return argument
+
+
+def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
+    """Progress from 0 to 1 at an even pace that sets in and dies down within `ease` seconds."""
+    t = np.arange(period, seconds + ease, period)
+    pace = np.clip(np.minimum(t, seconds + ease - t) / ease, 0.0, 1.0)
+    pace = pace * pace * (3.0 - 2.0 * pace)
+    total = np.cumsum(pace)
+    return total / total[-1]
+
+
+def lead_static(field: Leading) -> dict[str, npt.ArrayLike]:
+    """What a recording keeps of a field that leads: its scale, and the feet that bear over a lap of its gait."""
+    gait = field.gait
+    return {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}

@@ -1,0 +1,160 @@
+"""Runs on a lifted map: FOLLOW traces one of its curves, and all of them together are rivers."""
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.river import River
+from controllers.haptic_map.lifted import Lifted
+from controllers.state import Array
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import river_time
+from experiments.setups.pace import paced
+from sim.body.figure import FigureGains
+from sim.users.intent import Push
+from sim.world.world import phantom_angles
+
+_SPEEDS = (0.5, 2.0)  # least and greatest that a river takes, of its own: a hand that comes over has its neighbour's
+_SECONDS = 0.6  # of a push from one curve to another
+_LEAD = 0.36  # [s] before the transition, when it begins
+_CROSSING = 3.6  # [1/s] a push of this much drag times the distance of the curves takes a hand just over
+_NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
+_STAY = 3  # laps on the other curve
+
+# A foot that gives way by 2 mm in mid-stance still bears: a runner was taken to fly, and fell.
+LIFTED_GAINS = FigureGains(contact_reach=0.004)
+
+
+def curve_number(haptic_map: Lifted, curve: str) -> int:
+    """Which curve a name, or a number as text, means; the first for an empty one.
+
+    Raises
+    ------
+    ParameterError
+        If the map has none of that name.
+    """
+    if not curve:
+        return 0
+    if curve in haptic_map.names:
+        return haptic_map.names.index(curve)
+    if curve.isdecimal() and int(curve) < len(haptic_map.names):
+        return int(curve)
+    raise ParameterError(
+        f"no curve {curve!r} in the map; there are {', '.join(haptic_map.names)}, or 0 to {len(haptic_map.names) - 1}"
+    )
+
+
+def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
+    """The curve that a run begins on, at its clip's pace.
+
+    Raises
+    ------
+    ParameterError
+        If the map has none of that name.
+    SimError
+        If the Phantom does not reach it.
+    """
+    found = haptic_map.curve(curve_number(haptic_map, curve))
+    for phase in np.linspace(found.start, found.end, 64):
+        phantom_angles(found.point(phase))
+    return found
+
+
+def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
+    """A river for every clip, by its name, that leads the Phantom at the clip's pace (`paced`).
+
+    Raises
+    ------
+    ParameterError
+        If a gain is out of its interval.
+    SimError
+        If the Phantom does not reach a curve.
+    """
+    curves = [paced(haptic_map.curve(i), config.gains[1]) for i in range(len(haptic_map.names))]
+    return RiverBundle(tuple(lifted_river(curve, config) for curve in curves), haptic_map.names)
+
+
+def lifted_river(course: Trajectory, config: RunConfig) -> River:
+    """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at.
+
+    Raises
+    ------
+    ParameterError
+        If a gain is out of its interval.
+    """
+    speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
+    return River(course, config.river_tube, river_time(config), config.gains[1], np.outer(speeds, _SPEEDS))
+
+
+def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
+    """The curve along which the field of a run leads, so timed that friction leaves the hand the pace of `curve`.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    damping = config.gains[1]
+    leads = config.mode in ("follow", "rivers", "stretch-then-follow")
+    return paced(curve, damping) if leads and damping > 0.0 else curve
+
+
+def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
+    """What a hand on rivers does that pushes: over at its curve's best transition in the second lap, and back.
+
+    Raises
+    ------
+    ParameterError
+        If the curve has no transition.
+    """
+    first = curve_number(haptic_map, config.curve)
+    rows = [row for row in haptic_map.transitions if first in (row[0], row[1])]
+    if not rows:
+        pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]
+        raise ParameterError(
+            f"the curve {haptic_map.names[first]!r} has no transition to push over at; there are: "
+            f"{', '.join(pairs) or 'none'}; leave out --user push, or begin on another --curve"
+        )
+    second = int(rows[0][1] if int(rows[0][0]) == first else rows[0][0])
+    laps = [haptic_map.curve(i).duration for i in (first, second)]
+    begin = laps[0]
+    return (
+        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, config.gains[1]),
+        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], config.gains[1]),
+    )
+
+
+def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float, drag: float) -> Push:
+    """A push by which a hand on one curve's river gets over to another's, about the transition between them.
+
+    It is towards the other curve, in the river's drag b as hard as takes the hand there within about a quarter of a
+    second: a figure cannot break into a run faster.
+
+    Parameters
+    ----------
+    haptic_map : Lifted
+    first, second : int
+        The curves.
+    angle : float
+        θ of the transition [rad].
+    start : float
+        Earliest time [s]; the push begins when the hand next comes to its place.
+    drag : float
+        b of the rivers [N s/m].
+    """
+    curve, angles = haptic_map.curve(first), haptic_map.angles[first]
+    # Frames of a closed clip may begin anywhere in the lap.
+    frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
+    at = frame / haptic_map.clips[first][1] - _LEAD
+    place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))
+    way = _point(haptic_map, second, angle) - _point(haptic_map, first, angle)
+    distance = float(np.linalg.norm(way))
+    x, y, z = (float(value) for value in way)
+    p, q, r = (float(value) for value in place)
+    return Push(start, _SECONDS, _CROSSING * drag * distance, (x, y, z), (p, q, r), _NEAR)
+
+
+def _point(haptic_map: Lifted, curve: int, angle: float) -> Array:
+    r, z = haptic_map.site(curve, np.array(angle))
+    return np.array([r * np.cos(angle), r * np.sin(angle), z])

@@ -1,0 +1,62 @@
+r"""The pace of a hand that a field leads: what the Phantom's friction takes off it, and a curve that makes up for it.
+
+A field that draws a hand along with b (φ̇ − ṗ) leaves it behind by what friction holds: where the tip goes at v along a
+curve and the joints at q̇, b (φ̇ − v) is Σ_k (f_k |q̇_k| + d_k q̇_k²)/v, with Coulomb's f and the viscous d of
+`models.phantom`. A flight of a clip that is played at nine tenths of its speed asks for eight tenths of gravity.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from models.phantom.kinematics import jacobian, vector_to_device_frame
+from models.phantom.parameters import PREMIUM_1_5
+from sim.world.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
+
+
+def friction_along(curve: Trajectory, phases: Array) -> Array:
+    """Force [N] against a tip that goes along a curve at its own pace, at phases (n,) [s]; 0 where it rests.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    coulomb, viscous = np.array(PREMIUM_1_5.coulomb_friction), np.array(PREMIUM_1_5.viscous_friction)
+    force = np.zeros(len(phases))
+    for k, (p, v) in enumerate(zip(curve.point(phases), curve.velocity(phases), strict=True)):
+        speed = float(np.linalg.norm(v))
+        if speed > 0.0:
+            rates = np.linalg.solve(jacobian.py_func(phantom_angles(p)), vector_to_device_frame.py_func(tuple(v)))
+            force[k] = float(np.abs(rates) @ coulomb + rates**2 @ viscous) / speed
+    return force
+
+
+def paced(curve: Trajectory, drag: float) -> Trajectory:
+    r"""A curve in the same place, timed so that a field of drag b leads the Phantom along it at the old pace.
+
+    .. math:: |\dot\varphi'| = |\dot\varphi| + f/b, \qquad dt' = dt\,/\,(1 + f/(b\,|\dot\varphi|))
+
+    with f of `friction_along`. It goes through the same points; the stylus is upright.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        φ, in the hand frame H.
+    drag : float
+        b [N s/m], positive.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    times = np.asarray(curve.times)
+    own, middles = np.diff(times), 0.5 * (times[1:] + times[:-1])
+    speed = np.linalg.norm(curve.velocity(middles), axis=1)
+    pulled = drag * speed + friction_along(curve, middles)
+    # Where a curve rests it keeps its time.
+    steps = own * np.divide(drag * speed, pulled, out=np.ones_like(own), where=pulled > 0.0)
+    return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)

@@ -1,0 +1,1 @@
+"""Experiments that could refute a claim, and the pictures of the docs."""

@@ -1,0 +1,153 @@
+"""The experiment that could refute what is certified: random rivers whose loop is certified, let go in MuJoCo.
+
+Each river has a place, a curve, gains, a clock and an interval of hands of its own; from each, hands inside the
+interval are let go with offsets and velocities of their own. ``python -m experiments.studies.certified_trials`` draws
+1000.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import tyro
+
+from controllers.certificates.loop.hand import HandImpedance, HandRange
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.stability import River, stability
+from controllers.curves.closest_point import closest_phases
+from controllers.curves.trajectory import Trajectory
+from experiments.certify.certified_device import phantom_device
+from experiments.studies.trial_onset import predicted
+from experiments.studies.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
+from sim.errors import SimError
+
+Array = npt.NDArray[np.float64]
+
+FORCE = 3.0  # [N] that the law asks for at most at the start: the motors give it anywhere, and the limiter too
+LAP_SECONDS = 4.0  # of the rivers; the hands are let go where the curve stands still
+LEFT = 0.2  # share of the slowest mode that is left at the end of a simulation, unless that takes too long
+LONGEST = 2000  # ticks
+COUNTS = 5e-5  # [m] by which readings of a hand at rest change: a count or two
+ASSUMED = Conditions(16)
+EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+
+
+class Certified(NamedTuple):
+    """A certified river, its curve standing still, the intervals of its hands, and its largest spectral radius."""
+
+    river: River
+    still: Trajectory
+    hands: HandRange
+    radius: float
+
+
+class Let(NamedTuple):
+    """A hand that was let go: its largest distance from the curve in the first nine tenths of the time, and after [m].
+
+    Both are infinite if it went 5 cm away. Where encoders round, a hand that friction holds moves by `slack` [m].
+    """
+
+    before: float
+    after: float
+    slack: float
+
+    @property
+    def diverges(self) -> bool:
+        """Whether it ends farther from the curve than it ever was."""
+        return not self.after < self.before + self.slack
+
+
+def draw_certified(rng: np.random.Generator) -> Certified:
+    """A random river that is certified with a random interval of hands, its k_r up to 0.9 of what is critical."""
+    while True:
+        trial = draw_trial(rng)
+        k_r = float(rng.uniform(0.05, 0.9)) * predicted(trial)
+        hand = trial.hand
+        hands = HandRange(*(_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
+        lap = LAP_SECONDS / LAP * np.asarray(trial.curve.times)
+        curve = Trajectory(lap, trial.curve.positions, periodic=True)
+        river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
+        try:
+            verdict = stability(river, hands.hands())
+        except SimError:  # somewhere between the points that were looked at it is out of the workspace: another one
+            continue
+        if verdict.verdict == "certified":
+            return Certified(river, trial.curve, hands, float(str(verdict.figures["radius_bound"])))
+
+
+def _about(number: float, rng: np.random.Generator) -> tuple[float, float]:
+    """An interval about a number, of up to a half of it to either side."""
+    return float(number * rng.uniform(0.5, 1.0)), float(number * rng.uniform(1.0, 1.5))
+
+
+def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -> Let:
+    """Simulate a hand inside the intervals from a random state at a random phase."""
+    river, device, clock = drawn.river, drawn.river.device, drawn.river.sampling
+    hand = HandImpedance(*(float(rng.uniform(*getattr(drawn.hands, n))) for n in ("mass", "damping", "stiffness")))
+    phase = float(rng.uniform(0.0, LAP))
+    trial = Trial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
+    loop = trial.loop()
+    while True:
+        offset, velocity = rng.normal(size=3), rng.normal(size=3)
+        mix = rng.uniform(0.0, 0.5 * np.pi)
+        offset *= min(2e-3, FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
+        velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
+        try:
+            theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
+        except SimError:  # beyond a stop of the Phantom: another one
+            continue
+        break
+    rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
+    torques = np.tile(loop.linear.weight_theta[0] @ theta, clock.whole_delay)
+    state = np.concatenate([theta, rate, theta - clock.period * rate, rate, torques])
+    ticks = int(np.clip(np.log(LEFT) / np.log(drawn.radius), 200, LONGEST)) if drawn.radius < 1.0 else LONGEST
+    path = hand_path(trial, river.k_r, ticks, conditions, state)
+    if len(path) < ticks:
+        return Let(np.inf, np.inf, 0.0)
+    distance = closest_phases(drawn.still.packed(), path)[1]
+    slack = COUNTS if conditions.rounded else 0.0
+    return Let(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
+
+
+def certified_trials(
+    out: Path = Path("runs/certified_trials"), rivers: int = 50, hands: int = 20, seed: int = 1
+) -> None:
+    """Let hands go in certified rivers, inside the assumptions and with friction and rounding; write ``certified.md``.
+
+    Parameters
+    ----------
+    out : Path
+        Folder.
+    rivers, hands : int
+        How many rivers, and hands in each.
+    seed : int
+        Of what is drawn.
+    """
+    rng = np.random.default_rng(seed)
+    found: dict[str, list[Let]] = {"inside the assumptions": [], "with Coulomb friction and rounding": []}
+    clocks: list[float] = []
+    for number in range(rivers):
+        drawn = draw_certified(rng)
+        clocks.append(drawn.river.sampling.period)
+        for told, conditions in zip(found.values(), (ASSUMED, EVERYTHING), strict=True):
+            told += [let_go(drawn, conditions, rng) for _ in range(hands)]
+        print(f"{number + 1}/{rivers}: {sum(let.diverges for told in found.values() for let in told)}", flush=True)
+    lines = [
+        f"{rivers} certified rivers, periods of {1e3 * min(clocks):.2f} to {1e3 * max(clocks):.2f} ms (seed {seed})",
+        "",
+        "| | simulations | diverge | distance at the end / largest, median | worst |",
+        "|---|---|---|---|---|",
+    ]
+    for name, told in found.items():
+        shares = np.array([let.after / let.before if np.isfinite(let.before) else np.inf for let in told])
+        diverge = sum(let.diverges for let in told)
+        lines.append(f"| {name} | {len(told)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "certified.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    tyro.cli(certified_trials)

@@ -1,0 +1,123 @@
+"""Changes of river and stops at random moments: how far feet slide, how high they fly, how much velocities leap.
+
+``python -m experiments.studies.change_trials CLIP CLIP CLIP...`` lets rivers play embedded clips, and prints the
+worst of many
+changes from one to another, and of as many hands that are thrown off. It is the animation that is measured, update by
+update; a leap is what a velocity changes by from one to the next, 8 ms later.
+"""
+
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.haptic_map.river_clips import RiverClips
+from experiments.lifting.in_betweens import largest_slide, soles
+from experiments.setups.clips import load_clips
+from experiments.setups.figure_maps import figure_legs, packed_legs
+from experiments.setups.hands import stylus_path
+from experiments.setups.modes import river_bundle
+from experiments.setups.rests import with_rests
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import pose_difference
+from sim.reference.reference import make_reference, reference_along
+
+Array = npt.NDArray[np.float64]
+
+PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] between updates, of a lap, and the least for a change
+_TUBE = 0.015  # [m]
+_GLIDE, _AFTER = 0.3, 0.8  # [s] in which a hand goes over, and that is watched from the moment on
+_THROWN = np.array([0.1, 0.0, 0.1])  # [m] in as long
+_FIRST, _SPREAD = 1.2, 3.0  # [s] of the moments
+_COUNT, _SEED = 200, 11
+_SLID = 0.03  # [m]
+
+
+class Change(NamedTuple):
+    """What is worst in a change of river, or in a stop.
+
+    Attributes
+    ----------
+    slide, height, depth : float
+        How far a point of a sole goes on the floor, how high the lowest one is, and how deep below the floor [m].
+    over, up, joint : float
+        Leaps of the root's velocity over the ground and up [m/s], and of a joint's [rad/s].
+    """
+
+    slide: float
+    height: float
+    depth: float
+    over: float
+    up: float
+    joint: float
+
+
+def measured_change(poses: Array, period: float = PERIOD) -> Change:
+    """Measure a change in its poses, one each period [s], shape (n, 75)."""
+    points = soles(poses)
+    leaps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / period, axis=0))
+    return Change(
+        slide=largest_slide(points),
+        height=float(points[..., 2].min(axis=1).max()),
+        depth=float(-points[..., 2].min()),
+        over=float(leaps[:, :2].max()),
+        up=float(leaps[:, 2].max()),
+        joint=float(leaps[:, 6:].max()),
+    )
+
+
+def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
+    """The default rivers, one for each of three embedded clips, with the phases at which these can stand."""
+    figure = figure_model()
+    rivers = river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, _TUBE).rivers
+    clips = [(clip.poses, clip.fps) for clip in load_clips(names)[0]]
+    return with_rests(RiverClips([river.curve for river in rivers], clips, _TUBE, figure_legs(figure)), figure)
+
+
+def played_change(rivers: RiverClips, first: int, second: int | None, moment: float, period: float = PERIOD) -> Array:
+    """Poses from the moment [s] at which a hand on one river is had by another, or by none and is thrown off."""
+    figure = figure_model()
+    t = np.arange(round((moment + _AFTER) / period)) * period
+    s = np.clip((t - moment) / _GLIDE + (0.0 if second is None else 0.5), 0.0, 1.0)[:, None]
+    s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    there = rivers.curves[first].point(t % LAP)
+    away = _THROWN if second is None else rivers.curves[second].point(t % LAP) - there
+    traces = np.zeros((len(t), TRACE_SIZE))
+    traces[:, TRACE_PHASE] = t % LAP
+    # A run that begins on another river than the first goes over at once, long before the moment.
+    traces[:, TRACE_RIVER] = np.where(t < moment, first, -1.0 if second is None else second)
+    reference = make_reference(figure, rivers.compiled(), period, 6.0, BLEND, packed_legs(figure))
+    poses = np.empty((len(t), figure.nq))
+    reference_along(reference, stylus_path(there + s * away), traces, poses)
+    return poses[round(moment / period) :]
+
+
+def drawn_changes(rivers: RiverClips, count: int, rng: np.random.Generator, stops: bool) -> list[Change]:
+    """Measure changes, or stops, between rivers and at moments drawn by lot."""
+    changes = []
+    for _ in range(count):
+        first, second = rng.permutation(len(rivers.curves))[:2]
+        moment = _FIRST + _SPREAD * rng.random()
+        changes.append(measured_change(played_change(rivers, first, None if stops else second, moment)))
+    return changes
+
+
+def main(arguments: list[str]) -> None:
+    """Print a row for changes of river, and one for stops."""
+    rivers = rivers_that_play(tuple(arguments))
+    for stops in (False, True):
+        found = np.array(drawn_changes(rivers, _COUNT, np.random.default_rng(_SEED), stops))
+        slide, height, depth, over, up, joint = found.max(axis=0)
+        median, most = np.quantile(found[:, 5], [0.5, 0.9])
+        print(f"{_COUNT} {'stops' if stops else 'changes'}")
+        print(f"  slide {100 * slide:.1f} cm, {(found[:, 0] > _SLID).sum()} of them more than 3 cm")
+        print(f"  in the air {100 * height:.1f} cm, below the floor {100 * depth:.1f} cm")
+        print(f"  leaps of the root {over:.2f} m/s over the ground, {up:.2f} m/s up")
+        print(f"  leaps of joints {joint:.0f} rad/s, median {median:.1f}, nine of ten at most {most:.1f}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

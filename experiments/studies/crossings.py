@@ -1,0 +1,189 @@
+"""Hands at crossings of two rivers, on the simulated Phantom: who stays, who changes over, who is thrown out.
+
+``python -m experiments.studies.crossings`` prints the table of `docs/fields.md`.
+"""
+
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.certificates.loop.hand import HandImpedance
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import TRACE_RIVER, Program
+from controllers.fields.program import evaluate
+from controllers.fields.river import River
+from controllers.safety.limiter import ForceLimiter, limit_force
+from experiments.config.run_config import RunConfig
+from experiments.setups.modes import ADMISSION, HYSTERESIS, LOOK, SIGMA, law, river_time
+from experiments.studies.field_figures import SPEED, straight_river
+from experiments.studies.trial_simulation import trial_model
+from models.scene import PHANTOM, SceneConfig
+from sim.users.arm import Arm
+from sim.users.intent import Push
+from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
+from sim.world.plant import Hand, Plant, advance, make_hand
+from sim.world.world import place_stylus
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Form = Literal["discrete", "smooth"]
+
+ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)
+PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)
+PUSH_SECONDS = 0.2
+SECONDS = 1.25  # from 45 mm before the crossing to 45 mm behind it
+CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
+
+GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]
+HARDER = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
+BEFORE = (-0.1, 0.0, 0.1)  # [s] before the crossing, when a push begins
+LASTING = (0.2, 0.4)  # [s]
+
+
+class Passage(NamedTuple):
+    """A hand's way through a crossing, tick by tick.
+
+    Attributes
+    ----------
+    p : Array
+        Where it was in H [m], shape (n, 3).
+    force : Array
+        Of the field, limited [N], shape (n, 3).
+    river : Array
+        Which river had it, −1 for none, shape (n,).
+    """
+
+    p: Array
+    force: Array
+    river: Array
+
+
+@njit
+def _pass(
+    plant: Plant, port: PhantomPort, hand: Hand, ops: IntArray, params: Array, memory: Array, limits: Array,
+    limiter: Array, p: Array, force: Array, river: Array,
+) -> None:  # fmt: skip
+    wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
+    for k in range(p.shape[0]):
+        t = k * plant.period
+        sense(port, t, 0.0)
+        evaluate(ops, params, memory, port.hand, wrench)
+        limit_force(limits, limiter, wrench, force[k])
+        actuate(port, force[k])
+        p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
+        advance(plant, port, hand, t, False, applied)
+
+
+def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...] = ()) -> Passage:
+    """Let the simulated Phantom, in the hand of a relaxed user who pushes, go in a field from rest.
+
+    Parameters
+    ----------
+    program : Program
+        The field.
+    start : array_like, shape (3,)
+        In H [m].
+    seconds : float
+        How long [s].
+    pushes : tuple of Push
+        What the hand does.
+    """
+    scene = SceneConfig()
+    substeps = scene.substeps()
+    model = trial_model(
+        HandImpedance(0.0, 0.0, 0.0), scene.servo_period / substeps, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    )
+    data = mujoco.MjData(model)
+    place_stylus(model, data, np.asarray(start, dtype=float))
+    mujoco.mj_forward(model, data)
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    plant = Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=np.zeros(3), arm_v=(a, b, c), substeps=substeps, period=scene.servo_period,
+    )  # fmt: skip
+    port = phantom_port(model, data, scene.servo_period, CUTOFF)
+    limiter = ForceLimiter(scene.servo_period)
+    n = round(seconds / scene.servo_period)
+    p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    _pass(
+        plant, port, make_hand(Arm(pushes=pushes)), program.ops, program.params, program.fresh_memory(),
+        limiter.limits(), limiter.fresh_memory(), p, force, river,
+    )  # fmt: skip
+    return Passage(p, force, river)
+
+
+def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
+    """Field of the river along x and of a second one, or of the first alone, with the gains of the mode of rivers."""
+    gains = RunConfig(mode="rivers")
+    rivers = tuple(
+        replace(river, epsilon=gains.river_tube, tau=river_time(gains), drag=gains.river_damping)
+        for river in (straight_river(0.0), second)
+    )
+    bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
+    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form, LOOK[form]).program()
+
+
+def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
+    """Through the origin along x, pushed in the plane across the first river, towards the second, on the way."""
+    pushes = (Push(0.0, PUSH_SECONDS, newtons, (0.0, 1.0, 0.0), (-0.0075, 0.0, 0.0), 0.004),) if newtons else ()
+    return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), SECONDS, pushes)
+
+
+def verdict(way: Passage) -> str:
+    """Which river had the hand at the end, and whether one let it go for longer than 20 ms."""
+    lost = float(np.sum(way.river < 0.0)) * 1e-3
+    end = "out" if way.river[-1] < 0.0 else f"{int(way.river[-1]) + 1}"
+    return end if lost < 0.02 else f"{end} ({lost:.2f} s)"
+
+
+def crossing_passages() -> str:
+    """The table as Markdown: by angle and push, the river that has the hand in the end."""
+    lines = ["| angle | form | deviation unpushed [mm] | " + " | ".join(f"{f:g} N" for f in PUSHES) + " |"]
+    lines.append("|--:|---|--:|" + "--:|" * len(PUSHES))
+    for degrees in ANGLES:
+        for form in ("discrete", "smooth"):
+            ways = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
+            lone = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
+            away = 1e3 * float(np.max(np.abs(ways[0].p - lone.p)))
+            cells = " | ".join(verdict(way) for way in ways)
+            lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
+    return "\n".join(lines)
+
+
+def changed_over(config: RunConfig, newtons: float) -> tuple[int, int, int]:
+    """How many hands on the level river go over into another one, and are thrown out, and how many there are.
+
+    They are pushed up where the wave rises through it, or down where it falls.
+    """
+    curve = Trajectory.circle(config.radius, config.lap)
+    program, changed, out = law(config, curve).program(), 0, 0
+    pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in BEFORE for lasts in LASTING]
+    for up, lead, lasts in pushes:
+        at = curve.start + (0.5 if up > 0.0 else 0.75) * curve.duration - lead
+        x, y, z = (float(value) for value in curve.point(at))
+        push = Push(0.2, lasts, newtons, (0.0, 0.0, up), (x, y, z), 0.003)
+        river = passage(program, curve.point(at - 0.5), 1.6, (push,)).river
+        lost = bool(river[-1] < 0.0 or np.sum(river < 0.0) > 100)
+        changed, out = changed + int(not lost and bool(river[-1] > 0.0)), out + int(lost)
+    return changed, out, len(pushes)
+
+
+def pushed_rivers() -> str:
+    """The table as Markdown: by gains and push, how many hands change over, and how many are thrown out."""
+    lines = ["| k_r, b_d | " + " | ".join(f"{f:g} N" for f in HARDER) + " |", "|---|" + "--:|" * len(HARDER)]
+    for stiffness, damping in GAINS:
+        config = RunConfig(mode="rivers", river_stiffness=stiffness, river_damping=damping)
+        cells = [changed_over(config, f) for f in HARDER]
+        told = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
+        lines.append(f"| {stiffness:g}, {damping:g} | {told} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(crossing_passages(), pushed_rivers(), sep="\n\n")

@@ -1,0 +1,216 @@
+"""Pictures of the fields, and the table of crossings: ``python -m experiments.studies.field_figures docs``."""
+
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.bunny import Bunny
+from controllers.fields.edited import Edited, performance
+from controllers.fields.follow import Follow
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.program import evaluate
+from controllers.fields.river import River, integrate
+from controllers.state import HandState
+from experiments.setups.modes import ADMISSION, HYSTERESIS, SIGMA, Field
+from sim.viewer.palette import CURVE, FIELD, TUBE, USER
+
+Array = npt.NDArray[np.float64]
+
+SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]
+DRAG = 4.0
+STEP = 15  # between the angles of the table [degrees]
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+class Crossing(NamedTuple):
+    """Force of river 2 on a hand that follows river 1, where they cross, and on its way through.
+
+    Attributes
+    ----------
+    angle : float
+        Between the rivers [degrees].
+    both : float
+        In the static sum [N].
+    smooth, discrete : float
+        In the fields of higher order; in the discrete one river 1 has the hand [N].
+    alone : float
+        In the discrete field without river 1: whether river 2 takes a hand that moves like this [N].
+    both_passing, smooth_passing, discrete_passing : float
+        The greatest on the way from 30 mm before the crossing to 30 mm behind it [N].
+    """
+
+    angle: float
+    both: float
+    smooth: float
+    discrete: float
+    alone: float
+    both_passing: float
+    smooth_passing: float
+    discrete_passing: float
+
+
+def straight_river(degrees: float) -> River:
+    """River through the origin of H at an angle to x, 0.12 m long, in the plane z = 0."""
+    direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0])
+    times = np.linspace(0.0, 1.6, 17)
+    return River(Trajectory(times, np.outer(SPEED * (times - 0.8), direction)), drag=DRAG)
+
+
+def crossing(degrees: float) -> Crossing:
+    """Forces at a crossing of two straight rivers, on a hand that follows the first."""
+    pair = RiverBundle((straight_river(0.0), straight_river(degrees)), ("1", "2"))
+    second = RiverBundle((straight_river(degrees),), ("2",))
+    scale = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
+    smooth = HigherOrder(pair, ADMISSION * SPEED, SIGMA["smooth"] * SPEED)
+    discrete = HigherOrder(pair, *scale, "discrete")
+    # River 1 gives no force to a hand on it at its own speed: all that is felt comes from river 2.
+    way = np.linspace(-0.03, 0.03, 121)
+    alone = _felt(HigherOrder(second, *scale, "discrete"), np.zeros(1))
+    a, b, c = (_felt(field, way) for field in (pair, smooth, discrete))
+    at = len(way) // 2
+    return Crossing(degrees, a[at], b[at], c[at], alone[0], a.max(), b.max(), c.max())
+
+
+def _felt(field: Field, way: Array) -> Array:
+    """Force [N] on a hand that moves along x with the river's speed, at places x [m], one after the other."""
+    program = field.program()
+    memory, wrench = program.fresh_memory(), np.empty(6)
+    forces: list[float] = []
+    for x in way:
+        hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
+        evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+        forces.append(float(np.linalg.norm(wrench[:3])))
+    return np.array(forces)
+
+
+def crossing_table() -> str:
+    """The table of crossings as Markdown."""
+    lines = [
+        "| angle | static sum | smooth | discrete | discrete, river 1 away | sum, passing | smooth, passing "
+        "| discrete, passing |",
+        "|--:|--:|--:|--:|--:|--:|--:|--:|",
+    ]
+    for degrees in range(0, 181, STEP):
+        row = crossing(float(degrees))
+        cells = (_newtons(force) for force in row[1:])
+        lines.append(f"| {degrees}° | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _newtons(force: float) -> str:
+    # A force that rounding leaves of nothing is shown as nothing.
+    return f"{force:.4f}" if force >= 5e-5 else (f"{force:.0e}" if force > 1e-12 else "0")
+
+
+def crossing_figure() -> Figure:
+    """Force of river 2 on a hand on river 1 over the angle between them."""
+    rows = [crossing(float(angle)) for angle in np.linspace(0.0, 180.0, 181)]
+    angles = [row.angle for row in rows]
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    crossing_ax, passing_ax = figure.subplots(1, 2, sharey=True)
+    crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 1 away")
+    columns = (("static sum", TUBE), ("smooth", FIELD), ("discrete", CURVE))
+    for (name, colour), here, way in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
+        crossing_ax.plot(angles, [row[here] for row in rows], color=colour, label=name)
+        passing_ax.plot(angles, [row[way] for row in rows], color=colour)
+    for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "greatest on the way through")):
+        ax.set(xlabel="angle between the rivers [°]", xticks=range(0, 181, 30), title=title)
+    crossing_ax.set(ylabel="force of river 2 [N]")
+    crossing_ax.legend()
+    return figure
+
+
+def _axes(size: tuple[float, float]) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots()
+
+
+def _plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Array, Array]:
+    """Curves with their tubes from above, in millimetres; returns the grid of a plot there."""
+    for curve in curves:
+        points = 1e3 * curve.point(np.linspace(curve.start, curve.end, 400))
+        discs = [Circle((float(x), float(y)), 1e3 * epsilon) for x, y in points[:, :2]]
+        ax.add_collection(PatchCollection(discs, facecolor="#dbe7f4", edgecolor="none", zorder=0))
+        ax.plot(points[:, 0], points[:, 1], color=CURVE, lw=1.5)
+    ax.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    axis = np.linspace(-0.085, 0.085, 35)
+    x, y = np.meshgrid(axis, axis)
+    return x, y
+
+
+def force_figure(field: Field, curves: list[Trajectory], epsilon: float, t: float) -> Figure:
+    """Force of a field on a hand at rest in the plane z = 0, at time t [s]."""
+    figure, ax = _axes((4.6, 4.4))
+    x, y = _plane(ax, curves, epsilon)
+    forces = np.array([field.wrench(HandState.at([a, b, 0.0], t=t)).force for a, b in zip(x.flat, y.flat, strict=True)])
+    size = np.linalg.norm(forces, axis=1)
+    felt = size > 1e-3 * size.max()
+    # Lengths as roots, or the weak ones could not be seen.
+    arrows = forces / np.sqrt(np.maximum(size, 1e-12))[:, None]
+    ax.quiver(1e3 * x.ravel()[felt], 1e3 * y.ravel()[felt], arrows[felt, 0], arrows[felt, 1], color=FIELD, width=0.003)
+    ax.set_title(f"force on a hand at rest, up to {size.max():.1f} N", loc="left", fontsize=9)
+    return figure
+
+
+def edited_figure() -> Figure:
+    """A river, a performance that left it, and integral curves of V + U, of V + U/2 and of V."""
+    river = River(Trajectory.circle(0.05, 4.0), epsilon=0.045)
+    times = np.linspace(0.0, 4.0, 401)
+    bump = 0.02 * np.sin(0.5 * np.pi * np.clip(times - 1.0, 0.0, 2.0)) ** 2
+    performed = performance(times, river.curve.point(times) * (1.0 + bump / 0.05)[:, None])
+    figure, ax = _axes((4.6, 4.4))
+    _plane(ax, [river.curve], 0.0)
+    for weight, colour in ((0.5, TUBE), (1.0, FIELD)):
+        edited = Edited(river, (performed,), (weight,))
+        course = 1e3 * integrate(edited.flow, performed.point(0.0), times).points
+        ax.plot(
+            course[:, 0], course[:, 1], color=colour, lw=2.5, alpha=0.7, label=f"integral curve of V + {weight:g} U"
+        )
+    points = 1e3 * performed.point(times)
+    ax.plot(points[:, 0], points[:, 1], color=USER, ls="--", label="performed")
+    ax.legend(loc="center", fontsize=8)
+    return figure
+
+
+def eight(period: float = 4.0) -> Trajectory:
+    """A river that crosses itself: a figure of eight, 0.12 m by 0.06 m."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 129)
+    points = np.stack((0.06 * np.sin(angle), 0.03 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
+    points[-1] = points[0]
+    return Trajectory(period * angle / (2.0 * np.pi), points, periodic=True)
+
+
+def main(folder: Path) -> None:
+    """Draw all pictures into a folder and print the table."""
+    circle, small = Trajectory.circle(0.05, 4.0), Trajectory.circle(0.05, 4.0, (0.0, 0.02, 0.0))
+    bundle = RiverBundle((River(eight()), River(small)), ("eight", "ring"))
+    pictures = {
+        "follow": lambda: force_figure(Follow(circle, 300.0, 4.0, 0.03), [circle], 0.03, 0.0),
+        "bunny": lambda: force_figure(Bunny(circle, 300.0, 4.0, 0.02, "point", "clock"), [circle], 0.0, 0.5),
+        "rivers": lambda: force_figure(bundle, [eight(), small], 0.02, 0.0),
+        "crossing": crossing_figure,
+        "edited": edited_figure,
+    }
+    for name, draw in pictures.items():
+        with mpl.rc_context(_STYLE):
+            draw().savefig(folder / f"field-{name}.png", dpi=130)
+    print(crossing_table())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

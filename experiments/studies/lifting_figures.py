@@ -1,0 +1,94 @@
+"""The lifted map beside a hand-made one, for the docs: ``python -m experiments.studies.lifting_figures docs``."""
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.lifting.room import Room
+from experiments.lifting.in_betweens import MotionMeasure
+from experiments.lifting.lift import LiftedClips, lift_clips
+from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, measure_map
+from experiments.setups.figure_maps import figure_legs
+from models.humanoid.skeleton import figure_model
+from sim.viewer.palette import CURVE, FIELD, TUBE, USER
+
+CLIPS = ("walk", "run", "jump", "backflip")
+_COLOURS = (CURVE, FIELD, USER, TUBE)
+
+
+def cylinder(lifted: LiftedClips, room: Room) -> Layout:
+    """The same four clips at the corners of the same rectangle, in the order in which they were given."""
+    motions = [(clip.poses, clip.fps) for clip in lifted.clips]
+    haptic_map = Cylindrical(motions, room.r_range, room.z_range, figure_legs(figure_model()))
+    corners = np.array([(r, z) for z in room.z_range for r in room.r_range])
+    share = np.arange(SAMPLES + 1)[:, None] / SAMPLES
+    times = share * np.array([clip.duration for clip in lifted.clips])
+    return Layout(haptic_map, lifted.names, np.tile(corners, (SAMPLES, 1, 1)), times)
+
+
+def comparison_table(lifted: MapQuality, hand_made: MapQuality) -> str:
+    """What both maps are like, as Markdown."""
+    rows = [
+        ("least distance of two curves [mm]", *(f"{1e3 * q.separation:.1f}" for q in (hand_made, lifted))),
+        *_spreads("condition number of h_* along the curves", hand_made.conditioning, lifted.conditioning, 1.0),
+        *_spreads("the same half way between", hand_made.conditioning_between, lifted.conditioning_between, 1.0),
+        *_spreads("change of h_* [% of itself per mm]", hand_made.roughness, lifted.roughness, 100.0),
+    ]
+    worst = [MotionMeasure.worst(list(q.between.values())) for q in (hand_made, lifted)]
+    for name, field, unit in (
+        ("in-betweens: joints beyond their limits [°]", "limits", 180.0 / np.pi),
+        ("in-betweens: soles slide [cm]", "slide", 100.0),
+        ("in-betweens: below the floor [cm]", "penetration", 100.0),
+        ("in-betweens: flights from free fall [cm]", "ballistic", 100.0),
+    ):
+        rows.append((name, *(f"{unit * float(getattr(measure, field)):.1f}" for measure in worst)))
+    lines = ["| | hand-made cylinder | lifted |", "|---|--:|--:|"]
+    return "\n".join([*lines, *(f"| {name} | {a} | {b} |" for name, a, b in rows)])
+
+
+def _spreads(
+    name: str, first: tuple[float, float], second: tuple[float, float], unit: float
+) -> list[tuple[str, str, str]]:
+    cells = [" / ".join("∞" if np.isinf(v) else f"{unit * v:.3g}" for v in pair) for pair in (first, second)]
+    return [(f"{name}, median / 9 of 10 below", cells[0], cells[1])]
+
+
+def curves_figure(lifted: LiftedClips, hand_made: Layout) -> Figure:
+    """Sites of both maps in the half plane (r, z), and the distances of the lifted curves round the lap."""
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    plane, lap = figure.subplots(1, 2, width_ratios=(1.0, 1.6))
+    layout = lifted.layout()
+    for i, (name, colour) in enumerate(zip(layout.names, _COLOURS, strict=True)):
+        closed = 1e3 * np.concatenate([layout.sites[:, i], layout.sites[:1, i]])
+        plane.plot(closed[:, 0], closed[:, 1], color=colour, label=name)
+        plane.plot(*(1e3 * hand_made.sites[0, i]), "s", color=colour, ms=5)
+    plane.set(xlabel="r [mm]", ylabel="z [mm]", aspect="equal", title="lifted (lines), hand-made (squares)")
+    plane.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    angle = 360.0 * np.arange(SAMPLES) / SAMPLES
+    for meeting in lifted.lifting.after.meetings:
+        i, j = meeting.transition.first, meeting.transition.second
+        apart = 1e3 * np.linalg.norm(layout.sites[:, i] - layout.sites[:, j], axis=1)
+        (line,) = lap.plot(angle, apart, label=f"{layout.names[i]} – {layout.names[j]}")
+        lap.plot(np.degrees(meeting.transition.angle), 1e3 * meeting.distance, "o", color=line.get_color())
+    lap.set(xlabel="θ [°]", ylabel="distance of the curves [mm]", title="transitions found", ylim=(0.0, None))
+    lap.legend(fontsize=8)
+    return figure
+
+
+def main(folder: Path) -> None:
+    """Draw the picture into a folder and print the table."""
+    room = Room()
+    lifted = lift_clips(CLIPS, room)
+    hand_made = cylinder(lifted, room)
+    with mpl.rc_context({"font.size": 9.0, "axes.titlesize": 9.0, "legend.frameon": False}):
+        curves_figure(lifted, hand_made).savefig(folder / "lifting.png", dpi=130)
+    qualities = [measure_map(layout, lifted.clips, np.random.default_rng(1)) for layout in (lifted.layout(), hand_made)]
+    print(comparison_table(*qualities))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

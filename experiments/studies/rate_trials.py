@@ -1,0 +1,193 @@
+"""Gate and governor on the simulated Phantom: ``python -m experiments.studies.rate_trials docs`` draws what is felt.
+
+A hand is led through the flight of the backflip at one speed after another, by an arm's impedance along the curve.
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.easing import smooth_step
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.governor import Governor, governor_force
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER, Program
+from controllers.fields.river import River
+from controllers.haptic_map.animation import ClipMap
+from experiments.config.run_config import RunConfig
+from experiments.results.figures import STYLE
+from experiments.setups.clips import load_clips
+from experiments.setups.governor import speeds_along
+from experiments.setups.modes import GATE, HYSTERESIS, SIGMA
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from models.humanoid.skeleton import N_POSE
+from models.scene import FIGURE
+from sim.loop.loop import Loop
+from sim.loop.servo import FrameLog, TickLog
+from sim.users.arm import Arm
+from sim.viewer.palette import CURVE, FIELD, USER
+from sim.viewer.palette import TUBE as TUBE_COLOUR
+from sim.world.plant import make_hand
+
+Array = npt.NDArray[np.float64]
+
+DRAG, TUBE = 8.0, 0.015  # of governor and river [N s/m], [m]
+SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]
+REACH = 0.03  # [m] before and behind the place where a straight way touches the curve: within tube and flight
+STEP = 0.005  # [s] of a way
+RUN_UP, SLOWING = 0.4, 0.6  # [s] before the flight, and the share of it in which a hand slows down
+
+
+class Passage(NamedTuple):
+    """What a hand met that was led along the curve.
+
+    Attributes
+    ----------
+    t, phase, distance, speed : Array
+        Time [s], phase [s], distance from the curve [m] and speed along it [m/s], shape (n,).
+    along : Array
+        Force of the field along the curve [N], shape (n,).
+    river : Array
+        Number of the river that has the hand, −1 for none, shape (n,).
+    """
+
+    t: Array
+    phase: Array
+    distance: Array
+    speed: Array
+    along: Array
+    river: Array
+
+
+class Bench:
+    """The backflip under a circle of the hand: its curve, its admissible speeds, and a hand that is led along it.
+
+    Attributes
+    ----------
+    curve : Trajectory
+        φ.
+    speeds : Array
+        Least and greatest speed [m/s] at equal steps of the phase, shape (m, 2).
+    flight : tuple of two floats
+        Phases between which the least speed is above zero [s].
+    """
+
+    def __init__(self) -> None:
+        self._config = RunConfig(clips=("backflip",), lap=2.7, tube=TUBE)
+        self._clips, _ = load_clips(self._config.clips)
+        session = self._session()
+        self.curve = session.curve
+        assert isinstance(session.clip_map, ClipMap)
+        self.speeds = speeds_along(session.clip_map, self.curve)
+        phases = np.linspace(self.curve.start, self.curve.end, len(self.speeds))
+        flying = phases[self.speeds[:, 0] > 0.0]
+        self.flight = (float(flying[0]), float(flying[-1]))
+
+    def _session(self) -> Session:
+        return wire(self._config, self._clips)
+
+    def governor(self) -> Program:
+        """The governor alone."""
+        return Governor(self.curve, self.speeds, DRAG, TUBE).program()
+
+    def gate(self) -> Program:
+        """The backflip's river, which takes a hand at the speeds that its flight admits."""
+        pace = self.curve.length / self.curve.duration
+        bundle = RiverBundle((River(self.curve, TUBE, speeds=self.speeds),), ("backflip",))
+        return HigherOrder(bundle, GATE * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace, "discrete").program()
+
+    def past(self, speed: float) -> Array:
+        """A straight way at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""
+        middle = 0.5 * sum(self.flight)
+        there, along = self.curve.point(middle), self.curve.velocity(middle)
+        steps = np.arange(-REACH, REACH, speed * STEP)
+        return there + np.outer(steps, along / np.linalg.norm(along))
+
+    def slowing(self, speed: float) -> Array:
+        """A way along the curve at its own pace that slows down to a speed [m/s] in mid-flight, shape (n, 3)."""
+        first, last = self.flight
+        pace = self.curve.length / self.curve.duration
+        phase, phases = first - RUN_UP, [first - RUN_UP]
+        while phase < last:
+            slow = float(smooth_step((phase - first) / (last - first) / SLOWING))
+            phase += STEP * (1.0 + slow * (speed / pace - 1.0))
+            phases.append(phase)
+        return self.curve.point(np.array(phases))
+
+    def led(self, program: Program, way: Array) -> Passage:
+        """Lead a hand along a way, in steps of `STEP`, in a field."""
+        session = self._session()
+        plant = session.servo.plant
+        root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
+        session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
+        field = session.servo.field.of(program)
+        servo = session.servo._replace(field=field, hand=make_hand(Arm(400.0, 10.0, way, STEP)))
+        blocks: list[tuple[Array, ...]] = []
+
+        def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
+            hand, trace = ticks.hand[:n], ticks.trace[:n]
+            along = self.curve.velocity(trace[:, TRACE_PHASE])
+            along /= np.linalg.norm(along, axis=1, keepdims=True)
+            speed, force = (np.sum(a * along, axis=1) for a in (hand[:, 8:11], ticks.force[:n]))
+            columns = (hand[:, 0], trace[:, TRACE_PHASE], trace[:, TRACE_DISTANCE], speed, force, trace[:, TRACE_RIVER])
+            blocks.append(tuple(column.copy() for column in columns))
+
+        Loop(servo, session.world, keep).run(STEP * (len(way) - 1))
+        return Passage(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
+
+    def felt(self, speed: float) -> tuple[float, float]:
+        """Speed [m/s] of a hand where it touches the curve in mid-flight, and the governor's force on it there [N]."""
+        passage = self.led(self.governor(), self.past(speed))
+        near = passage.distance < 1e-3
+        return float(passage.speed[near].mean()), float(passage.along[near].mean())
+
+    def taken(self, speed: float) -> tuple[float, float]:
+        """Mean speed [m/s] of a hand in the tube of the backflip's river, and the share of the time that it has it."""
+        passage = self.led(self.gate(), self.past(speed))
+        inside = passage.distance < 0.9 * TUBE
+        return float(passage.speed[inside].mean()), float(np.mean(passage.river[inside] == 0.0))
+
+
+def draw(bench: Bench) -> Figure:
+    """Force and gate over the speed in mid-flight, and what a hand feels that slows down there."""
+    figure = Figure(figsize=(9.6, 3.0), layout="constrained")
+    force_ax, gate_ax, slow_ax = figure.subplots(1, 3)
+    middle = len(bench.speeds) * 0.5 * sum(bench.flight) / bench.curve.duration
+    least, greatest = bench.speeds[int(middle)]
+    forces = np.array([bench.felt(speed) for speed in SPEEDS])
+    law = np.linspace(0.0, 0.2, 201)
+    force_ax.plot(1e3 * law, [governor_force(s, least, greatest, DRAG) for s in law], color=TUBE_COLOUR, label="law")
+    force_ax.plot(1e3 * forces[:, 0], forces[:, 1], "o", ms=4, color=FIELD, label="on the Phantom")
+    force_ax.set(ylabel="governor's force along the curve [N]")
+    force_ax.legend()
+    taken = np.array([bench.taken(speed) for speed in SPEEDS])
+    gate_ax.plot(1e3 * taken[:, 0], 100 * taken[:, 1], "o", ms=4, color=FIELD)
+    gate_ax.set(ylabel="taken by the river [% of time in tube]")
+    for ax in (force_ax, gate_ax):
+        ax.axvspan(1e3 * least, 1e3 * greatest, color="#e4f1e6", lw=0)
+        ax.set(xlabel="speed in mid-flight [mm/s]")
+    passage = bench.led(bench.governor(), bench.slowing(0.05))
+    slow_ax.plot(passage.t, 1e3 * passage.speed, color=USER, label="speed [mm/s]")
+    shares = np.linspace(bench.curve.start, bench.curve.end, len(bench.speeds))
+    slowest = np.interp(passage.phase, shares, bench.speeds[:, 0])
+    slow_ax.plot(passage.t, 1e3 * slowest, color=CURVE, label="least speed [mm/s]")
+    slow_ax.plot(passage.t, 100 * passage.along, color=FIELD, label="force [0.01 N]")
+    slow_ax.set(xlabel="time [s]", title="a hand that slows down in flight", ylim=(-10.0, 205.0))
+    slow_ax.legend(loc="upper right")
+    return figure
+
+
+def main(folder: Path) -> None:
+    """Draw the picture of the docs into a folder."""
+    with mpl.rc_context(STYLE):
+        draw(Bench()).savefig(folder / "governor.png", dpi=130)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,126 @@
+"""The experiment that could refute a region: the linkage in MuJoCo from random states at its edge, inside and outside.
+
+Phase, hand and direction are drawn; the state is scaled to where V has the value wanted. Coulomb friction acts,
+encoders round, the river moves along its curve. Certified: no distance beyond the region's, and in the end the ball.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import tyro
+
+from controllers.certificates.loop.device import kinematics_function, plant_function
+from controllers.certificates.loop.hand import HandImpedance, HandRange
+from controllers.certificates.loop.stability import River
+from controllers.certificates.region.region import region
+from controllers.certificates.report import Verdict
+from controllers.curves.closest_point import closest_phases
+from controllers.safety.limiter import ForceLimiter
+from experiments.certify.certify import certified_rivers
+from experiments.config.run_config import RunConfig
+from experiments.studies.trial_simulation import Conditions, Trial, hand_path
+
+Array = npt.NDArray[np.float64]
+
+CONFIG, HANDS = RunConfig(), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
+TICKS = 400
+EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+
+
+class Outcome(NamedTuple):
+    """One simulation: largest and last distance from the curve [m]; infinite if it went 5 cm away."""
+
+    farthest: float
+    last: float
+
+
+def certified_region(config: RunConfig = CONFIG, hands: HandRange = HANDS) -> tuple[River, Verdict]:
+    """The river of a run and the verdict on its region."""
+    river = certified_rivers(config)[""]
+    return river, region(river, hands, ForceLimiter(river.sampling.period).peak, Verdict("certified", "not asked"))
+
+
+def simulate_from(
+    river: River, figures: Mapping[str, object], hands: HandRange, times: float, rng: np.random.Generator
+) -> Outcome:
+    """Simulate from a random state with √V some times that of the region's edge."""
+    curve, device = river.curve, river.device
+    hand = HandImpedance(*(float(rng.uniform(*getattr(hands, name))) for name in ("mass", "damping", "stiffness")))
+    phase = float(rng.uniform(curve.start, curve.end))
+    tangent = curve.velocity(phase)
+    away = rng.normal(size=3)
+    away -= tangent * (tangent @ away) / (tangent @ tangent)
+    direction = rng.normal(size=3)
+    mix = rng.uniform(0.0, 0.5 * np.pi)
+    away *= np.cos(mix) * np.asarray(figures["scale"])[0] / np.linalg.norm(away)
+    direction *= np.sin(mix) * np.asarray(figures["scale"])[1] / np.linalg.norm(direction)
+    alpha, beta, added = (np.asarray(figures[name]) for name in ("alpha", "beta", "hand"))
+    edge = times * (float(str(figures["level"])) - float(str(figures["shift"])))
+
+    def form(size: float) -> tuple[float, Array, Array]:
+        """√V of the state scaled by a size, its joint angles and J."""
+        theta = np.array(device.angles(curve.point(phase) + size * away))
+        jacobian = np.array(kinematics_function(device)(theta, 0.0)[0])
+        still = np.zeros(3)
+        mass = np.array(plant_function(device)(theta, still, still, still, still, hand.numbers())[0])
+        back = np.linalg.inv(jacobian)
+        inertia = back.T @ mass @ back
+        scale = np.asarray(figures["scale"])
+        x = size * np.stack([away / scale[0], direction / scale[1], direction / scale[2]])
+        value = np.einsum("ab,ai,bi->", alpha, x, x) + np.einsum("ab,ij,ai,bj->", beta, inertia, x, x)
+        value += (added[0] * hand.damping + added[1] * hand.stiffness) * (x[0] @ x[0])
+        return float(np.sqrt(value)), theta, jacobian
+
+    size = 1.0
+    for _ in range(6):
+        size *= edge / form(size)[0]
+    _, theta, jacobian = form(size)
+    pace = river.b_d / (river.b_d + hand.damping) * tangent
+    rate = np.linalg.solve(jacobian, pace + size * direction)
+    off = theta - np.array(device.angles(curve.point(phase)))
+    state = np.concatenate([off, rate, off - river.sampling.period * rate, rate])
+    trial = Trial(curve, phase, river.b_d, river.sampling, hand, away / max(np.linalg.norm(away), 1e-12))
+    path = hand_path(trial, river.k_r, TICKS, EVERYTHING, state)
+    if len(path) < TICKS:
+        return Outcome(np.inf, np.inf)
+    distance = closest_phases(curve.packed(), path)[1]
+    return Outcome(float(distance.max()), float(distance[-50:].max()))
+
+
+def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, outside: int = 100, seed: int = 1) -> None:
+    """Simulate from the edge of a certified region, and from 1.5, 3 and 6 times as far; write ``region.md``.
+
+    Parameters
+    ----------
+    out : Path
+        Folder.
+    count, outside : int
+        Simulations from the edge, and from each place outside.
+    seed : int
+        Of what is drawn.
+    """
+    river, verdict = certified_region()
+    print(verdict.reason)
+    rng = np.random.default_rng(seed)
+    lines = [
+        "| √V / edge | simulations | left the region | not in the ball at the end | farthest [mm] |",
+        "|---|---|---|---|---|",
+    ]
+    figures = verdict.figures
+    most, ball = float(str(figures["largest_distance"])), float(str(figures["ball"]))
+    for times, n in ((1.0, count), (1.5, outside), (3.0, outside), (6.0, outside)):
+        outcomes = np.array([simulate_from(river, figures, HANDS, times, rng) for _ in range(n)])
+        left, astray = int(np.sum(outcomes[:, 0] > times * most)), int(np.sum(outcomes[:, 1] > ball))
+        lines.append(f"| {times:g} | {n} | {left} | {astray} | {1e3 * outcomes[:, 0].max():.2f} |")
+        print(lines[-1], flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+    told = f"{verdict.reason}\n\n" + "\n".join(lines) + "\n"
+    (out / "region.md").write_text(told, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    tyro.cli(region_trials)

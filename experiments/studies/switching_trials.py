@@ -1,0 +1,141 @@
+"""Hands in crossing rivers on the MuJoCo Phantom, from any state and with any push; certificates against them.
+
+``python -m experiments.studies.switching_trials 40`` draws rivers and compares what is certified with what happens;
+``python -m experiments.studies.switching_trials docs`` draws the picture of the docs.
+"""
+
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.switching.switching import Keeping, Sharing
+from controllers.certificates.switching.switching_search import Push, failure
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from experiments.certify.certified_device import phantom_device
+from experiments.certify.certified_rivers import certified_bundle
+from experiments.certify.crossing_simulation import simulated_course
+from experiments.results.figures import STYLE
+from experiments.setups.modes import ADMISSION, SIGMA
+from experiments.studies.field_figures import SPEED, straight_river
+
+Array = npt.NDArray[np.float64]
+
+PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] that are tried on every crossing, to 4 N
+NONE, NEVER = 0.025, 5.7  # [N] where the picture has what is not certified, and who is never lost
+
+
+def straight_pair(
+    degrees: float, form: str, hysteresis: float, drag: float = 4.0, admission: float = ADMISSION
+) -> HigherOrder:
+    """Two straight rivers that cross in the origin of H; h and r as shares of their speed, σ of the discrete mode."""
+    rivers = tuple(replace(straight_river(angle), drag=drag) for angle in (0.0, degrees))
+    scale = (admission * SPEED, SIGMA["discrete"] * SPEED, hysteresis * SPEED)
+    return HigherOrder(RiverBundle(rivers, ("1", "2")), *scale, form)  # pyright: ignore[reportArgumentType]
+
+
+class Crossing(NamedTuple):
+    """Two random straight rivers, and a push in a random direction.
+
+    Attributes
+    ----------
+    field : HigherOrder
+        The rivers.
+    sampling : Sampling
+        The clock.
+    degrees : float
+        Between them.
+    allowed : float
+        Force that is certified [N]; negative if there is none.
+    direction : Array, shape (3,)
+        Of the push.
+    start, duration : float
+        Of the push [s].
+    """
+
+    field: HigherOrder
+    sampling: Sampling
+    degrees: float
+    allowed: float
+    direction: Array
+    start: float
+    duration: float
+
+    def kept(self, force: float) -> bool:
+        """Whether the first river keeps a hand in MuJoCo that is pushed with a force [N]."""
+        curve = self.field.bundle.rivers[0].curve
+        x, y, z = (force * self.direction).tolist()
+        push = Push((x, y, z), self.start, self.duration)
+        way = simulated_course(self.field, self.sampling, curve.point(0.2), curve.velocity(0.2), 1.2, push)
+        return failure(way.river[1:], self.sampling.period, 0, False) is None
+
+
+def draw_crossing(rng: np.random.Generator) -> Crossing:
+    """Random angle, gains, hysteresis, clock and push."""
+    degrees = float(rng.uniform(5.0, 90.0))
+    field = straight_pair(degrees, "discrete", float(rng.uniform(0.0, 3.0)), float(rng.uniform(4.0, 20.0)))
+    sampling = Sampling(float(rng.choice([5e-4, 1e-3])), 0.0, float(rng.uniform(25.0, 100.0)))
+    first, second = certified_bundle(field.bundle, phantom_device(), sampling)
+    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
+    allowed = Keeping(first, (second,), sharing).allowed(2.0)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    return Crossing(
+        field, sampling, degrees, allowed, direction, float(rng.uniform(0.2, 0.6)), float(rng.uniform(0.05, 0.4))
+    )
+
+
+def trial(rng: np.random.Generator) -> tuple[bool, bool]:
+    """Random rivers and a push as strong as is certified, else 1 N: whether certified, and whether the hand is kept."""
+    crossing = draw_crossing(rng)
+    certified = crossing.allowed > 0.0
+    return certified, crossing.kept(crossing.allowed if certified else 1.0)
+
+
+def trials(number: int, seed: int = 1) -> Counter[tuple[bool, bool]]:
+    """How many of some trials were (certified, kept)."""
+    rng = np.random.default_rng(seed)
+    return Counter(trial(rng) for _ in range(number))
+
+
+def outcomes_figure(number: int, seed: int = 1) -> Figure:
+    """The force that is certified against the least of some that loses the hand in MuJoCo, for random crossings."""
+    rng = np.random.default_rng(seed)
+    crossings = [draw_crossing(rng) for _ in range(number)]
+    lost = [next((force for force in PUSHES if not it.kept(force)), NEVER) for it in crossings]
+    x = [it.allowed if it.allowed > 0.0 else NONE for it in crossings]
+    figure = Figure(figsize=(5.6, 4.4), layout="constrained")
+    ax = figure.subplots()
+    ends = np.array([NONE, NEVER])
+    ax.fill_between(ends, [PUSHES[0] / 2.0] * 2, ends, color="#fbe9e7", lw=0, label="would refute the certificate")
+    dots = ax.scatter(x, lost, c=[it.degrees for it in crossings], cmap="viridis", s=28, vmin=0.0, vmax=90.0)
+    ax.set(xscale="log", yscale="log", xlim=(NONE / 1.3, NEVER * 1.2), ylim=(PUSHES[0] / 1.5, NEVER * 1.2))
+    ax.set_xticks([NONE, 0.1, 0.3, 1.0, 3.0], ["none", "0.1", "0.3", "1", "3"])
+    ax.set_yticks([*PUSHES[::2], NEVER], [*(f"{force:.2g}" for force in PUSHES[::2]), "kept"])
+    ax.minorticks_off()
+    ax.set(xlabel="force that is certified [N]", ylabel="least force that loses the hand in MuJoCo [N]")
+    ax.legend(loc="lower right", fontsize=8)
+    figure.colorbar(dots, label="angle of the crossing [degrees]")
+    return figure
+
+
+def main(arguments: list[str]) -> None:
+    """Count outcomes of as many trials as is said, or draw them into a folder."""
+    if not arguments[0].isdecimal():
+        with mpl.rc_context(STYLE):
+            outcomes_figure(40).savefig(Path(arguments[0]) / "switching-trials.png", dpi=130)
+        return
+    for (certified, kept), times in sorted(trials(int(arguments[0])).items()):
+        print(f"certified {certified}, kept {kept}: {times}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

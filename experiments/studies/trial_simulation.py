@@ -1,0 +1,284 @@
+"""Trials of a sampled river in MuJoCo: a place, a clock and a hand, and the linkage under the servo's kernels.
+
+The linkage stands alone in the world's frame; sensing, law and actuation are the functions that the servo runs, in its
+order. What the servo does not have is put around them: torques late by whole periods, encoders that do not round, no
+Coulomb friction, another integrator.
+"""
+
+from dataclasses import dataclass
+from types import FunctionType
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.certificates.loop.hand import HandImpedance
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.linear_loop import linearise
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.follow import Follow
+from controllers.fields.instructions import Program
+from controllers.fields.program import evaluate
+from experiments.certify.certified_device import phantom_device
+from models.phantom.spec import phantom_spec
+from models.scene import PHANTOM, R_WP
+from sim.compilation.compiled import entry_point
+from sim.errors import SimError
+from sim.users.arm import Arm
+from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
+from sim.world.plant import Hand, Plant, advance, make_hand
+from sim.world.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+LAP = 1e6  # [s] of a lap: the curve stands still, so a trial is about one configuration
+START = 1e-6  # [m] distance from the curve at which a trial begins
+
+
+@njit
+def _exact_reading(theta: tuple[float, float, float]) -> tuple[float, float, float]:
+    return theta
+
+
+# The servo's own sensing with its encoders' rounding taken out: the same source, one name bound to another function.
+_sense_exactly = njit(
+    FunctionType(sense.py_func.__code__, sense.py_func.__globals__ | {"encoder_reading": _exact_reading})
+)
+
+
+@entry_point
+def run_late(
+    plant: Plant,
+    port: PhantomPort,
+    hand: Hand,
+    ops: IntArray,
+    params: Array,
+    memory: Array,
+    late: Array,
+    rounded: bool,
+    path: Array,
+) -> None:
+    """The servo's loop over one device, without limiter and figure, its torques late by whole periods.
+
+    Parameters
+    ----------
+    plant, port, hand, ops, params, memory
+        As in the servo.
+    late : Array
+        Torques on their way, the next to act first, shape (m, 3); m is the delay in periods.
+    rounded : bool
+        Whether the encoders round.
+    path : Array
+        Written: the hand as measured at each tick, shape (n, 3); NaN from where it is farther than 5 cm off.
+    """
+    path[:] = np.nan
+    wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
+    for k in range(path.shape[0]):
+        t = k * plant.period
+        if rounded:
+            sense(port, t, 0.0)
+        else:
+            _sense_exactly(port, t, 0.0)
+        evaluate(ops, params, memory, port.hand, wrench)
+        actuate(port, wrench[:3])
+        for i in range(3):
+            if late.shape[0] > 0:
+                slot = k % late.shape[0]
+                port.ctrl[port.motor[i]] = late[slot, i]
+                late[slot, i] = port.torque[i]
+            path[k, i] = port.hand[1 + i]
+        if np.sum((path[k] - path[0]) ** 2) > 0.05**2:
+            break
+        advance(plant, port, hand, t, False, applied)
+
+
+CLOSURE = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 1], [0, 1, -1]], dtype=np.float64)
+"""All five hinges of the linkage, by θ."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is drawn.
+
+    Attributes
+    ----------
+    curve : Trajectory
+        A circle somewhere in the workspace, so slow that it stands still.
+    phase : float
+        Where on it [s].
+    b_d : float
+        Damping [N s/m].
+    sampling : Sampling
+        The clock; its delay is a whole number of periods.
+    hand : HandImpedance
+        On the stylus.
+    direction : Array
+        Across the curve, of the first displacement, shape (3,).
+    """
+
+    curve: Trajectory
+    phase: float
+    b_d: float
+    sampling: Sampling
+    hand: HandImpedance
+    direction: Array
+
+    def loop(self) -> SampledLoop:
+        """The linearised loop at the trial's place."""
+        linear = linearise(phantom_device(), FOLLOW_LAW, self.curve, np.array([self.phase]), self.hand)
+        return SampledLoop(linear, self.sampling)
+
+    def program(self, k_r: float) -> Program:
+        """The field that is simulated: FOLLOW with k_r [N/m]."""
+        return Follow(self.curve, k_r, self.b_d, np.inf).program()
+
+    def user(self, k_r: float) -> Arm:
+        """The hand that is simulated: it stays at the trial's place."""
+        held = self.hand.damping > 0.0 or self.hand.stiffness > 0.0
+        path = self.curve.point(self.phase)[None] if held else np.zeros((0, 3))
+        return Arm(self.hand.stiffness, self.hand.damping, path)
+
+
+def draw_trial(rng: np.random.Generator) -> Trial:
+    """A random trial: curve, phase, clock, hand, and a damping between 5 and 70 % of what is stable by itself."""
+    while True:
+        radius, centre = rng.uniform(0.02, 0.06), rng.uniform([-0.06, -0.08, -0.06], [0.06, 0.08, 0.1])
+        axes = np.linalg.qr(rng.normal(size=(3, 3)))[0][:, :2]
+        angle = np.linspace(0.0, 2.0 * np.pi, 97)
+        points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes.T
+        points[-1] = points[0]
+        curve = Trajectory(LAP * angle / (2.0 * np.pi), points, periodic=True)
+        period = float(0.25e-3 * 16.0 ** rng.uniform())
+        sampling = Sampling(period, float(rng.integers(4)) * period, float(rng.uniform(80.0, 250.0)))
+        hand = HandImpedance()
+        if rng.uniform() < 0.7:
+            stiffness = float(rng.uniform(50.0, 500.0)) if rng.uniform() < 0.5 else 0.0
+            hand = HandImpedance(float(rng.uniform(0.0, 0.3)), float(rng.uniform(0.5, 8.0)), stiffness)
+        try:
+            for point in curve.point(np.linspace(0.0, LAP, 24)):
+                phantom_angles(point)
+        except SimError:  # out of the workspace: another one
+            continue
+        phase = float(rng.uniform(0.0, LAP))
+        tangent = curve.velocity(phase) / np.linalg.norm(curve.velocity(phase))
+        sideways = rng.normal(size=3)
+        sideways -= tangent * (tangent @ sideways)
+        trial = Trial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
+        loop = trial.loop()
+        most = _critical_damping(loop)
+        return Trial(curve, phase, float(rng.uniform(0.05, 0.7)) * most, sampling, hand, trial.direction)
+
+
+def _critical_damping(loop: SampledLoop) -> float:
+    """Largest b_d [N s/m] that is stable with hardly any stiffness."""
+    gains = np.geomspace(0.05, 500.0, 60)
+    stable = [bool(loop.radius(1.0, b)[0] < 1.0) for b in gains]
+    first = int(np.argmin(stable)) if not all(stable) else len(gains) - 1
+    return float(gains[max(0, first - 1)])
+
+
+def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: mujoco.mjtIntegrator) -> mujoco.MjModel:
+    """The Phantom alone in the world's frame, with the hand's mass on its tip, which carries its own weight."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step
+    spec.option.integrator = integrator
+    spec.option.tolerance = 1e-14
+    device = phantom_spec()
+    stylus = device.body("stylus")
+    stylus.mass, stylus.gravcomp = stylus.mass + hand.mass, 1.0
+    if not coulomb:
+        for joint in device.joints:
+            joint.frictionloss = 0.0
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, R_WP.ravel())
+    spec.attach(device, prefix=PHANTOM, frame=spec.worldbody.add_frame(quat=quaternion.tolist()))
+    return spec.compile()
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is modelled beyond the linear loop, and how finely time is cut.
+
+    Attributes
+    ----------
+    substeps : int
+        Physics steps a servo period.
+    integrator : mujoco.mjtIntegrator
+        Runge and Kutta's by default. The world's own is of first order: it leads by half a step, which stabilises.
+    rounded : bool
+        Encoders round.
+    coulomb : bool
+        Coulomb friction acts.
+    start : float
+        Distance from the curve at the beginning [m].
+    """
+
+    substeps: int = 32
+    integrator: mujoco.mjtIntegrator = mujoco.mjtIntegrator.mjINT_RK4
+    rounded: bool = False
+    coulomb: bool = False
+    start: float = START
+
+
+def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
+    """Displacement from the trial's place across the curve at each tick [m], shape (n, 3); see `hand_path`."""
+    tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))
+    away = hand_path(trial, k_r, ticks, conditions, state) - trial.curve.point(trial.phase)
+    return away - np.outer(away @ tangent, tangent)
+
+
+def hand_path(
+    trial: Trial,
+    k_r: float,
+    ticks: int,
+    conditions: Conditions,
+    state: Array | None = None,
+    user: Arm | None = None,
+) -> Array:
+    """Where the hand is at each tick in H [m], shape (n, 3), n ≤ ticks, after letting go beside the curve.
+
+    Parameters
+    ----------
+    trial, conditions
+        What is simulated, and how.
+    k_r : float
+        [N/m].
+    ticks : int
+        How long; shorter if the hand gets 5 cm off.
+    state : Array, optional
+        State ξ of the linear loop to begin in; by default at rest, `conditions.start` off in the trial's direction.
+    user : Arm, optional
+        What pushes; by default the trial's own.
+    """
+    sampling, period = trial.sampling, trial.sampling.period
+    model = trial_model(trial.hand, period / conditions.substeps, conditions.coulomb, conditions.integrator)
+    data = mujoco.MjData(model)
+    centre = trial.curve.point(trial.phase)
+    port = phantom_port(model, data, period, sampling.cutoff)
+    late = np.zeros((sampling.whole_delay, 3))
+    if state is None:
+        theta, rate = np.array(phantom_angles(centre + conditions.start * trial.direction)), np.zeros(3)
+    else:
+        still = np.array(phantom_angles(centre))
+        theta, rate = still + state[:3], state[3:6]
+        port.memory[:3], port.memory[6:9], port.memory[12] = still + state[6:9], state[9:12], 1.0
+        port.hand[4] = 1.0
+        late += state[12:].reshape(-1, 3)[::-1]
+    late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
+    names = [PHANTOM + name for name in (*ARM_JOINTS, "elbow", "twin")]
+    for i, name in enumerate(names):
+        data.joint(name).qpos[0], data.joint(name).qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
+    mujoco.mj_forward(model, data)
+    a, b, c = (int(model.joint(name).dofadr[0]) for name in names[:3])
+    plant = Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=np.zeros(3), arm_v=(a, b, c), substeps=conditions.substeps, period=period,
+    )  # fmt: skip
+    hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
+    path = np.zeros((ticks, 3))
+    run_late(plant, port, hand, program.ops, program.params, program.fresh_memory(), late, conditions.rounded, path)
+    return path[np.isfinite(path[:, 0])]

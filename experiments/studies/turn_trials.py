@@ -1,0 +1,185 @@
+"""Turns, starts and stops that friction cannot give, tried in MuJoCo by a body that has nothing to do but to follow.
+
+``python -m experiments.studies.turn_trials CLIP...`` plays clips (embedded, or files) faster than the floor lets
+them, and prints what is certified of them beside what happens.
+
+The body is a mass on a foot that neither tips nor tires: motors between the two push it along the way of a centre of
+mass as they like, so that only the floor can refuse. What it cannot do, no figure can.
+"""
+
+import sys
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from controllers.certificates.flight.ballistic import BodyMotion
+from controllers.certificates.flight.tolerance import GRAVITY, JUDGING
+from experiments.certify.ballistics import clip_ballistics
+from experiments.setups.clips import load_clips
+from models.humanoid.skeleton import DEFAULT_MASS
+from models.mocap.clip import Clip
+
+Array = npt.NDArray[np.float64]
+
+_STEP = 5e-5  # of the simulation [s]
+_FOOT = 1.0  # mass of the foot [kg], radius of its sole 0.1 m
+_STIFF = 60.0  # natural frequency of the mass on its way [rad/s], critically damped
+_LEAN = 2.0  # most that the leg pushes sideways, of what it pushes down: more than any friction holds
+_FOLLOWED = 5e-4  # what is followed is missed by less [m]
+_FASTER = 1.35  # times the certified rate, at which a clip is played that is certified
+_SETTLING = 0.1  # [s] of rest before, in which the contact comes to bear
+
+
+class Followed(NamedTuple):
+    """What became of a mass that was to follow a way.
+
+    Attributes
+    ----------
+    miss : float
+        Largest distance from the way, at its samples [m].
+    slid : float
+        Largest distance of the foot from where it stood [m].
+    """
+
+    miss: float
+    slid: float
+
+
+def _body(friction: float) -> mujoco.MjModel:
+    axes = ("1 0 0", "0 1 0", "0 0 1")
+    slides = ["".join(f'<joint name="{name}{k}" type="slide" axis="{axis}"/>' for k, axis in enumerate(axes))
+              for name in ("foot", "leg")]  # fmt: skip
+    motors = "".join(f'<motor joint="leg{k}"/>' for k in range(3))
+    return mujoco.MjModel.from_xml_string(f"""
+        <mujoco><option timestep="{_STEP}" gravity="0 0 -{GRAVITY}" cone="elliptic" impratio="100"
+                        integrator="implicitfast"/>
+        <default><geom friction="{friction} 0 0" solref="0.002 1" condim="3"/></default>
+        <worldbody><geom type="plane" size="5 5 1"/>
+        <body pos="0 0 0.1">{slides[0]}<geom type="sphere" size="0.1" mass="{_FOOT}"/>
+        <body pos="0 0 0.9">{slides[1]}
+        <geom type="sphere" size="0.1" mass="{DEFAULT_MASS - _FOOT}" contype="0" conaffinity="0"/>
+        </body></body></worldbody><actuator>{motors}</actuator></mujoco>""")
+
+
+def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed:
+    """Let the mass follow a way from its first point, at a velocity.
+
+    Parameters
+    ----------
+    way : array, shape (n, 3)
+        Of a centre of mass [m].
+    fps : float
+        Points a second [1/s].
+    velocity : array, shape (3,)
+        With which it begins [m/s].
+    friction : float
+        μ between foot and floor.
+    """
+    model = _body(friction)
+    data = mujoco.MjData(model)
+    spline = CubicSpline(np.arange(len(way)) / fps, way - way[0])
+    speed, acceleration = spline.derivative(1), spline.derivative(2)
+
+    def push(error: Array, slower: Array, wanted: Array) -> None:
+        leg = DEFAULT_MASS * (wanted + _STIFF**2 * error + 2.0 * _STIFF * slower)
+        leg[2] = max(leg[2] + DEFAULT_MASS * GRAVITY, 0.0)  # it does not pull its foot up
+        data.ctrl[:2] = leg[:2] * min(1.0, _LEAN * leg[2] / max(np.linalg.norm(leg[:2]), 1e-12))
+        data.ctrl[2] = leg[2]
+        mujoco.mj_step(model, data)
+
+    while data.time < _SETTLING:
+        push(-_of_all(data.qpos), -_of_all(data.qvel), np.zeros(3))
+    data.time, stood, began = 0.0, data.qpos[:2].copy(), _of_all(data.qpos)
+    data.qvel[3:] += (velocity - _of_all(data.qvel)) / _of_all(np.repeat([0.0, 1.0], 3))
+    miss, slid = 0.0, 0.0
+    for k in range(len(way)):
+        while data.time < k / fps - 1e-9:
+            t = data.time
+            push(began + spline(t) - _of_all(data.qpos), speed(t) - _of_all(data.qvel), acceleration(t))
+        miss = max(miss, float(np.linalg.norm(began + way[k] - way[0] - _of_all(data.qpos))))
+        slid = max(slid, float(np.linalg.norm(data.qpos[:2] - stood)))
+    return Followed(miss, slid)
+
+
+def _of_all(values: Array) -> Array:
+    """Of the centre of mass of foot and mass: its place from positions of the joints, its velocity from theirs."""
+    return values[:3] + values[3:] * (1.0 - _FOOT / DEFAULT_MASS)
+
+
+class TurnTrial(NamedTuple):
+    """What a counterexample of ``turns`` says of a window of frames, and what happens in MuJoCo.
+
+    Attributes
+    ----------
+    rate, onset : float
+        Share of its speed at which the floor can give the window's mean acceleration: certified, and that from which
+        the mass no longer follows it.
+    bound, miss, miss_of_mean : float
+        Distance from the window that no body undercuts, and that of the mass from it and from its best parabola [m].
+    """
+
+    rate: float
+    onset: float
+    bound: float
+    miss: float
+    miss_of_mean: float
+
+
+def parabola(acceleration: Array, seconds: float, friction: float, rate: float) -> Followed:
+    """Let the mass follow a constant acceleration [m/s²] of some seconds, played at a rate."""
+    fps = 100.0 * rate / seconds
+    t = np.arange(101.0)[:, None] / fps
+    return follow(0.5 * rate**2 * acceleration * t**2, fps, np.zeros(3), friction)
+
+
+def onset(acceleration: Array, seconds: float, friction: float) -> float:
+    """Rate at which the mass begins to miss a constant acceleration, within 0.1 %, between 0.3 and 1.2."""
+    low, high = 0.3, 1.2
+    while high - low > 1e-3 * low:
+        middle = 0.5 * (low + high)
+        missed = parabola(acceleration, seconds, friction, middle).miss > _FOLLOWED
+        low, high = (low, middle) if missed else (middle, high)
+    return 0.5 * (low + high)
+
+
+def trial(motion: BodyMotion, example: Mapping[str, Any], friction: float) -> TurnTrial:
+    """Try in MuJoCo what a counterexample of the verdict ``turns`` says."""
+    way = motion.com[example["start"] : example["end"] + 1]
+    seconds, acceleration = (len(way) - 1) / motion.fps, np.asarray(example["acceleration"])
+    return TurnTrial(
+        rate=example["rate"],
+        onset=onset(acceleration, seconds, friction),
+        bound=example["distance"],
+        miss=follow(way, motion.fps, np.asarray(example["velocity"]), friction).miss,
+        miss_of_mean=parabola(acceleration, seconds, friction, 1.0).miss,
+    )
+
+
+def main(names: list[str]) -> None:
+    """Print a table of clips."""
+    print("| clip | played at | certified up to | missed from | error | misses by at least | misses | its mean |")
+    print("|---|---|---|---|---|---|---|---|")
+    clips, _ = load_clips(names)
+    for clip in clips:
+        margin = clip_ballistics(clip).certificate.verdicts["turns"].margin or 0.0
+        pace = max(1.0, _FASTER * float(np.sqrt(1.0 + margin)))
+        played = clip_ballistics(Clip(clip.poses, pace * clip.fps, clip.name))
+        verdict = played.certificate.verdicts["turns"]
+        if verdict.verdict != "refuted":
+            print(f"| {clip.name} | {pace:.2f} | {verdict.reason} |")
+            continue
+        done = trial(played.motion, verdict.counterexample, JUDGING.friction)
+        print(
+            f"| {clip.name} | {pace:.2f} | {done.rate:.3f} | "
+            f"{done.onset:.3f} | {100.0 * (done.onset / done.rate - 1.0):+.2f} % | {1e3 * done.bound:.1f} mm | "
+            f"{1e3 * done.miss:.0f} mm | {1e3 * done.miss_of_mean:.0f} mm |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,92 @@
+"""Hands with and without a soft wall, in a picture: ``python -m experiments.studies.wall_trials docs``."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from controllers.rotations import exponential, logarithm, multiply
+from experiments.config.run_config import RunConfig
+from experiments.setups.wiring import wire
+from models.humanoid.skeleton import JOINTS, N_POSE, joint_range
+from models.mocap.clip import Clip
+from models.mocap.library import embedded
+from sim.loop.loop import Loop
+from sim.loop.servo import FrameLog, TickLog
+from sim.users.intent import Push
+from sim.viewer.palette import CURVE, FIELD, USER
+
+Array = npt.NDArray[np.float64]
+
+BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a turn of it that it cannot do
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+def impossible(clip: Clip) -> Clip:
+    """A clip whose left elbow bends the wrong way."""
+    poses = clip.poses.copy()
+    column = N_POSE - 4 * (len(JOINTS) - JOINTS.index(BENT))
+    turn = exponential(*BEND)
+    poses[:, column : column + 4] = [multiply(q[0], q[1], q[2], q[3], *turn) for q in poses[:, column : column + 4]]
+    return Clip(poses, clip.fps, f"{clip.name} with a broken elbow")
+
+
+def excess(poses: Array) -> Array:
+    """How far the worst joint of each pose (n, 75) is beyond its limit [rad], shape (n,); negative within all."""
+    limits = joint_range()
+    turns = np.array([[logarithm(*q) for q in pose[-4 * len(JOINTS) :].reshape(-1, 4)] for pose in poses])
+    return np.maximum(turns - limits[..., 1], limits[..., 0] - turns).max(axis=(1, 2))
+
+
+class Meeting(NamedTuple):
+    """A hand that pushes towards a clip that cannot be done: time [s], radius of the stylus [m], excess [rad]."""
+
+    t: Array
+    radius: Array
+    excess: Array
+
+
+def meet(walls: bool, seconds: float = 6.0) -> Meeting:
+    """Let a hand push outwards, where the clip of the broken elbow is, for the second half of a lap."""
+    inside = embedded("squat_dance")
+    config = replace(RunConfig(), seconds=seconds, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
+    session = wire(config, (inside, impossible(inside)))
+    frames: list[tuple[Array, Array, Array]] = []
+
+    def observe(ticks: TickLog, block: FrameLog, n: int) -> None:
+        every = session.servo.figure_ticks
+        m = -(-n // every)
+        place = ticks.hand[: m * every : every, 1:3]
+        frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess(block.reference[:m])))
+
+    Loop(session.servo, session.world, observe).run(seconds)
+    return Meeting(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
+
+
+def wall_figure(without: Meeting, with_walls: Meeting) -> Figure:
+    """Radius of the stylus and worst joint over time, without walls and with them."""
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    radius, worst = figure.subplots(1, 2)
+    for meeting, color, label in ((without, USER, "without walls"), (with_walls, FIELD, "with walls")):
+        radius.plot(meeting.t, 1e3 * meeting.radius, color=color, label=label)
+        worst.plot(meeting.t, np.degrees(meeting.excess), color=color, label=label)
+    radius.set(xlabel="time [s]", ylabel="radius of the stylus [mm]", title="the hand pushes outwards from 2 s to 5 s")
+    worst.axhline(0.0, color=CURVE, lw=0.8, ls="--")
+    worst.set(xlabel="time [s]", ylabel="beyond the limit [°]", title="the worst joint of the figure")
+    radius.legend()
+    return figure
+
+
+if __name__ == "__main__":
+    with mpl.rc_context(_STYLE):
+        wall_figure(meet(walls=False), meet(walls=True)).savefig(Path(sys.argv[1]) / "soft-walls.png", dpi=150)

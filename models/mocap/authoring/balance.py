@@ -1,0 +1,173 @@
+"""Balance of a cyclic motion: its zero-moment point, and the sway of the pelvis that brings it under the feet.
+
+The zero-moment point (Vukobratović & Borovac 2004) is where the floor would have to push so that the body needs no
+other help: with mass m, centre of mass c, angular momentum L about it and F = m (c̈ + g e_z),
+
+    p_x = c_x − (c_z F_x + L̇_y) / F_z,    p_y = c_y − (c_z F_y − L̇_x) / F_z.
+
+Feet can only push inside the convex hull of their contacts.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
+
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.mocap.authoring.authoring import Choreography, poses_at
+from models.mocap.clip import Clip
+
+Array = npt.NDArray[np.float64]
+
+GRAVITY = 9.81
+_TOUCH = 0.006  # a contact sphere this near the floor [m] can push
+
+
+class Dynamics(NamedTuple):
+    """What a motion asks of the floor, frame by frame.
+
+    Attributes
+    ----------
+    com : array, shape (n, 3)
+        Centre of mass [m].
+    force : array, shape (n, 3)
+        Force of the floor on the body [N].
+    torque : array, shape (n, 3)
+        Rate of the angular momentum about the centre of mass [N m]: the moment that force must have about it.
+    zmp : array, shape (n, 2)
+        Zero-moment point on the floor [m].
+    contacts : array, shape (n, 8, 3)
+        Centres of the feet's contact spheres [m], in the order of `FOOT_CONTACTS`.
+    """
+
+    com: Array
+    force: Array
+    torque: Array
+    zmp: Array
+    contacts: Array
+
+
+def dynamics(clip: Clip) -> Dynamics:
+    """Centre of mass, floor force and zero-moment point of a clip that closes in place, by differences over the lap.
+
+    Parameters
+    ----------
+    clip : Clip
+        A cyclic clip whose last frame is its first, without displacement.
+
+    Returns
+    -------
+    Dynamics
+        Of the frames but the last.
+    """
+    model = figure_model()
+    data = mujoco.MjData(model)
+    pelvis = model.body("pelvis").id
+    feet = [model.geom(name).id for name in FOOT_CONTACTS]
+    velocities = clip.velocities()
+    n = len(clip.poses) - 1
+    com, spin, contacts = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(feet), 3))
+    for k in range(n):
+        data.qpos, data.qvel = clip.poses[k], velocities[k]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        com[k], spin[k], contacts[k] = data.subtree_com[pelvis], data.subtree_angmom[pelvis], data.geom_xpos[feet]
+    acceleration = (np.roll(com, -1, axis=0) - 2 * com + np.roll(com, 1, axis=0)) * clip.fps**2
+    force = model.body_subtreemass[pelvis] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
+    torque = (np.roll(spin, -1, axis=0) - np.roll(spin, 1, axis=0)) * clip.fps / 2
+    lever = np.stack([com[:, 2] * force[:, 0] + torque[:, 1], com[:, 2] * force[:, 1] - torque[:, 0]], axis=1)
+    return Dynamics(com, force, torque, com[:, :2] - lever / force[:, 2:], contacts)
+
+
+def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
+    """The point of the support nearest to a point on the floor.
+
+    Parameters
+    ----------
+    point : array, shape (2,)
+        Where, in the plane of the floor [m].
+    contacts : array, shape (k, 3)
+        Centres of the contact spheres [m]; those that touch the floor span the support.
+    share : float
+        How far the support is shrunk towards its middle.
+
+    Returns
+    -------
+    array, shape (2,)
+        The point itself when it lies inside or when nothing touches the floor.
+    """
+    touching = contacts[contacts[:, 2] < CONTACT_RADIUS + _TOUCH, :2]
+    if len(touching) == 0:
+        return point
+    middle = touching.mean(axis=0)
+    corners = middle + share * (touching - middle)
+    if len(corners) > 2:
+        try:
+            hull = ConvexHull(corners)
+        except QhullError:  # the corners lie on a line
+            corners = corners[np.argsort(corners @ np.ptp(corners, axis=0))]
+        else:
+            if np.all(hull.equations[:, :2] @ point + hull.equations[:, 2] <= 0):
+                return point
+            corners = corners[hull.vertices]
+    along = np.roll(corners, -1, axis=0) - corners
+    length = np.maximum(np.sum(along * along, axis=1), 1e-12)
+    where = np.clip(np.sum((point - corners) * along, axis=1) / length, 0.0, 1.0)
+    nearest = corners + where[:, None] * along
+    return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
+
+
+def outside_support(motion: Dynamics) -> Array:
+    """How far the zero-moment point lies outside the support [m], shape (n,)."""
+    nearest = [supported(point, contacts) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)]
+    return np.linalg.norm(motion.zmp - np.array(nearest), axis=1)
+
+
+def balanced_clip(
+    choreography: Choreography, fps: float, cutoff: float = 8.0, rounds: int = 12, share: float = 0.7
+) -> Clip:
+    """Sample a cyclic in-place choreography, its pelvis swaying so that the zero-moment point stays under the feet.
+
+    A pelvis that sways by δ moves the zero-moment point by about δ − (h/g) δ̈ (cart-table model, Kajita et al. 2003).
+    For a periodic error e that is solved harmonic by harmonic, δ̂ = ê / (1 + h ω²/g), and repeated on the exact
+    dynamics.
+
+    Parameters
+    ----------
+    choreography : Choreography
+        The motion; its sway is added to the x and y of its keys.
+    fps : float
+        Frames per second [1/s].
+    cutoff : float
+        Highest frequency of the sway [Hz]: it is smooth by construction.
+    rounds : int
+        Repetitions.
+    share : float
+        Share of the support, about its middle, in which the zero-moment point is asked to lie.
+
+    Returns
+    -------
+    Clip
+        One lap, its last frame closing on the first.
+    """
+    n = round(choreography.duration * fps)
+    t = np.linspace(0.0, choreography.duration, n + 1)
+    sway = np.zeros((n + 1, 2))
+    frequency = np.arange(n // 2 + 1) / choreography.duration
+    for _ in range(rounds):
+        motion = dynamics(Clip(poses_at(choreography, t, sway), fps, choreography.name))
+        wanted = [
+            supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
+        ]
+        # A sway adds a moment: the same one moves the zero-moment point further where the floor pushes less.
+        load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
+        error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)
+        error[frequency > cutoff] = 0.0
+        error /= (1 + motion.com[:, 2].mean() / GRAVITY * (2 * np.pi * frequency) ** 2)[:, None]
+        change = np.fft.irfft(error, n, axis=0)
+        sway += np.vstack([change, change[:1]])
+    return Clip(poses_at(choreography, t, sway), fps, choreography.name)

@@ -1,0 +1,211 @@
+"""Standing jump and backflip: key poses, made to push off, fly and land by spacetime optimisation.
+
+Both are symmetric, left and right, so everything happens in the sagittal plane. While no foot stands, the spacetime
+optimisation leaves no force but gravity: the centre of mass follows its parabola and angular momentum stays what the
+push-off made it, so the backflip turns as fast as its tuck allows (Yeadon 1990, "The simulation of aerial movement").
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
+from models.mocap.authoring.authoring import Arm
+from models.mocap.clip import Clip
+from models.mocap.dynamics.coordinates import coordinate, poses, reflection
+from models.mocap.dynamics.floor_forces import soles
+from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
+
+Array = npt.NDArray[np.float64]
+
+FPS = 120.0
+_HIP = 0.0875  # from the middle to a hip [m]: the feet stand below the hips
+# Symmetric degrees of freedom, and what a radian (metre) of distance from the sketch costs.
+_ACTIVE = (
+    ("position", "x", 0.3), ("position", "z", 0.3), ("root", "y", 0.5), ("abdomen", "y", 4.0), ("chest", "y", 4.0),
+    ("head", "y", 6.0), ("left_clavicle", "x", 8.0), ("left_clavicle", "z", 8.0), ("left_shoulder", "x", 4.0),
+    ("left_shoulder", "y", 4.0), ("left_shoulder", "z", 4.0), ("left_elbow", "z", 4.0), ("left_hip", "y", 2.0),
+    ("left_knee", "y", 2.0), ("left_ankle", "y", 2.0),
+)  # fmt: skip
+_COLUMNS = [coordinate(joint, axis) for joint, axis, _ in _ACTIVE]
+
+
+_ROUGH = Weights(force=3.0, moment=6.0, flight=1.0, slip=100.0, depth=50.0, limit=20.0, strain=1.0)
+
+
+class Key(NamedTuple):
+    """A pose of the sagittal plane at a time; angles in degrees.
+
+    Attributes
+    ----------
+    time : float
+        [s].
+    hip, knee, ankle : float
+        Flexion of hip and knee, dorsiflexion of the ankle.
+    pitch : float
+        Of the pelvis, forwards.
+    trunk : float
+        Flexion of the trunk on the pelvis, shared by abdomen and chest.
+    neck : float
+        Flexion of the head on the chest.
+    arm : Arm
+        Both arms.
+    place : (float, float)
+        Of the pelvis: x and z [m].
+    """
+
+    time: float
+    hip: float
+    knee: float
+    ankle: float
+    pitch: float
+    trunk: float
+    neck: float
+    arm: Arm
+    place: tuple[float, float]
+
+
+class Flight(NamedTuple):
+    """A motion with one flight, from rest to rest.
+
+    Attributes
+    ----------
+    name : str
+        Of the clip.
+    keys : tuple of Key
+        The sketch; the first and the last hold.
+    off, down : (float, float)
+        When heels and toes leave the floor, and when they are back [s].
+    travel : float
+        From the place of push-off to the place of landing [m].
+    intervals : int
+        Knot intervals.
+    weights : Weights
+        Of everything but the sketch.
+    """
+
+    name: str
+    keys: tuple[Key, ...]
+    off: tuple[float, float]
+    down: tuple[float, float]
+    travel: float
+    intervals: int
+    weights: Weights
+
+
+_HANG = Arm(raised=8, plane=60, elbow=14)
+_BACK = Arm(raised=48, plane=165, elbow=18)
+
+
+def _stand(time: float, x: float, pitch: float = 0.0) -> Key:
+    """Upright at rest: knees not quite locked, the pelvis 2 cm ahead of the ankles: the weight is over the feet."""
+    thigh, shank, bend = 0.4244, 0.4362, np.deg2rad(6.0)
+    alpha = np.arctan2(shank * np.sin(bend), thigh + shank * np.cos(bend))
+    length = thigh * np.cos(alpha) + shank * np.cos(bend - alpha)
+    slope = np.arcsin(0.02 / length)
+    hip, ankle = np.rad2deg([alpha - slope, bend - alpha + slope])
+    return Key(time, hip, 6.0, ankle, pitch, 0.0, 0.0, _HANG, (x + 0.02, 0.068 + length * np.cos(slope)))
+
+
+JUMP = Flight(
+    name="jump",
+    keys=(
+        _stand(0.0, 0.0),
+        _stand(0.2, 0.0),
+        Key(0.66, 88, 92, 28, 28, 18, -25, _BACK, (-0.10, 0.62)),
+        Key(0.94, 4, 6, -38, 2, -6, -5, Arm(raised=135, plane=12, elbow=20), (0.06, 1.02)),
+        Key(1.10, 18, 22, -32, 0, -4, 0, Arm(raised=145, plane=15, elbow=20), (0.14, 1.20)),
+        Key(1.25, 40, 34, -12, 4, 4, -4, Arm(raised=105, plane=20, elbow=25), (0.22, 1.18)),
+        Key(1.40, 38, 24, -6, 12, 8, -10, Arm(raised=70, plane=25, elbow=25), (0.28, 0.98)),
+        Key(1.66, 82, 84, 27, 26, 18, -22, Arm(raised=45, plane=20, elbow=30), (0.22, 0.66)),
+        _stand(2.2, 0.35),
+        _stand(2.4, 0.35),
+    ),
+    off=(0.82, 0.94), down=(1.45, 1.40), travel=0.35, intervals=48, weights=Weights(flight=10.0),
+)  # fmt: skip
+
+BACKFLIP = Flight(
+    name="backflip",
+    keys=(
+        _stand(0.0, 0.0),
+        _stand(0.2, 0.0),
+        Key(0.66, 84, 90, 28, 26, 16, -20, _BACK, (-0.10, 0.63)),
+        Key(1.00, -8, 10, -36, -16, -12, -14, Arm(raised=150, plane=12, elbow=12), (-0.02, 1.02)),
+        Key(1.15, 75, 80, -25, -75, 10, 5, Arm(raised=100, plane=15, elbow=30), (-0.08, 1.38)),
+        Key(1.26, 112, 122, -15, -150, 38, 18, Arm(raised=45, plane=20, elbow=75), (-0.14, 1.50)),
+        Key(1.44, 112, 122, -15, -255, 38, 18, Arm(raised=45, plane=20, elbow=75), (-0.20, 1.42)),
+        Key(1.57, 65, 60, -15, -315, 18, 0, Arm(raised=60, plane=15, elbow=30), (-0.24, 1.20)),
+        Key(1.68, 45, 26, -4, -338, 8, -8, Arm(raised=65, plane=20, elbow=22), (-0.28, 0.98)),
+        Key(1.94, 86, 88, 27, -334, 20, -22, Arm(raised=58, plane=20, elbow=25), (-0.34, 0.64)),
+        _stand(2.5, -0.25, -360.0),
+        _stand(2.7, -0.25, -360.0),
+    ),
+    off=(0.90, 1.00), down=(1.73, 1.68), travel=-0.25, intervals=60,
+    weights=Weights(force=30.0, moment=60.0, flight=7.0, slip=600.0, depth=800.0, jerk=6e-5),
+)  # fmt: skip
+
+
+def _sketch(keys: tuple[Key, ...], times: Array) -> Array:
+    """The 57 coordinates the keys ask for, shape (m, 57); monotone between keys."""
+    u = np.zeros((len(keys), N_TANGENT))
+    for row, key in zip(u, keys, strict=True):
+        row[0], row[2] = key.place
+        angles = np.deg2rad([key.pitch, 0.5 * key.trunk, 0.5 * key.trunk, key.neck, -key.hip, key.knee, -key.ankle])
+        joints = ("root", "abdomen", "chest", "head", "left_hip", "left_knee", "left_ankle")
+        for joint, angle in zip(joints, angles, strict=True):
+            row[coordinate(joint, "y")] = angle
+        first = coordinate("left_clavicle", "x")
+        row[first : first + 12] = key.arm.rotations().ravel()
+    return PchipInterpolator([key.time for key in keys], u)(times)
+
+
+def _stances(flight: Flight) -> list[Stance]:
+    """Both feet stand until push-off and after landing."""
+    stances: list[Stance] = []
+    for sphere, (name, (x, across, _)) in enumerate(zip(FOOT_CONTACTS, soles(), strict=True)):
+        part = int("toe" in name)
+        y = across + (_HIP if name.startswith("left") else -_HIP)
+        stances.append(Stance(sphere, -np.inf, flight.off[part], (x, y)))
+        stances.append(Stance(sphere, flight.down[part], np.inf, (x + flight.travel, y)))
+    return stances
+
+
+def task(flight: Flight, weights: Weights) -> Task:
+    """The whole flight as a task for the spacetime optimisation, from push-off to recovery."""
+    frames = 3 * flight.intervals
+    duration = flight.keys[-1].time
+    columns = np.eye(N_TANGENT)[:, _COLUMNS]
+    embed = np.clip(columns + reflection() @ columns, -1.0, 1.0)
+    return Task(
+        duration=duration, intervals=flight.intervals, embed=embed, mirror=None, speed=0.0,
+        sketch=_sketch(flight.keys, np.arange(frames) * duration / frames)[:, _COLUMNS],
+        tracking=np.tile([cost for _, _, cost in _ACTIVE], (frames, 1)), stances=_stances(flight),
+        clearance=np.zeros((frames, len(FOOT_CONTACTS))), weights=weights,
+    )  # fmt: skip
+
+
+def _clip(flight: Flight) -> Clip:
+    # Straight from the sketch to the true weights there are poor minima on the way; a rough solution avoids them.
+    rough = Motion(task(flight, _ROUGH))
+    rough.solve(40, 1e-3)
+    motion = Motion(task(flight, flight.weights))
+    motion.unknowns = rough.unknowns
+    motion.solve(150, 1e-6)
+    frames = round(flight.keys[-1].time * FPS) + 1
+    return Clip(poses(motion.coordinates(np.arange(frames) / FPS)), FPS, flight.name)
+
+
+def jump() -> Clip:
+    """A standing jump 0.35 m forwards, 0.46 s in the air."""
+    return _clip(JUMP)
+
+
+def backflip() -> Clip:
+    """A tucked backflip from standing, 0.68 s in the air."""
+    return _clip(BACKFLIP)
+
+
+CLIPS: dict[str, Callable[[], Clip]] = {"jump": jump, "backflip": backflip}

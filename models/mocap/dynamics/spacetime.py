@@ -1,0 +1,327 @@
+"""Spacetime optimisation: the motion nearest a sketch that floor contact alone can drive (Witkin & Kass 1988).
+
+A motion is a quintic B-spline in the figure's `coordinates`. Its control points minimise a sum of squares over
+sampled instants: the distance from a sketch, jerk, effort of the joints, slip of feet that stand, depth of feet that
+swing below their clearance, excess over joint limits, and above all the residual wrench at the root (`floor_forces`).
+In flight no contact gives anything, so the same term makes the centre of mass fall with g and keeps angular momentum
+constant.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import BSpline
+
+from models.errors import ModelError
+from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
+from models.mocap.dynamics.coordinates import states
+from models.mocap.dynamics.floor_forces import Demand, Floor, residual
+
+Array = npt.NDArray[np.float64]
+
+DEGREE = 5
+_STRONG = 0.8  # share of the joints' largest torques beyond which effort counts as strain
+_LAG = 0.012  # a sphere stands this long before and after it pushes [s]: no force without touch
+_MARGIN = 0.02  # to the joints' limits [rad]
+
+
+class Stance(NamedTuple):
+    """A contact sphere that stands on the floor.
+
+    Attributes
+    ----------
+    sphere : int
+        Index into `FOOT_CONTACTS`.
+    start, end : float
+        When [s].
+    place : tuple of float
+        Where its centre is on the floor, x and y [m] in W.
+    """
+
+    sphere: int
+    start: float
+    end: float
+    place: tuple[float, float]
+
+
+class Weights(NamedTuple):
+    """What one unit of error costs before it is squared, per sampled instant.
+
+    Attributes
+    ----------
+    force, moment : float
+        Residual force, per body weight; residual moment, per body weight × metre.
+    flight : float
+        Factor on both while nothing pushes.
+    slip, depth : float
+        Displacement of a standing sphere, depth of a swinging one below its clearance [1/m].
+    limit : float
+        Excess of a rotation vector over its limits [1/rad].
+    effort, strain : float
+        Torque of a joint as a share of its largest; what of it is beyond 80 %.
+    sway, jerk : float
+        Third derivatives of the root's place [s³/m] and of rotation vectors [s³/rad].
+    """
+
+    force: float = 20.0
+    moment: float = 40.0
+    flight: float = 5.0
+    slip: float = 300.0
+    depth: float = 200.0
+    limit: float = 150.0
+    effort: float = 0.4
+    strain: float = 10.0
+    sway: float = 3e-3
+    jerk: float = 5e-5
+
+
+_EVEN = Weights()
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a motion should look like and where it stands.
+
+    Parameters
+    ----------
+    duration : float
+        Of the span that is optimised [s]; half a cycle where `mirror` is given.
+    intervals : int
+        Knot intervals of the spline in that span.
+    embed : (57, n) array
+        Which combinations of the 57 coordinates are free: u = E y.
+    mirror : (n, n) array or None
+        What turns y into the other half of the cycle; None for a motion that starts and ends at rest.
+    speed : float
+        Mean forward speed, on top of the periodic part of the root's x [m/s].
+    sketch : (frames, n) array
+        Wanted y at `times`.
+    tracking : (frames, n) array
+        What a unit of distance from the sketch costs.
+    stances : sequence of Stance
+        Who stands when and where.
+    clearance : (frames, 8) array
+        Least height of the swinging spheres' lowest points above the floor [m].
+    weights : Weights
+        Of everything else.
+    """
+
+    duration: float
+    intervals: int
+    embed: Array
+    mirror: Array | None
+    speed: float
+    sketch: Array
+    tracking: Array
+    stances: Sequence[Stance]
+    clearance: Array
+    weights: Weights = _EVEN
+
+    @property
+    def times(self) -> Array:
+        """Sampled instants [s], shape (frames,)."""
+        return np.arange(len(self.sketch)) * self.duration / len(self.sketch)
+
+
+class Errors(NamedTuple):
+    """How far m states are from what is wanted.
+
+    Attributes
+    ----------
+    weighted : (m, 140) array
+        Residual wrench (6), slip (24), depth (8), effort (51) and excess over limits (51), weighted.
+    grip : (m, 32) array
+        Contact forces along the pyramids' edges [N].
+    residual : (m, 6) array
+        Residual wrench about the centre of mass [N, N m].
+    demand : Demand
+        What the forces answer.
+    """
+
+    weighted: Array
+    grip: Array
+    residual: Array
+    demand: Demand
+
+
+class _Answer(NamedTuple):
+    """Contact forces near sampled states: f ≈ grip + gain (change of the residual at that grip)."""
+
+    grip: Array
+    residual: Array
+    gain: Array
+
+
+class Motion:
+    """A motion under optimisation: y(t) is a quintic B-spline whose control points are affine in the unknowns x.
+
+    Parameters
+    ----------
+    task : Task
+        What is wanted.
+
+    Attributes
+    ----------
+    unknowns : (k,) array
+        x, at first those nearest the sketch.
+
+    Raises
+    ------
+    ModelError
+        If the arrays of the task do not fit together.
+    """
+
+    def __init__(self, task: Task) -> None:
+        frames, n = task.sketch.shape
+        shapes = (task.embed.shape, task.tracking.shape, task.clearance.shape)
+        if shapes != ((N_TANGENT, n), (frames, n), (frames, 8)):
+            raise ModelError(
+                f"embed, tracking and clearance have shapes {shapes}; with a sketch of shape {task.sketch.shape} "
+                f"they would be {(N_TANGENT, n)}, {(frames, n)}, {(frames, 8)}"
+            )
+        self.task = task
+        self.floor = Floor(task.weights.moment / task.weights.force)
+        count = task.intervals + DEGREE
+        knots = (np.arange(count + DEGREE + 1) - DEGREE) * task.duration / task.intervals
+        self._basis = BSpline(knots, np.eye(count), DEGREE)
+        self._ends = np.zeros((count, n))
+        if task.mirror is None:
+            self._ends[:DEGREE], self._ends[-DEGREE:] = task.sketch[0], task.sketch[-1]
+            self._expand = np.eye(count * n)[:, DEGREE * n : -DEGREE * n]
+        else:
+            wrap = np.kron(np.eye(DEGREE, task.intervals), task.mirror)
+            self._expand = np.concatenate([np.eye(task.intervals * n), wrap])
+        designs = [np.kron(self._basis(task.times, order), np.eye(n)) for order in range(4)]
+        self._maps = [(design @ self._expand).reshape(frames, n, -1) for design in designs]
+        self._offsets = [(design @ self._ends.ravel()).reshape(frames, n) for design in designs]
+        self._reach = [np.flatnonzero(np.any(rows, axis=0)) for rows in self._maps[0]]
+        self._standing, self._pushing = np.zeros((frames, 8), dtype=bool), np.zeros((frames, 8), dtype=bool)
+        self._places = np.full((frames, 8, 3), CONTACT_RADIUS)
+        for stance in task.stances:
+            now = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
+            self._standing[now, stance.sphere] = True
+            firm = (task.times > stance.start + _LAG) & (task.times < stance.end - _LAG)
+            self._pushing[firm, stance.sphere] = True
+            self._places[now, stance.sphere, :2] = stance.place
+        misfit = (task.sketch - self._offsets[0]).ravel()
+        self.unknowns: Array = np.linalg.lstsq(self._maps[0].reshape(frames * n, -1), misfit, rcond=None)[0]
+
+    def _states(self, unknowns: Array) -> Array:
+        """Free coordinates y, ẏ, ÿ at the sampled instants, shape (3, frames, n)."""
+        return np.array([m @ unknowns + o for m, o in zip(self._maps[:3], self._offsets[:3], strict=True)])
+
+    def _errors(self, y: Array, frames: npt.NDArray[np.intp], answer: _Answer | None) -> Errors:
+        """Errors of states y (3, m, n) at the sampled instants `frames`.
+
+        With an `answer`, contact forces follow the demand linearly, at a tenth of the cost.
+        """
+        task, w = self.task, self.task.weights
+        u, du, ddu = y @ task.embed.T
+        u[:, 0] += task.speed * task.times[frames]
+        du[:, 0] += task.speed
+        demand = self.floor.demand(*states(u, du, ddu))
+        standing, pushing = self._standing[frames], self._pushing[frames]
+        if answer is None:
+            grip = self.floor.grip(demand, pushing)
+        else:
+            held = answer.grip[frames]
+            grip = held + np.einsum("mij,mj->mi", answer.gain[frames], residual(demand, held) - answer.residual[frames])
+        missing = residual(demand, grip)
+        scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / self.floor.body_weight
+        slip = w.slip * standing[:, :, None] * (demand.spheres - self._places[frames])
+        low = demand.spheres[:, :, 2] - CONTACT_RADIUS - task.clearance[frames]
+        share = demand.torque_on(grip) / torque_limit()
+        vectors, limits = u[:, 6:], joint_range().reshape(-1, 2)
+        parts = [
+            scale * w.force * missing[:, :3],
+            scale * w.moment * missing[:, 3:],
+            slip.reshape(len(u), 24),
+            w.depth * np.where(standing, 0.0, np.minimum(low, 0.0)),
+            w.effort * share + w.strain * (share - np.clip(share, -_STRONG, _STRONG)),
+            w.limit * (vectors - np.clip(vectors, limits[:, 0] + _MARGIN, limits[:, 1] - _MARGIN)),
+        ]
+        return Errors(np.concatenate(parts, axis=1), grip, missing, demand)
+
+    def errors(self, unknowns: Array) -> Errors:
+        """All errors that are not linear in the unknowns, at every sampled instant."""
+        return self._errors(self._states(unknowns), np.arange(len(self.task.sketch)), None)
+
+    def _linear(self) -> tuple[Array, Array]:
+        """Tracking and jerk, linear in the unknowns: matrix and right-hand side of A x ≈ b."""
+        task, w = self.task, self.task.weights
+        calm = np.where(np.any(task.embed[:3], axis=0), w.sway, w.jerk)
+        rows = [task.tracking[:, :, None] * self._maps[0], calm[:, None] * self._maps[3]]
+        wanted = [task.tracking * (task.sketch - self._offsets[0]), -calm * self._offsets[3]]
+        return np.concatenate(rows).reshape(-1, len(self.unknowns)), np.concatenate(wanted).ravel()
+
+    def _normal_equations(self, errors: Errors) -> tuple[Array, Array]:
+        """Gauss–Newton matrix and gradient of the nonlinear errors: differences in y, ẏ, ÿ, then the chain rule."""
+        frames, n = self.task.sketch.shape
+        answer = _Answer(errors.grip, errors.residual, self.floor.answer(errors.demand, errors.grip))
+        which = np.repeat(np.arange(frames), n)
+        changes: list[Array] = []
+        for order, step in enumerate((1e-5, 1e-4, 1e-3)):
+            moved = np.repeat(self._states(self.unknowns), n, axis=1)
+            moved[order] += step * np.tile(np.eye(n), (frames, 1))
+            moved_errors = self._errors(moved, which, answer).weighted.reshape(frames, n, -1)
+            changes.append((moved_errors - errors.weighted[:, None]) / step)
+        matrix, gradient = np.zeros((len(self.unknowns),) * 2), np.zeros(len(self.unknowns))
+        for k, reach in enumerate(self._reach):
+            jacobian = np.concatenate([change[k] for change in changes]).T @ np.concatenate(
+                [m[k][:, reach] for m in self._maps[:3]]
+            )
+            matrix[np.ix_(reach, reach)] += jacobian.T @ jacobian
+            gradient[reach] += jacobian.T @ errors.weighted[k]
+        return matrix, gradient
+
+    def solve(self, iterations: int, tolerance: float = 1e-4) -> list[float]:
+        """Levenberg–Marquardt from the present unknowns, until the cost falls by less than `tolerance`.
+
+        Returns
+        -------
+        list of float
+            The cost before and after every iteration.
+        """
+        rows, wanted = self._linear()
+        fixed = rows.T @ rows
+        damping = 1e-3
+        errors = self.errors(self.unknowns)
+
+        def cost(errors: Errors, unknowns: Array) -> float:
+            return float(np.sum(errors.weighted**2) + np.sum((rows @ unknowns - wanted) ** 2))
+
+        costs = [cost(errors, self.unknowns)]
+        for _ in range(iterations):
+            matrix, gradient = self._normal_equations(errors)
+            matrix += fixed
+            gradient += rows.T @ (rows @ self.unknowns - wanted)
+            for _ in range(10):
+                trial = self.unknowns - np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient)
+                after = self.errors(trial)
+                if cost(after, trial) < costs[-1]:
+                    break
+                damping *= 4
+            else:
+                return costs
+            damping = max(damping / 4, 1e-8)
+            self.unknowns, errors = trial, after
+            costs.append(cost(errors, trial))
+            if costs[-2] - costs[-1] < tolerance * costs[-1]:
+                break
+        return costs
+
+    def coordinates(self, times: Array) -> Array:
+        """The 57 coordinates at any times [s], shape (m, 57); a mirrored motion goes on for ever."""
+        points = (self._expand @ self.unknowns).reshape(self._ends.shape) + self._ends
+        if self.task.mirror is None:
+            y = self._basis(times) @ points
+        else:
+            half = np.floor(times / self.task.duration + 1e-9)
+            y = self._basis(times - half * self.task.duration) @ points
+            y = np.where((half % 2 == 1)[:, None], y @ self.task.mirror.T, y)
+        u = y @ self.task.embed.T
+        u[:, 0] += self.task.speed * times
+        return u

@@ -1,0 +1,263 @@
+"""ASF/AMC, Acclaim's pair of skeleton and motion, as CMU's database gives them.
+
+A bone's rotation is given about axes of its own, C = R_z R_y R_x for `axis … XYZ`: its local rotation in the file's
+axes is C M C⁻¹ with M composed of the bone's degrees of freedom in the same order (Lander, *Working with motion capture
+file formats*, 1998). The files hold no rate: CMU recorded at 120 frames per second.
+"""
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap import quaternions
+from models.mocap.readers.motion_file import (
+    JOINT_LIMIT,
+    MotionFileError,
+    check_size,
+    number,
+    numbered_lines,
+    numbers,
+    quoted,
+)
+from models.mocap.readers.source_motion import SourceMotion
+
+Array = npt.NDArray[np.float64]
+
+FPS = 120.0
+_INCH = 0.0254
+_FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
+
+
+@dataclass
+class _Bone:
+    """A bone while the skeleton is read; `axis` are its Euler angles in the file's unit of angle."""
+
+    name: str
+    direction: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    length: float = 0.0
+    axis: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    order: str = "xyz"
+    freedoms: list[str] = field(default_factory=list[str])
+
+
+@dataclass
+class _Skeleton:
+    """An ASF file: bones by name, parents by child in the order of the joints, and units."""
+
+    bones: dict[str, _Bone]
+    parents: dict[str, str]
+    position: list[float]
+    degrees: bool
+    length_unit: float
+
+
+def read_amc(path: Path) -> SourceMotion:
+    """Read an AMC file with the ASF skeleton that lies beside it.
+
+    The skeleton of ``01_02.amc`` is ``01_02.asf``, else ``01.asf``, else the only ASF file of the folder.
+
+    Raises
+    ------
+    MotionFileError
+        If either file is malformed, or no skeleton is found.
+    """
+    skeleton = _read_asf(_skeleton_path(path))
+    degrees, frames = _read_frames(path, skeleton)
+    joints = ["root", *skeleton.parents]
+    parents = tuple(joints.index(skeleton.parents[joint]) if joint in skeleton.parents else -1 for joint in joints)
+    tips = np.array([np.multiply(skeleton.bones[joint].direction, skeleton.bones[joint].length) for joint in joints])
+    offsets = np.array([tips[parent] if parent >= 0 else skeleton.position for parent in parents])
+    translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
+    rotations = np.zeros((len(frames), len(joints), 4))
+    column = 0
+    for index, joint in enumerate(joints):
+        bone = skeleton.bones[joint]
+        values = dict(zip(bone.freedoms, frames[:, column : column + len(bone.freedoms)].T, strict=True))
+        column += len(bone.freedoms)
+        own = _euler(bone.order, dict(zip(("rx", "ry", "rz"), np.array(bone.axis), strict=True)), skeleton.degrees, 1)
+        turn = _euler(bone.order, values, degrees, len(frames))
+        rotations[:, index] = quaternions.product(quaternions.product(own, turn), quaternions.conjugate(own))
+        for axis, freedom in enumerate(("tx", "ty", "tz")):
+            if freedom in values:
+                translations[:, index, axis] += values[freedom]
+    unit = _INCH / skeleton.length_unit
+    return SourceMotion(path, tuple(joints), parents, offsets, tips, rotations, translations, FPS, unit)
+
+
+def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array:
+    """Rotations about fixed axes, the first of `order` first, shape (n, 4)."""
+    q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    for letter in order:
+        if (angle := values.get(f"r{letter}")) is not None:
+            turn = quaternions.about_axis("xyz".index(letter), np.deg2rad(angle) if degrees else angle)
+            q = quaternions.product(turn, q)
+    return q
+
+
+def _skeleton_path(path: Path) -> Path:
+    names = (path.with_suffix(".asf"), path.with_name(path.stem.partition("_")[0] + ".asf"))
+    for candidate in names:
+        if candidate.is_file():
+            return candidate
+    others = sorted(path.parent.glob("*.asf"))
+    if len(others) == 1:
+        return others[0]
+    raise MotionFileError(path, 0, "its skeleton is not beside it", f"{names[0].name} or {names[1].name}")
+
+
+def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Numbered lines as words, without comments and blank lines."""
+    for line, text in numbered_lines(path):
+        if fields := text.partition("#")[0].split():
+            yield line, fields
+
+
+def _read_asf(path: Path) -> _Skeleton:
+    """Parse an ASF file."""
+    root = _Bone("root")
+    skeleton = _Skeleton({"root": root}, {}, [0.0, 0.0, 0.0], True, 1.0)
+    section, bone, text = "", None, False
+    for line, fields in _fields(path):
+        keyword = fields[0].lower()
+        if keyword.startswith(":"):
+            section, bone, text = keyword[1:], None, False
+            if section not in ("version", "name", "units", "documentation", "root", "bonedata", "hierarchy", "skin"):
+                raise MotionFileError(
+                    path, line, f"section {quoted(fields[0])}", ":units, :root, :bonedata, :hierarchy"
+                )
+        elif section == "units" and len(fields) >= 2:
+            if keyword == "length":
+                skeleton.length_unit = number(fields[1], path, line)
+                if skeleton.length_unit <= 0.0:
+                    raise MotionFileError(path, line, f"unit of length is {quoted(fields[1])}", "a positive number")
+            elif keyword == "angle":
+                skeleton.degrees = fields[1].lower().startswith("deg")
+        elif section == "root":
+            _read_root_line(skeleton, fields, path, line)
+        elif section == "bonedata":
+            if keyword == "begin":
+                bone, text = None, True
+            elif keyword == "end":
+                text = False
+            elif keyword == "name" and text:
+                bone = _new_bone(skeleton, fields, path, line)
+            elif bone is not None:
+                _read_bone_line(bone, fields, path, line)
+        elif section == "hierarchy" and keyword not in ("begin", "end"):
+            _read_children(skeleton, fields, path, line)
+    if len(skeleton.parents) != len(skeleton.bones) - 1 or not skeleton.parents:
+        lost = next((name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone")
+        raise MotionFileError(path, 0, f"{quoted(lost)} is not in the hierarchy", "a parent for every bone")
+    return skeleton
+
+
+def _new_bone(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> _Bone:
+    if len(fields) != 2 or fields[1] in skeleton.bones:
+        raise MotionFileError(
+            path, line, f"bone name {quoted(' '.join(fields[1:]))}", "one name, different for each bone"
+        )
+    if len(skeleton.bones) >= JOINT_LIMIT:
+        raise MotionFileError(path, line, "too many bones", f"at most {JOINT_LIMIT}")
+    skeleton.bones[fields[1]] = bone = _Bone(fields[1])
+    return bone
+
+
+def _read_root_line(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> None:
+    root, keyword, rest = skeleton.bones["root"], fields[0].lower(), fields[1:]
+    if keyword == "order":
+        root.freedoms = _freedoms(rest, _FREEDOMS, path, line)
+    elif keyword == "axis":
+        root.order = _axis_order(rest, path, line)
+    elif keyword == "position":
+        skeleton.position = _vector(rest, path, line)
+    elif keyword == "orientation":
+        root.axis = _vector(rest, path, line)
+
+
+def _read_bone_line(bone: _Bone, fields: list[str], path: Path, line: int) -> None:
+    keyword, rest = fields[0].lower(), fields[1:]
+    if keyword == "direction":
+        bone.direction = _vector(rest, path, line)
+    elif keyword == "length":
+        if len(rest) != 1:
+            raise MotionFileError(path, line, f"length of {len(rest)} numbers", "one number")
+        bone.length = number(rest[0], path, line)
+    elif keyword == "axis":
+        bone.axis, bone.order = _vector(rest[:3], path, line), _axis_order(rest[3:], path, line)
+    elif keyword == "dof":
+        # A bone that slides or stretches would need a different skeleton: no database gives one.
+        bone.freedoms = _freedoms(rest, _FREEDOMS[3:], path, line)
+
+
+def _vector(fields: list[str], path: Path, line: int) -> list[float]:
+    if len(fields) != 3:
+        raise MotionFileError(path, line, f"{len(fields)} numbers", "three numbers")
+    return numbers(fields, path, line)
+
+
+def _axis_order(fields: list[str], path: Path, line: int) -> str:
+    order = fields[0].lower() if len(fields) == 1 else ""
+    if sorted(order) != ["x", "y", "z"]:
+        raise MotionFileError(path, line, f"order of axes {quoted(' '.join(fields))}", "an order such as XYZ")
+    return order
+
+
+def _freedoms(fields: list[str], known: tuple[str, ...], path: Path, line: int) -> list[str]:
+    freedoms = [word.lower() for word in fields]
+    if len(set(freedoms)) != len(freedoms) or not set(freedoms) <= set(known):
+        raise MotionFileError(path, line, f"degrees of freedom {quoted(' '.join(fields))}", " ".join(known))
+    return freedoms
+
+
+def _read_children(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> None:
+    """Parents come first in every ASF; a child whose parent is not placed yet, or that is placed twice, is an error."""
+    parent = fields[0]
+    if parent != "root" and parent not in skeleton.parents:
+        raise MotionFileError(path, line, f"{quoted(parent)} has no parent yet", "the hierarchy from the root outwards")
+    for child in fields[1:]:
+        if child == "root" or child not in skeleton.bones or child in skeleton.parents:
+            raise MotionFileError(path, line, f"child {quoted(child)}", "bones of :bonedata, each with one parent")
+        skeleton.parents[child] = parent
+
+
+def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
+    """Whether angles are in degrees, and the frames: one row each, the freedoms of all bones in the joints' order."""
+    moving = {name: skeleton.bones[name] for name in ("root", *skeleton.parents) if skeleton.bones[name].freedoms}
+    degrees, values, n_frames = True, array("d"), 0
+    row: dict[str, list[float]] = {}
+    line = 0
+    for line, fields in _fields(path):
+        if fields[0].startswith(":"):
+            degrees = degrees and fields[0].lower() != ":radians"
+        elif len(fields) == 1:
+            if n_frames:
+                _append(values, row, moving, path, line)
+            if not (fields[0].isascii() and fields[0].isdigit()):
+                raise MotionFileError(path, line, f"found {quoted(fields[0])}", "the number of a frame")
+            row, n_frames = {}, n_frames + 1
+            check_size(n_frames, len(skeleton.bones), len(values), path, line)
+        else:
+            bone = moving.get(fields[0])
+            if bone is None or n_frames == 0 or fields[0] in row:
+                raise MotionFileError(path, line, f"found {quoted(fields[0])}", "each moving bone once a frame")
+            if len(fields) - 1 != len(bone.freedoms):
+                what = f"{quoted(bone.name)} has {len(fields) - 1} numbers"
+                raise MotionFileError(path, line, what, f"{len(bone.freedoms)}: {' '.join(bone.freedoms)}")
+            row[bone.name] = numbers(fields[1:], path, line)
+    if n_frames == 0:
+        raise MotionFileError(path, line, "no frames", "frame numbers, each followed by its bones")
+    _append(values, row, moving, path, line)
+    return degrees, np.array(values).reshape(n_frames, -1)
+
+
+def _append(
+    values: "array[float]", row: dict[str, list[float]], moving: dict[str, _Bone], path: Path, line: int
+) -> None:
+    for name in moving:
+        if name not in row:
+            raise MotionFileError(path, line, f"frame without {quoted(name)}", "every moving bone in every frame")
+        values.extend(row[name])

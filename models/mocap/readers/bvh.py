@@ -1,0 +1,201 @@
+"""BVH: a reader for anybody's files."""
+
+import re
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap import quaternions
+from models.mocap.readers.motion_file import (
+    FRAME_LIMIT,
+    JOINT_LIMIT,
+    MotionFileError,
+    check_size,
+    count,
+    frame_rate,
+    number,
+    numbered_lines,
+    numbers,
+    quoted,
+)
+from models.mocap.readers.source_motion import SourceMotion
+
+Array = npt.NDArray[np.float64]
+
+_CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
+
+
+@dataclass
+class _Joint:
+    """A joint while its block is read; positions and rotations are pairs (axis, column of the frame's line)."""
+
+    name: str
+    parent: int
+    line: int
+    offset: list[float] | None = None
+    tip: list[float] | None = None
+    positions: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    rotations: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+
+
+def read_bvh(path: Path) -> SourceMotion:
+    """Read a BVH file.
+
+    Position channels replace the joint's OFFSET, on any joint; each joint may have its own channels in its own order.
+
+    Raises
+    ------
+    MotionFileError
+        If the file is not a BVH, or breaks off, or its counts do not agree.
+    """
+    lines = numbered_lines(path)
+    joints, n_columns = _read_hierarchy(lines, path)
+    frames, fps = _read_frames(lines, len(joints), n_columns, path)
+    offsets = np.array([joint.offset for joint in joints], dtype=np.float64)
+    tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in joints], dtype=np.float64)
+    translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
+    rotations = np.zeros((len(frames), len(joints), 4))
+    rotations[..., 0] = 1.0
+    for index, joint in enumerate(joints):
+        for axis, column in joint.positions:
+            translations[:, index, axis] = frames[:, column]
+        for axis, column in joint.rotations:
+            turn = quaternions.about_axis(axis, np.deg2rad(frames[:, column]))
+            rotations[:, index] = quaternions.product(rotations[:, index], turn)
+    names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
+    return SourceMotion(path, names, parents, offsets, tips, rotations, translations, fps, None)
+
+
+class _Tokens:
+    """Words of the hierarchy with the lines they stand on."""
+
+    def __init__(self, lines: Iterator[tuple[int, str]], path: Path) -> None:
+        self.path = path
+        self.line = 0
+        self._words = ((number, word) for number, line in lines for word in line.split())
+
+    def next(self, expected: str) -> str:
+        """The next word."""
+        line, word = next(self._words, (self.line, ""))
+        if not word:
+            raise MotionFileError(self.path, line, "file ends in the hierarchy", expected)
+        self.line = line
+        return word
+
+    def name(self) -> str:
+        """Words up to the opening brace: names such as `Bip01 L Thigh` have blanks."""
+        words: list[str] = []
+        while (word := self.next("a name and {")) != "{":
+            words.append(word)
+            if len(words) > 8 or len(word) > 200:
+                raise MotionFileError(
+                    self.path, self.line, f"name {quoted(' '.join(words))} does not end", "a { after it"
+                )
+        return " ".join(words)
+
+    def vector(self) -> list[float]:
+        """Three numbers."""
+        return [number(self.next("three numbers"), self.path, self.line) for _ in range(3)]
+
+    def error(self, what: str, expected: str) -> MotionFileError:
+        """An error at the last word."""
+        return MotionFileError(self.path, self.line, what, expected)
+
+
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:
+    """Joints in the file's order and number of channels; leaves the lines after MOTION."""
+    tokens = _Tokens(lines, path)
+    if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
+        raise tokens.error(f"file begins with {quoted(word)}", "HIERARCHY: is this a BVH file?")
+    if (word := tokens.next("ROOT")).upper() != "ROOT":
+        raise tokens.error(f"found {quoted(word)}", "ROOT")
+    joints = [_Joint(tokens.name(), -1, tokens.line)]
+    open_joints, n_columns = [0], 0
+    while open_joints:
+        joint = joints[open_joints[-1]]
+        word = tokens.next("}")
+        keyword = word.upper()
+        if keyword == "OFFSET":
+            joint.offset = tokens.vector()
+        elif keyword == "CHANNELS":
+            if joint.positions or joint.rotations:
+                raise tokens.error(f"joint {quoted(joint.name)} has CHANNELS twice", "one line of CHANNELS a joint")
+            n_columns = _read_channels(tokens, joint, n_columns)
+        elif keyword == "JOINT":
+            if len(joints) >= JOINT_LIMIT:
+                raise tokens.error("too many joints", f"at most {JOINT_LIMIT}")
+            open_joints.append(len(joints))
+            joints.append(_Joint(tokens.name(), open_joints[-2], tokens.line))
+        elif keyword == "END":
+            tip = _read_end_site(tokens)
+            joint.tip = joint.tip or tip
+        elif word == "}":
+            open_joints.pop()
+            if joint.offset is None:
+                raise tokens.error(f"joint {quoted(joint.name)} (line {joint.line}) has no OFFSET", "OFFSET x y z")
+        else:
+            raise tokens.error(f"found {quoted(word)}", "OFFSET, CHANNELS, JOINT, End Site or }")
+    if (word := tokens.next("MOTION")).upper() != "MOTION":
+        raise tokens.error(f"found {quoted(word)} after the root's }}", "MOTION")
+    return joints, n_columns
+
+
+def _read_channels(tokens: _Tokens, joint: _Joint, column: int) -> int:
+    """Note which columns drive which axes of a joint; returns the next free column."""
+    for _ in range(count(tokens.next("a number of channels"), 6, "number of channels", tokens.path, tokens.line)):
+        word = tokens.next("a channel such as Xrotation")
+        match = _CHANNEL.fullmatch(word)
+        if match is None:
+            raise tokens.error(f"channel {quoted(word)}", "Xposition … Zposition, Xrotation … Zrotation")
+        channels = joint.positions if match[2].lower() == "position" else joint.rotations
+        axis = "xyz".index(match[1].lower())
+        if channels is joint.positions and axis in dict(channels):
+            raise tokens.error(f"channel {quoted(word)} stands twice in one joint", "each position once")
+        channels.append((axis, column))
+        column += 1
+    return column
+
+
+def _read_end_site(tokens: _Tokens) -> list[float]:
+    tokens.name()
+    tip = [0.0, 0.0, 0.0]
+    while (word := tokens.next("OFFSET or }")) != "}":
+        if word.upper() != "OFFSET":
+            raise tokens.error(f"found {quoted(word)} in an End Site", "OFFSET or }")
+        tip = tokens.vector()
+    return tip
+
+
+def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int, path: Path) -> tuple[Array, float]:
+    """The frames' channels, shape (frames, channels), and their rate."""
+    rest = ((line, text) for line, text in lines if text.strip())
+    line, text = next(rest, (0, ""))
+    match = re.fullmatch(r"\s*Frames\s*:\s*(\S+)\s*", text, re.IGNORECASE)
+    if match is None:
+        raise MotionFileError(path, line, f"found {quoted(text.strip())} after MOTION", "Frames: n")
+    n_frames = count(match[1], FRAME_LIMIT, "number of frames", path, line)
+    check_size(n_frames, n_joints, n_frames * n_columns, path, line)
+    line, text = next(rest, (line + 1, ""))
+    match = re.fullmatch(r"\s*Frame\s+Time\s*:\s*(\S+)\s*", text, re.IGNORECASE)
+    if match is None:
+        raise MotionFileError(path, line, f"found {quoted(text.strip())} after Frames", "Frame Time: seconds")
+    fps = frame_rate(number(match[1], path, line), path, line)
+    values, found = array("d"), 0
+    for line, text in rest:
+        tokens = text.split()
+        found += 1
+        if found > n_frames:
+            raise MotionFileError(
+                path, line, f"more lines than the {n_frames} frames declared", "as many as Frames says"
+            )
+        if len(tokens) != n_columns:
+            raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
+        values.extend(numbers(tokens, path, line))
+    # A skeleton without channels has nothing to say in its frames.
+    if found < n_frames and n_columns:
+        raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
+    return np.array(values).reshape(n_frames, n_columns), fps

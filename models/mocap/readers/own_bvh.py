@@ -1,0 +1,149 @@
+"""BVH of the figure: a writer whose channels are exactly its 57, and what tells such a file from others.
+
+Files are Y up, facing +Z, left = +X, in centimetres, as most programs expect of BVH: with world (x, y, z) in metres,
+the file's (X, Y, Z) is 100 (y, z, x), an exchange of axes that loses no digit. The order of each joint's rotations is
+chosen so that its middle angle, which locks at ±90°, moves least; a locked pose is still written exactly.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.errors import ModelError
+from models.humanoid.skeleton import SEGMENTS, figure_model
+from models.mocap.clip import Clip
+from models.mocap.readers.source_motion import SourceMotion
+
+Array = npt.NDArray[np.float64]
+
+_CENTIMETRES = 100.0
+_TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
+         "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
+_TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
+_TO_WORLD = [2, 0, 1]
+
+
+def _rotation_order(joint: str) -> tuple[int, int, int]:
+    """File axes of a joint's rotations, first to last. World x, y, z are the file's Z, X, Y."""
+    if joint == "root":
+        return (1, 2, 0)  # turn, lean, then somersault: locks only when lying on a side
+    if joint.endswith("shoulder"):
+        return (2, 0, 1)  # raise, twist, swing: a twist rarely reaches 90°
+    return (0, 2, 1)  # bend, lean, turn
+
+
+def _euler_angles(q: Array, order: tuple[int, int, int]) -> Array:
+    """Angles [rad] of intrinsic rotations about three different axes, shape (n, 3).
+
+    Bernardes & Viollet (2022), without their threshold: where the middle angle locks, the split between the other two
+    is arbitrary but their product with it is still the rotation.
+    """
+    k, j, i = order  # intrinsic rotations are extrinsic ones in reverse
+    sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
+    w, x, y, z = q[:, 0], q[:, 1 + i], q[:, 1 + j], sign * q[:, 1 + k]
+    a, b, c, d = w - y, x + z, y + w, z - x
+    middle = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - np.pi / 2
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    first, last = sign * (half_sum + half_difference), half_sum - half_difference
+    return np.column_stack((first, middle, last))
+
+
+def write_bvh(clip: Clip, path: Path) -> None:
+    """Write a clip, so that reading it again gives the same poses to 1e-9 rad.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    write_bvh_blocks(path, clip.n_frames, clip.fps, [clip.poses])
+
+
+def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Array]) -> None:
+    """Write a motion that is told block by block, in memory that does not grow with it.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    n_frames : int
+        Frames in all.
+    fps : float
+        Frames per second [1/s].
+    blocks : iterable of array (k, 75)
+        Poses, in order.
+
+    Raises
+    ------
+    ModelError
+        If the blocks have not n_frames frames in all.
+    OSError
+        If the file cannot be written.
+    """
+    written, last = 0, None
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        header = [*_hierarchy(), "MOTION", f"Frames: {n_frames}", f"Frame Time: {1.0 / fps!r}"]
+        file.write("\n".join(header) + "\n")
+        for poses in blocks:
+            angles = _angles(poses, last)
+            rows = np.hstack((poses[:, _TO_FILE] * _CENTIMETRES, np.rad2deg(angles)))
+            file.writelines(" ".join(f"{value:.9f}" for value in row) + "\n" for row in rows)
+            written, last = written + len(poses), angles[-1:]
+    if written != n_frames:
+        raise ModelError(f"{path}: {written} frames were given; expected {n_frames}")
+
+
+def _angles(poses: Array, last: Array | None) -> Array:
+    """Angles of all joints [rad], shape (k, 54), without jumps, also from the frame before."""
+    columns: list[Array] = []
+    for index, segment in enumerate(SEGMENTS):
+        quaternion = poses[:, 3 + 4 * index : 7 + 4 * index]
+        columns.append(
+            _euler_angles(quaternion[:, [0, *(1 + axis for axis in _TO_FILE)]], _rotation_order(segment.joint))
+        )
+    angles = np.hstack(columns)
+    if last is None:
+        return np.unwrap(angles, axis=0)
+    return np.unwrap(np.vstack((last, angles)), axis=0)[1:]
+
+
+def _hierarchy() -> list[str]:
+    lines, model = ["HIERARCHY"], figure_model()
+    open_segments: list[int] = []
+    for index, segment in enumerate(SEGMENTS):
+        while open_segments and open_segments[-1] != segment.parent:
+            open_segments.pop()
+            lines.append("\t" * len(open_segments) + "}")
+        channels = " ".join(f"{'XYZ'[axis]}rotation" for axis in _rotation_order(segment.joint))
+        indent = "\t" * len(open_segments)
+        # The pelvis of the model stands at its rest height; a BVH root starts from the origin.
+        offset = model.body(segment.body).pos if index else np.zeros(3)
+        positions = "3" if index else "6 Xposition Yposition Zposition"
+        lines += [f"{indent}{'JOINT' if index else 'ROOT'} {segment.joint}", f"{indent}{{",
+                  f"{indent}\tOFFSET {_vector(offset)}", f"{indent}\tCHANNELS {positions} {channels}"]  # fmt: skip
+        if segment.joint in _TIPS:
+            tip = _vector(np.array(_TIPS[segment.joint]))
+            lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {tip}", f"{indent}\t}}"]
+        open_segments.append(index)
+    return lines + ["\t" * depth + "}" for depth in reversed(range(len(open_segments)))]
+
+
+def _vector(world: Array) -> str:
+    return " ".join(f"{value:.6f}" for value in world[_TO_FILE] * _CENTIMETRES)
+
+
+def own_clip(motion: SourceMotion) -> Clip | None:
+    """The clip in a file that `write_bvh` wrote (same joints, same bones); None for any other skeleton."""
+    if motion.joints != tuple(segment.joint for segment in SEGMENTS):
+        return None
+    if motion.parents != tuple(segment.parent for segment in SEGMENTS):
+        return None
+    model = figure_model()
+    bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:, _TO_FILE] * _CENTIMETRES
+    if np.abs(motion.offsets[1:] - bones).max() > 1e-4:
+        return None
+    quaternion = motion.rotations[..., [0, *(1 + axis for axis in _TO_WORLD)]]
+    position = motion.translations[:, 0, _TO_WORLD] / _CENTIMETRES
+    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)

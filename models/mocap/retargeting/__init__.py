@@ -1,0 +1,1 @@
+"""From a foreign skeleton to the figure."""

@@ -1,0 +1,1 @@
+"""What follows the reference: the physical figure, or a robot arm."""

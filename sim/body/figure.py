@@ -1,0 +1,137 @@
+r"""The physical figure: joint torques and ground contact that follow a reference pose, and as little else as possible.
+
+Whole-body inverse dynamics at each control tick (`sim.body.whole_body`). With the reference pose, velocity and
+acceleration (q_r, v_r, a_r) the wanted acceleration of all 57 degrees of freedom is
+
+.. math:: a^* = a_r + 2\omega\,(v_r - v) + \omega^2\,(q_r \ominus q) ,
+
+amended in the legs so that loaded feet rest (`sim.body.stance`). Nothing but the ground may push the root, so its six
+rows of M a + c = S^T τ + J^T f + w are a demand on the contact forces,
+
+.. math:: (M a^* + c)_r = J_r^T f + w ,
+
+met by f within the friction cones of the points that touch (`sim.body.contact_forces`). The residual wrench w is what
+is
+left, bounded, in proportion to the support, and zero while the reference flies or nothing touches: then the root falls
+as it must. The torques are the other 51 rows. A motor that would need more than its limit gives way: its joint's
+acceleration becomes the one that the limit allows, and the plan is made again; what the saturated joints of a standing
+leg cannot give is residual too. No spring holds the root.
+"""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from models.humanoid.skeleton import (
+    BODIES,
+    CONTACT_RADIUS,
+    DEFAULT_STATURE,
+    FOOT_CONTACTS,
+    HAND_CONTACTS,
+    JOINTS,
+    N_POSE,
+    N_TANGENT,
+    SEGMENTS,
+)
+from sim.body.contact_forces import N_EDGES
+from sim.body.figure_state import Array, FigureGains, FigureState
+from sim.body.whole_body import figure_torque
+from sim.compilation.compiled import entry_point
+from sim.errors import SimError
+
+__all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
+
+CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
+_RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
+_N_MOTORS = N_TANGENT - 6
+
+
+@entry_point
+def _update(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    figure_torque(s, q_r, v_r, a_r)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """The physical figure of a world (see the module's equations) and the arrays that `figure_torque` works on.
+
+    Parameters
+    ----------
+    model, data
+        The compiled world and its state; kept alive here, since the kernel holds their addresses.
+    twin
+        The figure alone, of the same stature and mass (`models.humanoid.skeleton.figure_model`).
+    prefix : str
+        Of the figure's names in the world.
+    gains : FigureGains
+        Feedback and bounds.
+
+    Raises
+    ------
+    SimError
+        If the world holds no such figure, or a gain is not a positive finite number (a bound may be 0).
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    twin: mujoco.MjModel
+    prefix: str = ""
+    gains: FigureGains = FigureGains()  # noqa: RUF009 - immutable
+    twin_data: mujoco.MjData = field(init=False, repr=False)
+    state: FigureState = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, value in self.gains._asdict().items():
+            if not (np.isfinite(value) and value >= 0.0) or (value == 0.0 and not name.endswith("bound")):
+                raise SimError(f"FigureGains.{name} is {value}; expected a finite number > 0 (a bound may be 0)")
+        object.__setattr__(self, "twin_data", mujoco.MjData(self.twin))
+        object.__setattr__(self, "state", self._state())
+
+    def update(self, q_r: Array, v_r: Array, a_r: Array) -> None:
+        """Set torques and residual for a reference, once; loops call the kernel `figure_torque` instead.
+
+        Parameters
+        ----------
+        q_r, v_r, a_r : Array
+            Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
+        """
+        _update(self.state, q_r, v_r, a_r)
+
+    def _state(self) -> FigureState:
+        m, d, twin = self.model, self.data, self.twin
+        try:
+            root = m.joint(self.prefix + "root")
+            body = int(m.body(self.prefix + BODIES[0]).id)
+            motor = int(m.actuator(f"{self.prefix}{JOINTS[0]}_x").id)
+            spheres = [int(m.geom(self.prefix + name).id) for name in CONTACTS]
+        except KeyError as error:
+            raise SimError(f"the world has no figure with the prefix {self.prefix!r}: {error}") from None
+        n, qpos, dof = len(CONTACTS), int(root.qposadr[0]), int(root.dofadr[0])
+        bodies, dofs = slice(body, body + len(BODIES)), slice(dof, dof + N_TANGENT)
+        motors = slice(motor, motor + _N_MOTORS)
+        world_M = np.zeros((m.nv, m.nv))
+        radius = float(m.geom_size[spheres[0], 0])
+        legs = [[BODIES.index(f"{side}_{name}") for name in ("thigh", "shank", "foot")] for side in ("left", "right")]
+        return FigureState(
+            model=m._address, data=d._address, twin_model=twin._address, twin_data=self.twin_data._address,
+            gains=FigureGains(*(float(value) for value in self.gains)),
+            qpos=d.qpos[qpos : qpos + N_POSE], qvel=d.qvel[dofs], bias=d.qfrc_bias[dofs],
+            passive=d.qfrc_passive[dofs], ctrl=d.ctrl[motors], applied=d.qfrc_applied[dof : dof + 6],
+            xpos=d.xpos[bodies], xmat=d.xmat[bodies], contact_pos=d.geom_xpos, contact=np.array(spheres),
+            contact_body=np.array([int(m.geom_bodyid[sphere]) - body for sphere in spheres]),
+            twin_qpos=self.twin_data.qpos, twin_contact_pos=self.twin_data.geom_xpos,
+            twin_contact=np.array([int(twin.geom(name).id) for name in CONTACTS]),
+            world_M=world_M, M=world_M[dofs, dofs], parent=np.array([segment.parent for segment in SEGMENTS]),
+            legs=np.array(legs), torque_limit=m.actuator_ctrlrange[motors, 1].copy(),
+            weight=float(m.body_subtreemass[body]) * float(np.linalg.norm(m.opt.gravity)),
+            stature=DEFAULT_STATURE * radius / CONTACT_RADIUS, radius=radius,
+            friction=_RELIED_ON * float(m.geom_friction[spheres[0], 0]),
+            acceleration=np.zeros(N_TANGENT), wanted_root=np.zeros(6), rotation=np.zeros((2, 3)), share=np.zeros(n),
+            near=np.zeros(n), points=np.zeros((n, 3)), edges=np.zeros((N_EDGES * n, 6)),
+            edge_share=np.zeros(N_EDGES * n), edge_force=np.zeros(N_EDGES * n), scaled=np.zeros(6),
+            residual=np.zeros(6), force=np.zeros((n, 3)), given=np.zeros(N_TANGENT), demand=np.zeros(6),
+            wrench=np.zeros(6), offset=np.zeros(9), response=np.zeros((2, 9, 6)), lost=np.zeros(_N_MOTORS),
+            yielding=np.zeros(_N_MOTORS, dtype=np.int64), block=np.zeros((_N_MOTORS, _N_MOTORS)),
+            correction=np.zeros(_N_MOTORS), report=np.zeros(8),
+        )  # fmt: skip

@@ -1,0 +1,252 @@
+"""A clip through the physical figure alone: what torques and ground can do of it, and how much help it took."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.floor import add_floor
+from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec
+from models.mocap.clip import Clip, pose_difference
+from sim.body.clip_motion import ClipMotion, clip_motion
+from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState, figure_torque
+from sim.compilation.compiled import entry_point
+from sim.compilation.native import mj_step
+from sim.errors import SimError
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+_PREFIX = "figure/"
+
+
+@dataclass(frozen=True)
+class TrackingConfig:
+    """How the figure is stepped.
+
+    Parameters
+    ----------
+    physics_step : float
+        Time step of the simulation [s].
+    control_steps : int
+        Physics steps between two updates of the control.
+    stature, mass : float
+        Of the figure [m], [kg].
+    gains : FigureGains
+        Of its control.
+
+    Raises
+    ------
+    SimError
+        If the step is not within 0 to 5 ms, or the control is not updated every 1 to 100 steps.
+    """
+
+    physics_step: float = 5e-4
+    control_steps: int = 4
+    stature: float = DEFAULT_STATURE
+    mass: float = DEFAULT_MASS
+    gains: FigureGains = FigureGains()  # noqa: RUF009 - immutable
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.physics_step <= 5e-3:
+            raise SimError(f"physics step is {self.physics_step} s; expected 0 < step ≤ 0.005 s")
+        if not 1 <= self.control_steps <= 100:
+            raise SimError(f"control every {self.control_steps} physics steps; expected 1 to 100")
+
+
+class TrackedMotion(NamedTuple):
+    """What happened, one row for each control update.
+
+    Attributes
+    ----------
+    reference : ClipMotion
+        What was asked for.
+    poses : Array
+        What the figure did, shape (n, 75).
+    reports : Array
+        Support, saturated motors, residual wrench (see `FigureState.report`), shape (n, 8).
+    flying : Array
+        1 while all contact points of the reference are above the height of flight, shape (n,).
+    contacts : Array
+        Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
+    ground : Array
+        Force of the ground on the figure [N], shape (n, 3).
+    weight, stature : float
+        Of the figure [N], [m].
+    warnings : int
+        Warnings that MuJoCo gave.
+    """
+
+    reference: ClipMotion
+    poses: Array
+    reports: Array
+    flying: Array
+    contacts: Array
+    ground: Array
+    weight: float
+    stature: float
+    warnings: int
+
+
+@dataclass(frozen=True)
+class TrackingReport:
+    """How the physical figure tracked a clip.
+
+    Attributes
+    ----------
+    seconds, flight_seconds : float
+        How long the motion was, and how long the reference was in flight [s].
+    joint_error : float
+        RMS over joints and time of the angle between a joint and its reference [deg].
+    root_error, root_error_max : float
+        RMS and largest distance of the root from its reference [m].
+    residual_force, residual_force_max : float
+        RMS while the reference stands, and largest; as shares of body weight.
+    residual_moment, residual_moment_max : float
+        The same of the moment about the root, as shares of body weight × stature.
+    residual_in_flight : float
+        Largest component of the residual while the reference flies [N, N m]; zero by construction.
+    grounded : float
+        Share of the time in which the reference stands that the figure touches the floor.
+    slide : float
+        Largest distance that a contact point moved over the floor while it stood [m].
+    saturation : float
+        Share of motors at their limits, mean over time.
+    warnings : int
+        Warnings that MuJoCo gave.
+    """
+
+    seconds: float
+    flight_seconds: float
+    joint_error: float
+    root_error: float
+    root_error_max: float
+    residual_force: float
+    residual_force_max: float
+    residual_moment: float
+    residual_moment_max: float
+    residual_in_flight: float
+    grounded: float
+    slide: float
+    saturation: float
+    warnings: int
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
+            f"(largest {100 * self.root_error_max:.1f}), residual {100 * self.residual_force:.1f} % of body weight RMS "
+            f"in stance (largest {100 * self.residual_force_max:.0f} %), {self.flight_seconds:.2f} s of flight, "
+            f"feet on the ground {100 * self.grounded:.0f} % of stance"
+        )
+
+
+@entry_point
+def _simulate(
+    s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
+    poses: Array, reports: Array, flying: Array, contacts: Array, ground: Array, contact_force: Array,
+) -> None:  # fmt: skip
+    for k in range(q.shape[0]):
+        poses[k] = s.qpos
+        figure_torque(s, q[k], v[k], a[k])
+        lowest = np.inf
+        for c in range(s.points.shape[0]):
+            lowest = min(lowest, s.twin_contact_pos[s.twin_contact[c], 2] - s.radius)
+            contacts[k, c] = s.contact_pos[s.contact[c]]
+            contacts[k, c, 2] -= s.radius
+        flying[k] = 1.0 if lowest > s.gains.flight_height else 0.0
+        reports[k] = s.report
+        for _ in range(control_steps):
+            mj_step(s.model, s.data)
+            ground[k] += contact_force / control_steps
+
+
+def floor_world(config: TrackingConfig) -> mujoco.MjModel:
+    """The figure alone on a floor, prefix ``figure/``."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = config.physics_step
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    add_floor(spec)
+    spec.attach(figure_spec(config.stature, config.mass), prefix=_PREFIX, frame=spec.worldbody.add_frame())
+    return spec.compile()
+
+
+def tracked_motion(clip: Clip, seconds: float, config: TrackingConfig) -> TrackedMotion:
+    """Run a clip through the physical figure, which starts in the clip's first pose and with its velocity.
+
+    Raises
+    ------
+    SimError
+        If the time is not within 0 to an hour.
+    """
+    if not 0.0 < seconds <= 3600.0:
+        raise SimError(f"{seconds} s of tracking; expected more than 0 and at most an hour")
+    model = floor_world(config)
+    data = mujoco.MjData(model)
+    figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains)
+    period = config.physics_step * config.control_steps
+    n = max(1, round(seconds / period))
+    reference = clip_motion(clip, period * np.arange(n, dtype=np.float64))
+    data.qpos[:], data.qvel[:] = reference.poses[0], reference.velocities[0]
+    mujoco.mj_forward(model, data)
+    poses, reports, flying = np.empty((n, model.nq)), np.empty((n, 8)), np.empty(n)
+    contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
+    _simulate(
+        figure.state, config.control_steps, reference.poses, reference.velocities, reference.accelerations,
+        poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
+    )  # fmt: skip
+    warnings = int(sum(warning.number for warning in data.warning))
+    return TrackedMotion(
+        reference, poses, reports, flying, contacts, ground, figure.state.weight, config.stature, warnings
+    )
+
+
+def track(clip: Clip, seconds: float, config: TrackingConfig | None = None) -> TrackingReport:
+    """Run a clip through the physical figure and report how it went; see `tracked_motion`."""
+    return report(tracked_motion(clip, seconds, config or TrackingConfig()))
+
+
+def report(motion: TrackedMotion) -> TrackingReport:
+    """Sum up a tracked motion."""
+    times, wrench = motion.reference.times, motion.reports[:, 2:]
+    period = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    difference = pose_difference(motion.poses, motion.reference.poses)
+    angles = np.linalg.norm(difference[:, 6:].reshape(len(times), -1, 3), axis=-1)
+    root = np.linalg.norm(difference[:, :3], axis=1)
+    force = np.linalg.norm(wrench[:, :3], axis=1) / motion.weight
+    moment = np.linalg.norm(wrench[:, 3:], axis=1) / (motion.weight * motion.stature)
+    stands: Flags = np.equal(motion.flying, 0.0)
+    touches: Flags = np.less(motion.contacts[:, :, 2], 0.0)
+    return TrackingReport(
+        seconds=period * len(times),
+        flight_seconds=period * float(np.sum(~stands)),
+        joint_error=float(np.rad2deg(_rms(angles))),
+        root_error=_rms(root),
+        root_error_max=float(root.max()),
+        residual_force=_rms(force[stands]),
+        residual_force_max=float(force.max()),
+        residual_moment=_rms(moment[stands]),
+        residual_moment_max=float(moment.max()),
+        residual_in_flight=float(np.abs(wrench[~stands]).max(initial=0.0)),
+        grounded=float(np.mean(np.any(touches[stands], axis=1))) if stands.any() else 1.0,
+        slide=_slide(motion.contacts, touches),
+        saturation=float(motion.reports[:, 1].mean()) / 51.0,
+        warnings=motion.warnings,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+def _slide(contacts: Array, touches: Flags) -> float:
+    """Largest distance of a touching point from where it began to touch."""
+    largest = 0.0
+    for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], touch, [False])).astype(np.int8)))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            stand = point[start:end, :2]
+            largest = max(largest, float(np.linalg.norm(stand - stand[0], axis=1).max()))
+    return largest

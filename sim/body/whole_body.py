@@ -1,0 +1,233 @@
+"""The control of the physical figure, compiled: see `sim.body.figure` for its equations."""
+
+import numpy as np
+from numba import njit
+
+from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
+from sim.body.feedback import shorten, wanted_acceleration
+from sim.body.figure_state import Array, FigureState
+from sim.body.stance import N_LEG, factor, stance_response, substitute
+from sim.compilation.native import mj_full_m, mj_integrate_pos, mj_kinematics
+
+_LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a residual force
+_FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
+_PLANS = 4  # plans at most in a tick, each with the joints that saturated in the one before giving way
+_N_FOOT = 4  # contact points of a foot
+
+
+@njit
+def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    """Set the motors' torques and the root's residual wrench for the reference of this control tick.
+
+    Parameters
+    ----------
+    s : FigureState
+        Reads the state, and the dynamics of the last physics step; writes `ctrl`, `applied` and `report`.
+    q_r, v_r, a_r : Array
+        Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
+    """
+    wanted_acceleration(s, q_r, v_r, a_r)
+    s.wanted_root[:] = s.acceleration[:6]
+    support = _find_support(s, q_r, v_r)
+    mj_full_m(s.model, s.data, s.world_M.ctypes)
+    for leg in range(2):
+        foot = slice(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT)
+        stance_response(
+            s.legs[leg], s.points[foot], s.share[foot], s.near[foot], s.xpos, s.xmat, s.qvel, s.acceleration,
+            s.offset, s.response[leg],
+        )  # fmt: skip
+        for k in range(N_LEG):
+            s.acceleration[3 + 3 * s.legs[leg, k // 3] + k % 3] += s.offset[k]
+    s.yielding[:] = 0
+    for plan in range(_PLANS):
+        s.acceleration[:6] = s.wanted_root
+        met = _plan_contacts(s, support)
+        _let_root_fall(s, support if met else 0.0)
+        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
+            break
+    _make_up_for_legs(s, support)
+    s.applied[:] = s.wrench
+    s.report[0] = support
+    s.report[1] = np.sum(np.abs(s.ctrl) >= 0.999 * s.torque_limit)
+    s.report[2:] = s.wrench
+
+
+@njit
+def _nearness(height: float, reach: float) -> float:
+    """1 on the floor or below, 0 from a height `reach` on, C¹ between."""
+    x = min(max(height / reach, 0.0), 1.0)
+    return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
+
+
+@njit
+def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
+    """Share of each contact point: it touches, and the reference has it near the floor now and a moment ahead.
+
+    A point that the reference is about to lift is unloaded before, so that its leg need not catch up; one that swings
+    low over the floor does not stand, and is not held to it. Returns the largest share by the narrower measure of what
+    counts as flight.
+    """
+    s.twin_qpos[:] = q_r
+    mj_integrate_pos(s.twin_model, s.twin_qpos.ctypes, v_r.ctypes, s.gains.lift_time)
+    mj_kinematics(s.twin_model, s.twin_data)
+    for c in range(s.share.shape[0]):
+        s.points[c] = s.twin_contact_pos[s.twin_contact[c]]
+    s.twin_qpos[:] = q_r
+    mj_kinematics(s.twin_model, s.twin_data)
+    support = 0.0
+    for c in range(s.share.shape[0]):
+        now = s.twin_contact_pos[s.twin_contact[c]]
+        way = np.sqrt((s.points[c, 0] - now[0]) ** 2 + (s.points[c, 1] - now[1]) ** 2)
+        height = max(s.points[c, 2], now[2]) - s.radius
+        s.points[c] = s.contact_pos[s.contact[c]]
+        s.points[c, 2] -= s.radius
+        touch = _nearness(s.points[c, 2], s.gains.contact_reach)
+        rests = _nearness(way, s.gains.lift_time * s.gains.swing_speed)
+        s.near[c] = rests * _nearness(height, s.gains.stance_height)
+        s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)
+        support = max(support, touch * _nearness(height, s.gains.flight_height))
+    return support
+
+
+@njit
+def _plan_contacts(s: FigureState, support: float) -> bool:
+    """Contact forces and residual that meet the root's demand (M a* + c)_r, and the generalised forces they make.
+
+    Returns whether they meet it: not if the residual was beyond its bounds.
+    """
+    R, w, y = s.xmat[0], s.wrench, s.residual
+    w[:] = 0.0
+    s.force[:] = 0.0
+    s.given[:] = 0.0
+    if s.share.max() <= 0.0:
+        y[:] = 0.0
+        return False
+    for i in range(6):
+        s.demand[i] = s.bias[i] - s.passive[i]
+        for k in range(s.acceleration.shape[0]):
+            s.demand[i] += s.M[i, k] * s.acceleration[k]
+    for i in range(3):  # moments in world axes, so that the cones need no turning
+        s.scaled[i] = s.demand[i] / s.weight
+        moment = R[3 * i] * s.demand[3] + R[3 * i + 1] * s.demand[4] + R[3 * i + 2] * s.demand[5]
+        s.scaled[3 + i] = moment / (s.weight * _LEVER)
+    for c in range(s.share.shape[0]):
+        edges = s.edges[N_EDGES * c : N_EDGES * c + N_EDGES]
+        cone_edges(s.points[c] - s.xpos[0], s.friction, edges)
+        edges[:, 3:] /= _LEVER
+        s.edge_share[N_EDGES * c : N_EDGES * c + N_EDGES] = _FULL_SHARE * s.share[c]
+    shared_forces(s.edges, s.edge_share, s.scaled, y, s.edge_force)
+    for c in range(s.share.shape[0]):
+        for e in range(N_EDGES * c, N_EDGES * c + N_EDGES):
+            for i in range(3):
+                s.force[c, i] += s.weight * s.edge_force[e] * s.edges[e, i]
+        if s.force[c, 2] > 0.0:
+            _add_contact(s, c)
+    for i in range(3):
+        w[i] = y[i] * s.weight
+        w[3 + i] = (R[i] * y[3] + R[3 + i] * y[4] + R[6 + i] * y[5]) * s.weight * _LEVER
+    return not _bound_residual(s, support)
+
+
+@njit
+def _bound_residual(s: FigureState, support: float) -> bool:
+    """Shorten the residual to its bounds, which shrink with the support; returns whether it was beyond them."""
+    force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
+    moment = shorten(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
+    return force or moment
+
+
+@njit
+def _add_contact(s: FigureState, c: int) -> None:
+    """Add Jᵀ f of one contact point: the root's force, and moments about it and about every joint on the way there."""
+    f = s.force[c]
+    s.given[:3] += f
+    body = s.contact_body[c]
+    while body >= 0:
+        R = s.xmat[body]
+        x, y, z = s.points[c, 0] - s.xpos[body, 0], s.points[c, 1] - s.xpos[body, 1], s.points[c, 2] - s.xpos[body, 2]
+        mx, my, mz = y * f[2] - z * f[1], z * f[0] - x * f[2], x * f[1] - y * f[0]
+        for i in range(3):
+            s.given[3 + 3 * body + i] += R[i] * mx + R[3 + i] * my + R[6 + i] * mz
+        body = s.parent[body]
+
+
+@njit
+def _let_root_fall(s: FigureState, support: float) -> None:
+    """Without support the root's acceleration is what the forces make it: M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
+
+    So it is where the residual is at its bounds: torques planned for an acceleration that does not come throw the limbs
+    about.
+    """
+    if support >= 1.0:
+        return
+    a, falling, block = s.acceleration, s.demand, s.block[:6, :6]
+    block[:] = s.M[:6, :6]
+    for i in range(6):
+        falling[i] = s.given[i] + s.wrench[i] - s.bias[i] + s.passive[i]
+        for k in range(6, a.shape[0]):
+            falling[i] -= s.M[i, k] * a[k]
+    factor(block)
+    substitute(block, falling)
+    for i in range(6):
+        a[i] = support * s.wanted_root[i] + (1.0 - support) * falling[i]
+
+
+@njit
+def _plan_torques(s: FigureState) -> bool:
+    """Torques of the planned motion, within the motors' limits; returns whether any needed more."""
+    a, saturated = s.acceleration, False
+    for motor in range(s.ctrl.shape[0]):
+        i = motor + 6
+        torque = s.bias[i] - s.passive[i] - s.given[i]
+        for k in range(a.shape[0]):
+            torque += s.M[i, k] * a[k]
+        limit = s.torque_limit[motor]
+        s.ctrl[motor] = min(max(torque, -limit), limit)
+        s.lost[motor] = torque - s.ctrl[motor]
+        if s.lost[motor] != 0.0:
+            saturated = True
+    return saturated
+
+
+@njit
+def _give_way(s: FigureState) -> bool:
+    """Give saturated joints the acceleration that their limits allow, M_ss Δa = −lost; not those of standing legs."""
+    for motor in range(s.lost.shape[0]):
+        if s.lost[motor] != 0.0:
+            s.yielding[motor] = 1
+    for leg in range(2):
+        if s.share[_N_FOOT * leg : _N_FOOT * leg + _N_FOOT].max() > 0.0:
+            for k in range(N_LEG):
+                s.yielding[3 * s.legs[leg, k // 3] + k % 3 - 3] = 0
+    n = 0
+    for i in range(s.lost.shape[0]):
+        if s.yielding[i] == 0:
+            continue
+        s.correction[n] = -s.lost[i]
+        m = 0
+        for k in range(i + 1):
+            if s.yielding[k] == 1:
+                s.block[n, m] = s.M[6 + i, 6 + k]
+                m += 1
+        n += 1
+    if n == 0:
+        return False
+    factor(s.block[:n, :n])
+    substitute(s.block[:n, :n], s.correction[:n])
+    n = 0
+    for i in range(s.lost.shape[0]):
+        if s.yielding[i] == 1:
+            s.acceleration[6 + i] += s.correction[n]
+            n += 1
+    return True
+
+
+@njit
+def _make_up_for_legs(s: FigureState, support: float) -> None:
+    """What standing legs cannot give within their limits is residual, by virtual work: Kᵀ lost."""
+    for leg in range(2):
+        for k in range(N_LEG):
+            lost = s.lost[3 * s.legs[leg, k // 3] + k % 3 - 3]
+            for i in range(6):
+                s.wrench[i] += s.response[leg, k, i] * lost
+    _bound_residual(s, support)

@@ -1,0 +1,1 @@
+"""Compiled kernels: their cache, their addresses, and MuJoCo's functions for them."""

@@ -1,0 +1,1 @@
+"""The servo, run block by block."""

@@ -1,0 +1,238 @@
+"""A run: the servo's compiled blocks one after the other, streamed to a recorder, in memory that does not grow."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.fields.instructions import (
+    EXTERNAL,
+    TRACE_DISTANCE,
+    TRACE_PHASE,
+    TRACE_POINT,
+    TRACE_RIVER,
+    TRACE_SIZE,
+    PythonFunction,
+)
+from controllers.state import HandState
+from models.humanoid.skeleton import N_POSE
+from models.mocap.clip import pose_difference
+from models.scene import FIGURE
+from sim.devices.simulated import read_phantom
+from sim.errors import SimError
+from sim.loop.servo import FrameLog, Servo, TickLog, run_block
+from sim.recording.recorder import Group, Recorder
+from sim.world.plant import hand_torques
+from sim.world.robot_world import RobotWorld
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+
+BLOCK_SECONDS = 0.2  # of simulated time between two looks at the clock and the recorder
+
+
+class RunTimes(NamedTuple):
+    """How fast a run was.
+
+    Attributes
+    ----------
+    simulated, wall : float
+        Seconds of simulated time, and what they took.
+    """
+
+    simulated: float
+    wall: float
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over the time it took."""
+        return self.simulated / self.wall if self.wall > 0.0 else float("inf")
+
+
+def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
+    """Empty logs for a block of ticks."""
+    plant = servo.plant
+    frames = -(-ticks // servo.figure_ticks)
+    return (
+        TickLog(
+            hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
+            user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
+            trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
+            applied=np.zeros((ticks, plant.substeps, hand_torques(servo.hand))),
+            residual=np.zeros((ticks, len(servo.figure.applied))),
+        ),
+        FrameLog(
+            t=np.zeros(frames), qpos=np.zeros((frames, len(plant.qpos))),
+            reference=np.zeros((frames, len(servo.reference.pose))),
+            report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
+        ),
+    )  # fmt: skip
+
+
+def groups(servo: Servo) -> dict[str, Group]:
+    """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's."""
+    plant = servo.plant
+    ticks = Group(
+        1.0 / plant.period,
+        {
+            "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
+            "force": (3,), "user": (3,), "tank": (), "tank_scale": (), "torque": (3,),
+            "phase": (), "nearest": (3,), "distance": (), "river": (),
+            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, hand_torques(servo.hand)), "residual": (6,),
+        },
+    )  # fmt: skip
+    frames = Group(
+        1.0 / (plant.period * servo.figure_ticks),
+        {
+            "t": (), "qpos": (len(plant.qpos),), "reference": (N_POSE,), "joint_error": (), "root_error": (),
+            "residual": (6,), "ground": (3,), "flight": (), "saturated": (),
+        },
+    )  # fmt: skip
+    return {"ticks": ticks, "frames": frames}
+
+
+Observer = Callable[[TickLog, FrameLog, int], None]
+"""Called after each block with its logs and the number of ticks in them; the logs are used again."""
+
+
+class Loop:
+    """A servo and its world, run block by block.
+
+    Parameters
+    ----------
+    servo : Servo
+        See `sim.loop.servo`.
+    world : World
+        Whose addresses the servo holds; kept alive here.
+    observe : Observer, optional
+        What is done with each block, such as `record_into`.
+    block_seconds : float
+        Simulated time of a block [s], rounded to whole figure updates.
+    python_laws : sequence of PythonFunction
+        `Program.python_laws` of the servo's field. With any, blocks go tick by tick: the hand is sensed, the laws
+        are called, and the compiled loop does the rest of the tick.
+
+    Raises
+    ------
+    SimError
+        If the laws are not as many as the field has slots for them.
+    """
+
+    def __init__(
+        self,
+        servo: Servo,
+        world: World | RobotWorld,
+        observe: Observer = lambda ticks, frames, n: None,
+        block_seconds: float = BLOCK_SECONDS,
+        python_laws: Sequence[PythonFunction] = (),
+    ):
+        self.servo, self.world, self._observe = servo, world, observe
+        every = servo.figure_ticks
+        self._block = every * max(1, round(block_seconds / servo.plant.period / every))
+        self._tick = 0
+        field = servo.field
+        self._slots = [int(slot) for slot in field.ops[field.ops[:, 0] == EXTERNAL, 2]]
+        self._laws = tuple(python_laws)
+        if len(self._laws) != len(self._slots):
+            raise SimError(
+                f"the field has {len(self._slots)} slots for laws in Python, {len(self._laws)} are given; "
+                "expected the program's python_laws"
+            )
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        return self._tick * self.servo.plant.period
+
+    def run(self, seconds: float, progress: Callable[[float], None] = lambda _: None) -> RunTimes:
+        """Run on for some time.
+
+        Parameters
+        ----------
+        seconds : float
+            Rounded to whole figure updates.
+        progress : callable
+            Called with the simulated time after every block.
+        """
+        plant, every = self.servo.plant, self.servo.figure_ticks
+        wanted = every * round(seconds / (plant.period * every))
+        ticks, frames = make_logs(self.servo, self._block)
+        first, begin = self._tick, time.perf_counter()
+        while self._tick < first + wanted:
+            n = min(self._block, first + wanted - self._tick)
+            if self._laws:
+                self._run_with_laws(n, ticks, frames)
+            else:
+                run_block(self.servo, self._tick, n, False, ticks, frames)
+            self._tick += n
+            self._observe(ticks, frames, n)
+            progress(self.time)
+        return RunTimes(wanted * plant.period, time.perf_counter() - begin)
+
+    def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
+        servo, every = self.servo, self.servo.figure_ticks
+        for k in range(n):
+            tick, row = self._tick + k, k // every
+            read_phantom(servo.port, servo.hand, tick * servo.plant.period)
+            hand = HandState.of(servo.port.hand)
+            for slot, law in zip(self._slots, self._laws, strict=True):
+                servo.field.memory[slot : slot + 3] = law(hand)
+            tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
+            frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
+            run_block(servo, tick, 1, False, tick_rows, frame_rows)
+
+
+def record_into(recorder: Recorder, servo: Servo, world: World) -> Observer:
+    """An observer that appends every block to a recorder made with `groups`."""
+    root = int(world.model.joint(FIGURE + "root").qposadr[0])
+
+    def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
+        recorder.append("ticks", tick_channels(ticks, n))
+        recorder.append("frames", frame_channels(frames, -(-n // servo.figure_ticks), root))
+
+    return observe
+
+
+def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
+    """The first n ticks of a block by channel."""
+    hand, trace = ticks.hand[:n], ticks.trace[:n]
+    return {
+        "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
+        "switch": hand[:, 14],
+        "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n],
+        "tank": ticks.tank[:n, 0], "tank_scale": ticks.tank[:n, 1], "torque": ticks.torque[:n],
+        "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
+        "distance": trace[:, TRACE_DISTANCE], "river": trace[:, TRACE_RIVER],
+        "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
+    }  # fmt: skip
+
+
+def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
+    """The first m figure updates of a block by channel; `root` is where the figure's pose stands in qpos."""
+    reference, report = frames.reference[:m], frames.report[:m]
+    joint_error, root_error = pose_errors(frames.qpos[:m, root : root + N_POSE], reference)
+    return {
+        "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joint_error": joint_error,
+        "root_error": root_error, "residual": report[:, 2:8], "ground": frames.ground[:m],
+        "flight": (report[:, 0] == 0.0).astype(np.float64), "saturated": report[:, 1],
+    }  # fmt: skip
+
+
+def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
+    """How far poses are from others: RMS over the joints of the angle between rotations [rad], and root distance [m].
+
+    Parameters
+    ----------
+    poses, reference : Array
+        Shape (n, 75) each.
+
+    Returns
+    -------
+    joints, root : Array
+        Shape (n,) each.
+    """
+    difference = pose_difference(poses, reference)
+    turns = difference[:, 6:].reshape(len(poses), -1, 3)
+    return np.sqrt(np.mean(np.sum(turns**2, axis=2), axis=1)), np.linalg.norm(difference[:, :3], axis=1)

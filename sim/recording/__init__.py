@@ -1,0 +1,1 @@
+"""Recordings: written tick by tick, and read."""

@@ -1,0 +1,233 @@
+"""Recording a run: streamed to HDF5, so that a killed run loses at most its last half second.
+
+The file is written in HDF5's single-writer mode (SWMR), in which every flush leaves a file that can be opened. What
+counts is counted last: ``<group>/rows`` is raised only after the rows have been flushed, so a reader never sees rows
+that were still on their way. A file is born whole under another name and then renamed, so it is never half a header.
+The layout is that of `sim.recording.recording`, which reads it.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
+
+Array = npt.NDArray[np.float64]
+
+CHUNK_SECONDS = 0.5  # what a killed run can lose, beside what was not yet appended
+# The system copies a page of a write at once, and between two pages a kill can end it: what crosses a page can be torn.
+# HDF5's own structures stay within pages of this size (up to 8176 chunks, more than an hour), rows need not.
+PAGE = 4096
+_PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Channels that are recorded at one rate.
+
+    Parameters
+    ----------
+    rate : float
+        Rows per second [Hz].
+    channels : Mapping[str, tuple of int]
+        Shape of one row of each channel; ``()`` for a number.
+
+    Raises
+    ------
+    RecordingError
+        If the rate is not positive, or no channel is given, or a channel is called ``rows`` or ``rate``.
+    """
+
+    rate: float
+    channels: Mapping[str, tuple[int, ...]]
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise RecordingError(f"rate is {self.rate} Hz; it must be positive")
+        if not self.channels or RESERVED & self.channels.keys():
+            raise RecordingError(f"channels are {sorted(self.channels)}; at least one, and none of {sorted(RESERVED)}")
+
+    @property
+    def chunk(self) -> int:
+        """Rows that are written at once."""
+        return max(1, round(self.rate * CHUNK_SECONDS))
+
+
+class _Stream:
+    """A group on its way to the file: one buffer of fixed size per channel, written when full."""
+
+    def __init__(self, group: Group, node: h5py.Group):
+        self._name = node.name
+        self._datasets = {name: dataset_of(node, name) for name in group.channels}
+        self._rows = dataset_of(node, "rows")
+        self._buffers = {name: np.empty((group.chunk, *shape)) for name, shape in group.channels.items()}
+        self._chunk = group.chunk
+        self._filled = 0
+        self._written = 0
+
+    def append(self, blocks: Mapping[str, Array]) -> None:
+        if blocks.keys() != self._buffers.keys():
+            raise RecordingError(f"{self._name}: channels are {sorted(blocks)}; expected {sorted(self._buffers)}")
+        n = len(next(iter(blocks.values())))
+        for name, block in blocks.items():
+            expected = (n, *self._buffers[name].shape[1:])
+            if np.shape(block) != expected:
+                raise RecordingError(f"{self._name}/{name}: shape is {np.shape(block)}; expected {expected}")
+        start = 0
+        while start < n:
+            stop = min(n, start + self._chunk - self._filled)
+            filled = self._filled + stop - start
+            for name, block in blocks.items():
+                self._buffers[name][self._filled : filled] = block[start:stop]
+            self._filled, start = filled, stop
+            if filled == self._chunk:
+                self.flush()
+
+    def flush(self) -> None:
+        """Write the buffered rows, and only then count them."""
+        if self._filled == 0:
+            return
+        total = self._written + self._filled
+        for name, buffer in self._buffers.items():
+            dataset = self._datasets[name]
+            dataset.id.set_extent((total, *buffer.shape[1:]))
+            # Whole chunks go straight to the file: five times faster, and no cache that grows.
+            if self._filled == self._chunk and self._written % self._chunk == 0:
+                dataset.id.write_direct_chunk((self._written, *[0] * (buffer.ndim - 1)), buffer)
+            else:
+                dataset[self._written : total] = buffer[: self._filled]
+            dataset.flush()
+        self._rows[0] = total
+        self._rows.flush()
+        self._written, self._filled = total, 0
+
+
+def _write_header(
+    file: h5py.File, config: Mapping[str, object], seed: int, static: Mapping[str, npt.ArrayLike | str]
+) -> None:
+    file["config"] = json.dumps(config)
+    file["versions"] = json.dumps({"python": platform.python_version()} | {p: version(p) for p in _PACKAGES})
+    file["seed"] = seed
+    node = file.create_group("static")
+    for name, value in static.items():
+        node[name] = value
+    file.create_dataset("summary", shape=(0,), maxshape=(None,), chunks=(4096,), dtype=np.uint8)
+    file["summary_bytes"] = np.zeros(1, dtype=np.int64)
+
+
+def _write_group(node: h5py.Group, group: Group) -> None:
+    node["rate"] = group.rate
+    node["rows"] = np.zeros(1, dtype=np.int64)
+    for name, shape in group.channels.items():
+        node.create_dataset(
+            name, shape=(0, *shape), maxshape=(None, *shape), chunks=(group.chunk, *shape), dtype=np.float64
+        )
+
+
+class Recorder:
+    """Writes a run to a new file, in memory that does not grow with the run.
+
+    Use as a context manager; leaving it before `close` was given a summary (because of an exception, say) keeps all
+    rows and leaves the recording marked as incomplete.
+
+    Parameters
+    ----------
+    path : Path
+        File to make.
+    config : Mapping
+        The resolved configuration of the run: with the seed, all that is needed to repeat it. Stored as JSON.
+    seed : int
+        Seed of the run's random generator.
+    groups : Mapping[str, Group]
+        What will be appended.
+    static : Mapping[str, array or str]
+        What does not change during the run: points of the curve, the model's XML, names of clips.
+
+    Raises
+    ------
+    RecordingError
+        If the file exists.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        config: Mapping[str, object],
+        seed: int,
+        groups: Mapping[str, Group],
+        static: Mapping[str, npt.ArrayLike | str],
+    ):
+        if path.exists():
+            raise RecordingError(f"{path}: exists; a recording is never overwritten, choose another name")
+        draft = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            with h5py.File(draft, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE) as file:
+                _write_header(file, config, seed, static)
+                for name, group in groups.items():
+                    _write_group(file.create_group(name), group)
+            draft.rename(path)
+        finally:
+            draft.unlink(missing_ok=True)
+        # Opened in single-writer mode at once: opening first and switching then leaves a moment in which a kill
+        # would mark the file as unreadable.
+        access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+        access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
+        flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
+        self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
+        self._streams = {name: _Stream(group, group_of(self._file, name)) for name, group in groups.items()}
+
+    def append(self, group: str, blocks: Mapping[str, Array]) -> None:
+        """Append rows to every channel of a group.
+
+        Parameters
+        ----------
+        group : str
+            One of the groups given at construction.
+        blocks : Mapping[str, array]
+            For each channel of the group an array (n, *shape); they are copied.
+
+        Raises
+        ------
+        RecordingError
+            If the group, a channel or a shape is not what was announced.
+        """
+        if group not in self._streams:
+            raise RecordingError(f"{group}: no such group; there are {sorted(self._streams)}")
+        self._streams[group].append(blocks)
+
+    def flush(self) -> None:
+        """Write what is buffered, so that a reader sees all that was appended."""
+        for stream in self._streams.values():
+            stream.flush()
+
+    def close(self, summary: Mapping[str, object] | None = None) -> None:
+        """Write what is buffered and close the file; a summary marks the recording as complete."""
+        if not self._file:
+            return
+        self.flush()
+        if summary is not None:
+            text = np.frombuffer(json.dumps(summary).encode(), dtype=np.uint8)
+            dataset, count = dataset_of(self._file, "summary"), dataset_of(self._file, "summary_bytes")
+            dataset.resize(len(text), axis=0)
+            dataset[:] = text
+            dataset.flush()
+            count[0] = len(text)
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

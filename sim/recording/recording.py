@@ -1,0 +1,199 @@
+"""Recordings, read: of a run that ended, was killed, or is still going on.
+
+Layout of the file, which `sim.recording.recorder` writes::
+
+    config, versions      JSON texts          seed     integer
+    static/<name>         arrays and texts    summary  JSON as bytes, of which ``summary_bytes`` count; 0 until the end
+    <group>/<channel>     float64 (n, *shape), of which ``<group>/rows`` count, at ``<group>/rate`` [Hz]
+
+Other programs open the file of a killed run with ``h5py.File(path, "r", swmr=True)``, or after ``h5clear -s``.
+"""
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from sim.errors import SimError
+
+Array = npt.NDArray[np.float64]
+
+RESERVED = frozenset({"rows", "rate"})
+"""Names in a group that are not channels."""
+
+
+class RecordingError(SimError):
+    """A recording that cannot be made, continued or read."""
+
+
+def dataset_of(node: h5py.Group, name: str) -> h5py.Dataset:
+    """A dataset by name; KeyError if there is none."""
+    dataset = node[name]
+    if not isinstance(dataset, h5py.Dataset):
+        raise KeyError(f"{node.name}/{name} is not a dataset")
+    return dataset
+
+
+def group_of(node: h5py.Group, name: str) -> h5py.Group:
+    """A group by name; KeyError if there is none."""
+    group = node[name]
+    if not isinstance(group, h5py.Group):
+        raise KeyError(f"{node.name}/{name} is not a group")
+    return group
+
+
+def _names(node: h5py.Group) -> list[str]:
+    return [str(name) for name in node]
+
+
+def _opened(path: Path) -> h5py.File:
+    """The file as it is, or, if its writer did not close it (yet), as a reader beside the writer."""
+    try:
+        return h5py.File(path, "r")
+    except OSError:
+        return h5py.File(path, "r", libver="latest", swmr=True)
+
+
+class Channel:
+    """Rows of a channel, read from the file when they are sliced.
+
+    ``channel[i]``, ``channel[a:b]`` and ``channel[::k]`` give float64 arrays; ``len(channel)`` is the number of
+    rows that count when the recording was opened.
+    """
+
+    def __init__(self, dataset: h5py.Dataset, rows: int):
+        self._dataset = dataset
+        self._rows = rows
+        self.shape = (rows, *dataset.shape[1:])
+
+    def __len__(self) -> int:
+        return self._rows
+
+    def __getitem__(self, rows: int | slice) -> Array:
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(self._rows)
+            return self._dataset[start:stop:step]
+        if not -self._rows <= rows < self._rows:
+            raise IndexError(f"{self._dataset.name}: row {rows}; there are {self._rows}")
+        return np.asarray(self._dataset[rows % self._rows])
+
+
+class Recording:
+    """A recording, finished or not, opened for reading; also while it is still being written.
+
+    Parameters
+    ----------
+    path : Path
+        File made by a `Recorder`.
+
+    Attributes
+    ----------
+    config : dict
+        Configuration of the run.
+    seed : int
+    versions : dict
+        Versions of Python and of the packages that decide what a run does.
+    summary : dict or None
+        What `Recorder.close` was given; None if the run did not get there.
+    arrays, texts : dict
+        What does not change during the run (`static` of the `Recorder`), by kind.
+    groups : dict
+        For each group its channels by name.
+    rates : dict
+        For each group its rate [Hz].
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing, or not a recording.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        try:
+            self._file = _opened(path)
+        except OSError as error:
+            said = error if path.exists() else "there is no such file"
+            raise RecordingError(f"{path}: cannot be opened ({said}); expected the run.h5 of a run") from None
+        try:
+            self._read()
+        except (KeyError, OSError, TypeError, ValueError) as error:
+            self._file.close()
+            raise RecordingError(f"{path}: not a recording ({error}); expected the run.h5 of a run") from None
+
+    def _read(self) -> None:
+        file = self._file
+        self.config: dict[str, object] = json.loads(dataset_of(file, "config")[()])
+        self.versions: dict[str, str] = json.loads(dataset_of(file, "versions")[()])
+        self.seed = int(dataset_of(file, "seed")[()])
+        summary = bytes(dataset_of(file, "summary")[: dataset_of(file, "summary_bytes")[0]])
+        self.summary: dict[str, object] | None = json.loads(summary) if summary else None
+        self.arrays: dict[str, Array] = {}
+        self.texts: dict[str, str] = {}
+        static = group_of(file, "static")
+        for name in _names(static):
+            value = dataset_of(static, name)[()]
+            if isinstance(value, bytes):
+                self.texts[name] = value.decode()
+            else:
+                self.arrays[name] = np.asarray(value, dtype=np.float64)
+        self.groups: dict[str, dict[str, Channel]] = {}
+        self.rates: dict[str, float] = {}
+        for name in _names(file):
+            node = file[name]
+            if isinstance(node, h5py.Group) and "rate" in node:
+                rows = int(dataset_of(node, "rows")[0])
+                self.rates[name] = float(dataset_of(node, "rate")[()])
+                self.groups[name] = {
+                    key: Channel(dataset_of(node, key), rows) for key in _names(node) if key not in RESERVED
+                }
+
+    def channel(self, group: str, name: str) -> Channel:
+        """A channel that has rows.
+
+        Raises
+        ------
+        RecordingError
+            If there is no such channel, or it has no rows.
+        """
+        channels = self.groups.get(group, {})
+        if name not in channels:
+            raise RecordingError(f"{self._path}: no channel {group}/{name}; {group} has {sorted(channels)}")
+        if len(channels[name]) == 0:
+            raise RecordingError(
+                f"{self._path}: {group}/{name} has no rows; the run ended before the first was written"
+            )
+        return channels[name]
+
+    def array(self, name: str) -> Array:
+        """An array that does not change during the run.
+
+        Raises
+        ------
+        RecordingError
+            If there is none of that name.
+        """
+        if name not in self.arrays:
+            raise RecordingError(f"{self._path}: no array {name}; there are {sorted(self.arrays)}")
+        return self.arrays[name]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to its end."""
+        return self.summary is not None
+
+    def close(self) -> None:
+        """Close the file; channels can then no longer be read."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

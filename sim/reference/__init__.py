@@ -1,0 +1,1 @@
+"""From the stylus to the pose, velocity and acceleration that the body is to follow."""

@@ -1,0 +1,32 @@
+"""The derivative of a haptic map at one stylus pose, from Python, by the kernels that the servo calls."""
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
+from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from sim.compilation.compiled import entry_point
+from sim.compilation.kernel_units import map_units
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@entry_point
+def _derivative(
+    units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
+) -> None:
+    evaluate_map_jacobian(units, kind, params, x, memory, pose, jacobian)
+
+
+def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
+    """`HapticMap.jacobian` at a stylus pose (7,), to the last bit; its kernels are found compiled.
+
+    Returns
+    -------
+    Array, shape (nv, 6)
+    """
+    kind, params, memory = haptic_map.compiled()
+    pose, jacobian = np.empty(haptic_map.nq), np.empty((haptic_map.nv, STYLUS_TANGENT))
+    _derivative(map_units([(kind, params)]), kind, params, x, memory, pose, jacobian)
+    return jacobian

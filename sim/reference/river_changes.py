@@ -1,0 +1,133 @@
+"""When another river has the hand, or none has it any more: one motion of the figure goes over into another."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.haptic_map.evaluate import evaluate_map
+from controllers.haptic_map.river_clips import (
+    ahead_in_clip,
+    change_clip,
+    heading_between,
+    phase_rate,
+    place_clip,
+    stop_clip,
+)
+from controllers.legs.footsteps import limb_end
+from controllers.motion.inertialization import stopping_way
+from controllers.rotations import rotate
+from sim.reference.reference_state import CompiledReference, carry, look_around
+from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
+from sim.reference.waiting import leaps, stands, waits_no_longer
+
+Array = npt.NDArray[np.float64]
+
+
+@njit
+def _look_ahead(reference: CompiledReference, params: Array, seconds: float, pose: Array) -> None:
+    """Pose of the clip that plays, some time from now, if it goes on at the pace of its river."""
+    memory = reference.scratch_memory
+    memory[:] = reference.memory
+    ahead_in_clip(params, memory, seconds)
+    evaluate_map(reference.units, reference.kind, reference.params, reference.scratch_x, memory, pose)
+
+
+@njit
+def _show_on(reference: CompiledReference) -> None:
+    """Note what is shown: now, a period before and a period after."""
+    look_around(reference, reference.going)
+    carry(reference)
+    shown = reference.transition.shown
+    shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
+
+
+@njit
+def _stand_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, float]:
+    """Place the motion where it has the foot that stands before and after; which it is, −1 for none, and how far [m].
+
+    A figure that stands on it alone turns with it.
+    """
+    transition, old, new = reference.transition, np.empty(7), np.empty(7)
+    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    _look_ahead(reference, params, transition.lasts[0], transition.ahead[1])
+    foot, row = pivot_of(transition)
+    moved = 0.0
+    if foot >= 0:
+        limb_end(transition.limbs[foot], transition.shown[0], old)
+        limb_end(transition.limbs[foot], transition.ahead[row], new)
+        turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
+        place_clip(reference.memory, new, old[0], old[1], turn)
+        moved = math.hypot(new[0] - old[0], new[1] - old[1])
+    return foot, moved
+
+
+@njit
+def _go_over(reference: CompiledReference, params: Array) -> None:
+    """Let the motion that the memory now has go on from what was shown, with an offset that decays.
+
+    It begins ahead of the figure by the way on which its speed over the ground, and about the vertical, comes to
+    that of the new motion, so it neither turns back nor is pulled there; or where a foot of it stands already.
+    """
+    transition, memory, period = reference.transition, reference.memory, reference.period
+    shown, change = transition.shown, transition.change
+    look_around(reference, reference.going)
+    pose = reference.pose
+    place_clip(memory, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
+    look_around(reference, reference.going)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
+    set_duration(transition, 0.0, period)
+    way, seconds = np.zeros(3), transition.lasts[0]
+    for i in range(2):
+        way[i] = stopping_way(change[1, i], change[2, i], seconds)
+    _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
+    _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
+    way[2] = stopping_way(spin, twist, seconds)
+    place_clip(memory, pose, pose[0] + way[0], pose[1] + way[1], way[2])
+    _, moved = _stand_on_pivot(reference, params)
+    set_duration(transition, moved, period)
+    # Where the motion stands when a longer change ends.
+    foot, _ = _stand_on_pivot(reference, params)
+    look_around(reference, reference.going)
+    note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
+    _look_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    plan_depth(transition)
+    transition.since[0] = 0.0
+
+
+@njit
+def may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
+    """Whether the figure stands, and another river's clip does not leap before it is shown; or has waited for that."""
+    transition, memory = reference.transition, reference.scratch_memory
+    if waits_no_longer(transition):
+        return True
+    if not stands(transition, reference.pose, reference.velocity[2]):
+        return False
+    for k in range(3):
+        memory[:] = reference.memory
+        change_clip(memory, river, phase)
+        ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
+        evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
+        if leaps(transition, transition.ahead[0]):
+            return False
+    return True
+
+
+@njit
+def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
+    """Let another river's clip go on from what is shown."""
+    _show_on(reference)
+    change_clip(reference.memory, river, phase)
+    _go_over(reference, params)
+
+
+@njit
+def stop(reference: CompiledReference, params: Array) -> None:
+    """Let the clip that plays come to rest: at the phase of rest nearest to where it would."""
+    memory, period = reference.memory, reference.period
+    _show_on(reference)
+    # Of the clip's own pace, not of a hand that is thrown along the curve or against it.
+    pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
+    stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))
+    _go_over(reference, params)

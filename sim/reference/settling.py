@@ -1,0 +1,96 @@
+r"""An animation that is held, or goes slowly, comes down to the floor: no body hovers in the middle of a flight.
+
+A flight takes as long as gravity lets it. Played at σ times its pace it asks for σ² g, and a hand that stops in one
+asks for a figure that hangs in the air. So what the figure is asked for is lowered by the share s of the clearance c of
+its feet, which is 1 for a hand that is slow and 0 at the clips' own pace:
+
+.. math:: z \leftarrow z - s\,u\,S(c), \qquad s \to S_{01}\Bigl(\frac{\sigma_1 - \sigma}{\sigma_1 - \sigma_0}\Bigr),
+          \qquad \sigma = |\dot\theta|\,T_c / 2\pi,
+
+with θ the stylus's angle about the vertical axis of H, on which the phase of these maps is, T_c the time of the clips,
+S(x) = x³/(x² + r²) for x > 0 and u from 0 to 1 as the figure is upright: one that turns over has no feet to be put on.
+s follows its goal critically damped, so pose, velocity and acceleration are continuous.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.legs.footsteps import limb_end
+from controllers.legs.limbs import LIMB
+from controllers.rotations import rotate
+from models.humanoid.skeleton import CONTACT_RADIUS
+from sim.compilation.compiled import entry_point
+
+Array = npt.NDArray[np.float64]
+
+_HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: below the first all of a flight is let down, from the second on none
+_RATE = 10.0  # of the approach to the goal [1/s]: a body falls as far as a jump is high in 0.3 s
+_SOFTNESS = 2e-3  # [m] of the minimum of the soles' heights
+_ROUND = 4e-3  # r [m]
+
+
+@njit
+def _smooth(x: float) -> float:
+    """3x² − 2x³, from 0 to 1."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+@njit
+def slowness(p: Array, v: Array, seconds: float) -> float:
+    """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips of so many seconds."""
+    square = p[0] * p[0] + p[1] * p[1]
+    if square == 0.0:
+        return 1.0
+    pace = abs(p[0] * v[1] - p[1] * v[0]) / square * seconds / (2.0 * math.pi)
+    return _smooth((_FLOWN - pace) / (_FLOWN - _HELD))
+
+
+@njit
+def approach(state: Array, goal: float, period: float) -> None:
+    """Advance the share and its rates (3,) by one period towards its goal."""
+    state[0] += period * state[1] + 0.5 * period**2 * state[2]
+    state[1] += period * state[2]
+    state[2] = _RATE**2 * (goal - state[0]) - 2.0 * _RATE * state[1]
+
+
+@njit
+def _height(limb: Array, end: Array, k: int) -> float:
+    """Height over the floor [m] of the sphere of a limb's sole that is at column k, the limb's end at `end` (7,)."""
+    _, _, z = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
+    return end[2] + z - CONTACT_RADIUS
+
+
+@njit
+def clearance(limbs: Array, ends: Array, pose: Array) -> float:
+    """Height of the lowest point of all soles over the floor [m], by a soft minimum; `ends` (n, 7) is scratch."""
+    least = math.inf
+    for n in range(limbs.shape[0]):
+        limb_end(limbs[n], pose, ends[n])
+        for k in range(LIMB, limbs.shape[1], 3):
+            least = min(least, _height(limbs[n], ends[n], k))
+    total = 0.0
+    for n in range(limbs.shape[0]):
+        for k in range(LIMB, limbs.shape[1], 3):
+            total += math.exp((least - _height(limbs[n], ends[n], k)) / _SOFTNESS)
+    return least - _SOFTNESS * math.log(total)
+
+
+@njit
+def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
+    """Lower a pose (75,) by a share of the clearance of its feet, over limbs of `packed_steppers`."""
+    if share <= 0.0 or limbs.shape[0] == 0:
+        return
+    above = clearance(limbs, ends, pose)
+    upright = 1.0 - 2.0 * (pose[4] ** 2 + pose[5] ** 2)
+    if above > 0.0:
+        pose[2] -= min(share, 1.0) * _smooth(2.0 * upright) * above**3 / (above**2 + _ROUND**2)
+
+
+@entry_point
+def stood(limbs: Array, pose: Array) -> None:
+    """Let a pose (75,) down to the floor, where a run begins with it; see `let_down`."""
+    let_down(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)

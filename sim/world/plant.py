@@ -1,0 +1,123 @@
+"""The world as compiled code steps it: MuJoCo's memory and the hand on the stylus, one servo period at a time."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from models.scene import PHANTOM
+from sim.compilation.native import mj_step
+from sim.users.arm import Arm, CompiledArm, hand_force
+from sim.users.fingers import turning_moment
+from sim.world.phantom_port import ARM_JOINTS, PhantomPort, true_motion, true_turn
+from sim.world.robot_world import RobotWorld
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+
+
+class Plant(NamedTuple):
+    """The world and its rates.
+
+    Attributes
+    ----------
+    model, data : int
+        Addresses of MjModel and MjData.
+    qpos, ctrl, applied : Array
+        Views of MuJoCo's own memory: state, motor commands, external generalised forces.
+    ground : Array
+        View of the ground's whole push on the figure [N], shape (3,); zero for a body that does not stand on it.
+    arm_v : tuple of three ints
+        Degrees of freedom of θ1, θ2, θ3.
+    substeps : int
+        Physics steps a servo period.
+    period : float
+        Servo period T [s].
+    """
+
+    model: int
+    data: int
+    qpos: Array
+    ctrl: Array
+    applied: Array
+    ground: Array
+    arm_v: tuple[int, int, int]
+    substeps: int
+    period: float
+
+
+class Hand(NamedTuple):
+    """The simulated user, in H what the hand feels (true position, velocity, Jacobian) and its force.
+
+    And the same of a hand that turns the stylus: true orientation (wxyz), angular velocity, gimbal axes, its moment.
+    """
+
+    arm: CompiledArm
+    p: Array
+    v: Array
+    jacobian: Array
+    force: Array
+    q: Array
+    w: Array
+    axes: Array
+    moment: Array
+
+
+def make_plant(world: World | RobotWorld) -> Plant:
+    """Wire up a world; it must outlive the plant, which holds its addresses."""
+    model, data = world.model, world.data
+    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in ARM_JOINTS)
+    return Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=world.ground, arm_v=(a, b, c), substeps=world.config.substeps(), period=world.config.servo_period,
+    )  # fmt: skip
+
+
+def make_hand(arm: Arm) -> Hand:
+    """A simulated user before its first tick."""
+    linear = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
+    return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+
+
+def hand_torques(hand: Hand) -> int:
+    """How many joints the hand has torques about: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
+    return 6 if len(hand.arm.turns) > 0 else 3
+
+
+@njit
+def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
+    """Step the physics from time t for one servo period.
+
+    Parameters
+    ----------
+    plant, port, hand
+        Updated.
+    t : float
+        [s]
+    replay : bool
+        Take the hand's torques from `applied` instead of asking the hand.
+    applied : Array
+        The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], and with six columns about the gimbal
+        joints, τ = AᵀM; written or read, shape (substeps, `hand_torques`).
+    """
+    turning = applied.shape[1] > 3
+    for i in range(plant.substeps):
+        if not replay:
+            true_motion(port, hand.p, hand.v, hand.jacobian)
+            hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)
+            J, F = hand.jacobian, hand.force
+            for j in range(3):
+                applied[i, j] = J[0, j] * F[0] + J[1, j] * F[1] + J[2, j] * F[2]
+            if turning:
+                arm, A, M = hand.arm, hand.axes, hand.moment
+                true_turn(port, hand.q, hand.w, A)
+                when = t + i * plant.period / plant.substeps
+                turning_moment(arm.turn_stiffness, arm.turn_damping, arm.turns, when, hand.q, hand.w, M)
+                for j in range(3):
+                    applied[i, 3 + j] = A[0, j] * M[0] + A[1, j] * M[1] + A[2, j] * M[2]
+        for j in range(3):
+            plant.applied[plant.arm_v[j]] = applied[i, j]
+            if turning:
+                plant.applied[port.gimbal_v[j]] = applied[i, 3 + j]
+        mj_step(plant.model, plant.data)
