@@ -11,14 +11,13 @@ import pytest
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
+from experiments.certify import certified_field, certified_rivers
 from experiments.certify.certified_field import certificate_inputs, read_certificate, verify_certificate
 from experiments.certify.certify import (
     CERTIFICATE,
     FLIGHTS_PLOT,
     PAGE,
     PLOT,
-    certified_field,
-    certified_rivers,
     certify_into,
 )
 from experiments.cli import main

@@ -6,7 +6,7 @@ from clip_measures import G, acceleration, limit_excess, measure, overlap, resid
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES
-from models.mocap.authoring.authoring import flights
+from models.mocap.authoring import flights
 from models.mocap.library import embedded
 
 FLIGHTS = {"jump": flights.JUMP, "backflip": flights.BACKFLIP}

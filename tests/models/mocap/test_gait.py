@@ -5,7 +5,7 @@ import pytest
 from clip_measures import G, acceleration, limit_excess, measure, overlap, residuals, rms, slide, steps
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
-from models.mocap.authoring.authoring import gait
+from models.mocap.authoring import gait
 from models.mocap.dynamics.coordinates import coordinate
 from models.mocap.dynamics.spacetime import Motion
 from models.mocap.library import embedded

@@ -6,7 +6,7 @@ import pytest
 
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model, rest_pose
-from models.mocap.authoring.authoring import flights, gait
+from models.mocap.authoring import flights, gait
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection, states
 from models.mocap.dynamics.floor_forces import Floor, residual
 from models.mocap.dynamics.spacetime import Motion, Task
