@@ -160,10 +160,7 @@ def _spare_wrappers() -> None:
         return flags
 
     def get_executable(self: Any, library: Any, fndesc: Any, env: Any) -> Any:
-        if _Depth.now > 1:
-            entry = _NoEntry()
-        else:
-            entry = executable(self, library, fndesc, env)
+        entry = _NoEntry() if _Depth.now > 1 else executable(self, library, fndesc, env)
         if not library.deferred:
             _set_environments(library)
         return entry

@@ -33,10 +33,10 @@ from models.humanoid.skeleton import (
     N_TANGENT,
     SEGMENTS,
 )
-from sim.compiled import entry_point
 from sim.contact_forces import N_EDGES
 from sim.errors import SimError
 from sim.figure_state import Array, FigureGains, FigureState
+from sim.units import unit_function
 from sim.whole_body import figure_torque
 
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
@@ -46,9 +46,7 @@ _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
 
 
-@entry_point
-def _update(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    figure_torque(s, q_r, v_r, a_r)
+_update = unit_function(figure_torque.__module__, figure_torque.__qualname__)  # the same unit as in the servo's loop
 
 
 @dataclass(frozen=True)

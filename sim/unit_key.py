@@ -20,7 +20,6 @@ import mujoco
 import numba
 import numpy as np
 from numba import config, types
-from numba.core import sigutils
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.core.registry import cpu_target
@@ -38,7 +37,7 @@ _SETTINGS = (
 _LITERALS = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), np.generic)
 _PLAIN_TYPES = (
     types.Number, types.Boolean, types.NoneType, types.Omitted, types.Literal, types.Array, types.CPointer,
-    types.RawPointer, types.Record, types.UnicodeType,
+    types.RawPointer, types.Record, types.UnicodeType, types.NumberClass, types.TypeRef,
 )  # fmt: skip
 
 
@@ -280,9 +279,6 @@ def describe_type(kind: Any) -> object:
         return kind.instance_class.__module__, kind.instance_class.__qualname__, kind.fields, inner
     if isinstance(kind, types.BaseTuple):
         return "tuple", [describe_type(item) for item in kind.types]
-    if isinstance(kind, types.ExceptionClass | types.NumberClass | types.TypeRef) or isinstance(kind, _PLAIN_TYPES):
+    if isinstance(kind, _PLAIN_TYPES):
         return type(kind).__name__, str(kind)
-    if hasattr(kind, "args") and hasattr(kind, "return_type"):
-        arguments, result = sigutils.normalize_signature(kind)
-        return [describe_type(argument) for argument in arguments], str(result)
     raise UnknownIngredient(f"the type {kind} is a {type(kind).__qualname__}; expected numbers, arrays and tuples")
