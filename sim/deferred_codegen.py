@@ -8,6 +8,9 @@ the last bit.
 This reaches into numba. With a version that it was not tested with, numba is left as it is: slower, not wrong.
 """
 
+# pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
+# What is patched here is numba's own, and TESTED says of which versions.
+
 from typing import Any
 
 import numba
@@ -79,6 +82,17 @@ class UnitLibrary(codegen.JITCodeLibrary):
             self.deferred = self._finalized = False
             self.finalize()
         return super().get_pointer_to_function(name)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        if not self.deferred:
+            super()._optimize_functions(ll_module)
+            return
+        ll_module.data_layout = self._codegen._data_layout
+        # numba makes the passes anew for each function, also for those that are only declared.
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         missing = undefined_symbols(self._final_module)

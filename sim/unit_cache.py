@@ -5,6 +5,9 @@ reads a half; it carries a hash of its contents, and one that is cut short, chan
 Units that nobody has asked for in a long time are removed.
 """
 
+# pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
+# The cache of a dispatcher is not public in numba; `sim.deferred_codegen` says of which versions this is true.
+
 import hashlib
 import os
 import pickle

@@ -6,6 +6,8 @@ found again after any change that it does not depend on, and from another copy o
 know how to describe is an error: it might be something that the code depends on.
 """
 
+# pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
+
 import dis
 import enum
 import hashlib
@@ -13,6 +15,7 @@ import sys
 import types as python_types
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import llvmlite
@@ -24,6 +27,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.core.registry import cpu_target
 
+from sim import deferred_codegen
 from sim.deferred_codegen import install
 from sim.errors import SimError
 
@@ -99,7 +103,12 @@ def _platform() -> tuple[object, ...]:
     """Versions, processor and settings that compiled code is for."""
     settings = tuple((name, repr(getattr(config, name, None))) for name in _SETTINGS)
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__, mujoco.__version__)
-    return versions, cpu_target.target_context.codegen().magic_tuple(), settings, install()
+    return versions, cpu_target.target_context.codegen().magic_tuple(), settings, _generation()
+
+
+def _generation() -> str:
+    """How code is generated: by numba as it is, or as `sim.deferred_codegen` has it, by the hash of that file."""
+    return hashlib.sha256(Path(deferred_codegen.__file__).read_bytes()).hexdigest() if install() else "numba"
 
 
 _Others = list[tuple[Function, dict[str, Any]]]
@@ -229,8 +238,8 @@ def _value(value: Any, name: str, others: _Others) -> object:
 
 def _items(options: dict[str, Any]) -> list[object]:
     others: _Others = []
-    described = [(key, _value(options[key], f"option {key}", others)) for key in sorted(options)]
-    return described + [f"{other.__module__}.{other.__qualname__}" for other, _ in others]
+    described: list[object] = [(key, _value(options[key], f"option {key}", others)) for key in sorted(options)]
+    return [*described, *(f"{other.__module__}.{other.__qualname__}" for other, _ in others)]
 
 
 def _class(kind: type, name: str) -> tuple[object, ...]:
