@@ -220,6 +220,8 @@ def _value(value: Any, name: str, others: _Others) -> object:
             raise UnknownIngredient(f"{name} is an array of objects; expected numbers")
         content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
         return "array", value.dtype.str, value.shape, value.flags.c_contiguous, content
+    if isinstance(value, np.dtype):
+        return "dtype", repr(value)
     if isinstance(value, dict):
         return "dict", [(_value(key, name, others), _value(item, name, others)) for key, item in value.items()]
     if isinstance(value, tuple):
@@ -228,7 +230,7 @@ def _value(value: Any, name: str, others: _Others) -> object:
     if isinstance(value, type):
         return _class(value, name)
     if _is_library(value):
-        return "library", type(value).__qualname__, getattr(value, "__module__", ""), _name_of(value)
+        return "library", type(value).__qualname__, str(getattr(value, "__module__", "")), _name_of(value)
     if isinstance(value, python_types.FunctionType):
         others.append((value, {}))
         others.extend((template._overload_func, {}) for template in _overloads(value))
@@ -254,12 +256,22 @@ def _class(kind: type, name: str) -> tuple[object, ...]:
 
 
 def _is_library(value: object) -> bool:
-    """Whether something belongs to a library, of which the version is in the key already."""
-    if isinstance(value, python_types.BuiltinFunctionType | np.ufunc):
-        return True
-    module = value.__name__ if isinstance(value, python_types.ModuleType) else getattr(value, "__module__", None)
-    top = (module or "").split(".")[0]
-    return top in sys.stdlib_module_names - {"__main__"} or top in ("numpy", "numba", "llvmlite", "mujoco")
+    """Whether something is a module, a class or a function of a library, whose version is in the key already.
+
+    An instance of a library's class is none of them, nor is a method of one: what they hold is nobody's version.
+    """
+    if isinstance(value, python_types.ModuleType):
+        name: object = value.__name__
+    elif callable(value) and _name_of(value) and isinstance(getattr(value, "__self__", None), _OF_MODULES):
+        name = getattr(value, "__module__", None) or type(value).__module__
+    else:
+        return False
+    top = str(name).split(".")[0]
+    return top in sys.stdlib_module_names - {"__main__"} or top in _LIBRARIES
+
+
+_OF_MODULES = (python_types.NoneType, python_types.ModuleType)
+_LIBRARIES = ("numpy", "numba", "llvmlite", "mujoco")
 
 
 def _name_of(value: object) -> str:
