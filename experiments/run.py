@@ -83,7 +83,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     console = Console(stderr=True)
     check_folder(out, overwrite)
     clips, remarks = load_clips(config.clips)
-    session = wire(config, clips, remarks, lambda parts: compile_once(console, config, parts))
+    session = wire(config, clips, remarks, lambda units: compile_once(console, units))
     for remark in session.remarks:
         console.print(remark, highlight=False)
     clear_folder(out)

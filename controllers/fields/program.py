@@ -57,8 +57,10 @@ LAW_KERNELS: dict[int, Kernel] = {
 }
 """Kernels of the laws by opcode."""
 
-_VECTOR = types.Array(types.float64, 1, "C")
-LAW_ARGUMENTS = (_VECTOR, types.int64, types.int64, _VECTOR, types.int64, _VECTOR, _VECTOR)
+VECTOR = types.Array(types.float64, 1, "C")
+"""Type of a row of numbers."""
+
+LAW_ARGUMENTS = (VECTOR, types.int64, types.int64, VECTOR, types.int64, VECTOR, VECTOR)
 """Types of a kernel's arguments: params, at, curve, memory, slot, hand, wrench."""
 
 _call = kernel_call(LAW_ARGUMENTS)

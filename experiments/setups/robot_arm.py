@@ -18,7 +18,7 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.robot_arm import ROBOT_ARM, RobotArm
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
-from experiments.compiling import compile_once, compiled_parts
+from experiments.compiling import compile_once
 from experiments.config.run_config import ArmConfig
 from experiments.files.json_text import json_text
 from experiments.results.figures import STYLE
@@ -30,12 +30,13 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm_model
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT
 from sim.body.robot import REPORT_SATURATED, robot_state
-from sim.compilation.kernel_units import law_units
+from sim.compilation.units import Unit
 from sim.loop.loop import Loop, groups, tick_channels
+from sim.loop.run_units import run_units
 from sim.loop.servo import Field, FrameLog, Servo, TickLog
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
-from sim.reference.reference import check_reference, make_reference, poses_along
+from sim.reference.reference import check_reference, poses_along, unlinked_reference
 from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.replay_html import Target
@@ -123,7 +124,7 @@ def tilted_circle(radius: float, lap: float) -> Trajectory:
 
 
 def wire_arm(
-    config: ArmConfig, ready: Callable[[tuple[str, ...]], None] = lambda parts: None
+    config: ArmConfig, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> tuple[Servo, RobotWorld, Trajectory]:
     """Put a run together: servo, world and curve; `ready` as in `experiments.setups.wiring.wire`.
 
@@ -155,25 +156,27 @@ def wire_arm(
     mujoco.mju_mat2Quat(stylus, world.data.site(PHANTOM + "tip").xmat)
     port = phantom_port(world.model, world.data, period, config.cutoff)
     check_reference(period * config.arm_ticks, config.smoothing, 0.0)
-    # The map looks at its domain with compiled code, when everything else has been checked.
-    ready(compiled_parts("arm", CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), program.ops))
-    compiled = robot_arm_map().compiled()
-    world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
+    nothing, arm_period = CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), period * config.arm_ticks
     servo = Servo(
         plant=make_plant(world),
         port=port,
         field=Field(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory(),
+            units=np.zeros(0, dtype=np.int64), ops=program.ops, params=program.params, memory=program.fresh_memory(),
             limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
         hand=make_hand(Arm(pushes=pushes)),
-        reference=make_reference(world.arm, compiled, period * config.arm_ticks, config.smoothing),
+        reference=unlinked_reference(world.arm, nothing, arm_period, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
         argument=port.hand[1:8],
     )  # fmt: skip
-    return servo, world, curve
+    # The map looks at its domain with compiled code, when everything else has been checked.
+    ready(run_units(servo))
+    compiled = robot_arm_map().compiled()
+    world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
+    reference = unlinked_reference(world.arm, compiled, arm_period, config.smoothing)
+    return servo._replace(reference=reference).linked(), world, curve
 
 
 def arm_groups(servo: Servo) -> dict[str, Group]:
@@ -229,7 +232,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     """
     console = Console(stderr=True)
     check_folder(out, overwrite)
-    servo, world, curve = wire_arm(config, lambda parts: compile_once(console, config, parts))
+    servo, world, curve = wire_arm(config, lambda units: compile_once(console, units))
     out.mkdir(parents=True, exist_ok=True)
     for name in (RECORDING, SUMMARY, REPORT, FIGURE):
         (out / name).unlink(missing_ok=True)

@@ -21,7 +21,6 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
-from experiments.compiling import compiled_parts
 from experiments.config.run_config import MAP_SUFFIX, STRETCHING, RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.setups.balance import balanced
@@ -44,12 +43,13 @@ from experiments.setups.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.body.figure import Figure, FigureGains
-from sim.compilation.kernel_units import law_units
+from sim.compilation.units import Unit
+from sim.loop.run_units import run_units
 from sim.loop.servo import Field as CompiledField
 from sim.loop.servo import Servo
-from sim.reference.map_derivative import map_derivative
-from sim.reference.reference import begin_in_motion, check_reference, make_reference, poses_along
-from sim.reference.settling import stood
+from sim.reference.map_derivative import derivative_unit, map_derivative
+from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along, unlinked_reference
+from sim.reference.settling import stood, stood_unit
 from sim.users.arm import Arm
 from sim.world.phantom_port import PhantomPort, phantom_port, sense_in_motion
 from sim.world.plant import make_hand, make_plant
@@ -64,7 +64,7 @@ def wire(
     config: RunConfig,
     clips: tuple[Clip, ...],
     remarks: tuple[str, ...] = (),
-    ready: Callable[[tuple[str, ...]], None] = lambda parts: None,
+    ready: Callable[[tuple[Unit, ...]], None] = lambda units: None,
 ) -> Session:
     """Put a run together.
 
@@ -75,7 +75,7 @@ def wire(
     clips, remarks
         Of `load_clips`.
     ready : callable
-        Called before compiled code is needed, with the names of its parts (see `experiments.compiling`).
+        Called before compiled code is needed, with its units (see `experiments.compiling`).
 
     Raises
     ------
@@ -130,7 +130,14 @@ def wire(
         config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube, share))
     parts = _assemble(config, (curve, course), blended, rivers, led, world)
     remarks += hand_remarks(config, curve)
-    ready(compiled_parts("figure", parts.compiled, parts.program.ops))
+    # A walk at full speed cannot begin from rest: where clips are played as they are, so does the figure.
+    bends = config.mode in STRETCHING
+    moves = isinstance(blended, Lifted | RiverClips) and not bends
+    draft = _servo(config, parts, blended, world, _figure(config, blended, world), curve)
+    more = ((derivative_unit(),) if moves else ()) + ((stood_unit(),) if bends else ())
+    if isinstance(blended, RiverClips):
+        more += (along_unit(draft.reference),)
+    ready(run_units(draft) + more)
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
         blended = balanced(blended, world.figure, config.lap)
@@ -141,57 +148,27 @@ def wire(
     if isinstance(blended, Led) and led is not None:
         blended = balanced_on_ground(blended, led.gait, world.figure)
         parts = _assemble(config, (curve, course), blended, rivers, led, world)
-    haptic_map, field, program, compiled, user, limiter, tank, port = parts
-    memory = program.fresh_memory()
-    if leading:
-        # The path that the figure is on is the one that the field lays.
-        compiled = compiled._replace(memory=memory)
-    period = config.scene.servo_period * config.figure_ticks
-    legs, bends = packed_legs(world.figure), config.mode in STRETCHING
-    # Where a curve is bent, a hand may hold the figure in the middle of a flight.
-    held = 0.0
-    if bends and not isinstance(blended, Led):
-        held = curve.duration if isinstance(blended, Lifted) else blended.lap_seconds
-    reference = make_reference(world.figure, compiled, period, config.smoothing, config.blend, legs, held)
-    # A walk at full speed cannot begin from rest: where clips are played as they are, so does the figure.
-    moves = isinstance(blended, Lifted | RiverClips) and not bends
+    figure = _figure(config, blended, world)
+    servo = _servo(config, parts, blended, world, figure, curve).linked()
+    haptic_map, compiled = parts.haptic_map, servo.reference
     begin = beginning(curve, np.random.default_rng(config.seed), moves)
     poses = np.empty((1, haptic_map.nq))
-    walker = memory[TRACE_SIZE + ARGUMENT :][:7]
-    argument = walker[None] if leading else stylus_path(begin.point[None])
+    argument = servo.argument[None] if leading else stylus_path(begin.point[None])
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     if bends:
-        stood(legs, poses[0])
-    orientation, v_H, velocity = UPRIGHT if config.expressive or user.turns else None, None, None
+        stood(packed_legs(world.figure), poses[0])
+    orientation, v_H, velocity = UPRIGHT if config.expressive or parts.user.turns else None, None, None
     if moves:
         v_H = begin.velocity
         velocity = map_derivative(haptic_map, argument[0])[:, :3] @ v_H
-        begin_in_motion(reference, np.array(begin))
+        begin_in_motion(servo.reference, np.array(begin))
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     world.reset(begin.point, poses[0], orientation, v_H, velocity)
     if moves:
-        sense_in_motion(port)
-    gains = LIFTED_GAINS if bends or isinstance(blended, Lifted) else FigureGains()
-    if isinstance(blended, Led):
-        gains = led_gains(blended)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
-    servo = Servo(
-        plant=make_plant(world),
-        port=port,
-        field=CompiledField(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=memory,
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
-            wrench=np.zeros(6), force=np.zeros(3),
-        ),
-        hand=make_hand(user),
-        reference=reference,
-        figure=figure.state,
-        figure_ticks=config.figure_ticks,
-        argument=walker if leading else port.hand[1:8],
-    )  # fmt: skip
+        sense_in_motion(parts.port)
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)
-    return Session(config, clips, remarks, course, field, blended, haptic_map, world, figure, servo)
+    return Session(config, clips, remarks, course, parts.field, blended, haptic_map, world, figure, servo)
 
 
 class _Parts(NamedTuple):
@@ -240,6 +217,51 @@ def _assemble(
     tank = energy_tank(config, course, limiter, grabs, urged)
     port = phantom_port(world.model, world.data, period, config.cutoff)
     return _Parts(haptic_map, field, program, compiled, user, limiter, tank, port)
+
+
+def _figure(config: RunConfig, blended: ClipMap | Led, world: World) -> Figure:
+    bends = config.mode in STRETCHING
+    gains = LIFTED_GAINS if bends or isinstance(blended, Lifted) else FigureGains()
+    if isinstance(blended, Led):
+        gains = led_gains(blended)
+    return Figure(world.model, world.data, world.figure, FIGURE, gains)
+
+
+def _servo(
+    config: RunConfig,
+    parts: _Parts,
+    blended: ClipMap | Led,
+    world: World,
+    figure: Figure,
+    curve: Trajectory,
+) -> Servo:
+    """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
+    _, _, program, compiled, user, limiter, tank, port = parts
+    memory, leading = program.fresh_memory(), config.mode == "lead"
+    if leading:
+        # The path that the figure is on is the one that the field lays.
+        compiled = compiled._replace(memory=memory)
+    period = config.scene.servo_period * config.figure_ticks
+    # Where a curve is bent, a hand may hold the figure in the middle of a flight.
+    held = 0.0
+    if config.mode in STRETCHING and not isinstance(blended, Led):
+        held = curve.duration if isinstance(blended, Lifted) else blended.lap_seconds
+    return Servo(
+        plant=make_plant(world),
+        port=port,
+        field=CompiledField(
+            units=np.zeros(0, dtype=np.int64), ops=program.ops, params=program.params, memory=memory,
+            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
+            wrench=np.zeros(6), force=np.zeros(3),
+        ),
+        hand=make_hand(user),
+        reference=unlinked_reference(
+            world.figure, compiled, period, config.smoothing, config.blend, packed_legs(world.figure), held
+        ),
+        figure=figure.state,
+        figure_ticks=config.figure_ticks,
+        argument=memory[TRACE_SIZE + ARGUMENT :][:7] if leading else port.hand[1:8],
+    )  # fmt: skip
 
 
 def _pace_remark(lap: float, clips: float) -> tuple[str, ...]:

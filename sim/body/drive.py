@@ -1,28 +1,21 @@
-"""What follows the reference, the figure or a robot arm: its control is chosen by type when the loop is compiled."""
+"""What follows the reference, the figure or a robot arm: the unit that sets its torques is chosen by its type."""
 
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
-from numba.extending import overload
+from numba import typeof
 
-from sim.body.figure_state import Array, FigureState
+from controllers.fields.program import VECTOR
+from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
 from sim.body.whole_body import figure_torque
+from sim.compilation.units import Unit
 
 BodyState: TypeAlias = FigureState | RobotState
 
-
-def drive(body: BodyState, pose: Array, velocity: Array, acceleration: Array) -> None:
-    """Set a body's torques for the reference of this control tick; as in `sim.body.figure`, `sim.body.robot`."""
-    if isinstance(body, FigureState):
-        figure_torque(body, pose, velocity, acceleration)
-    else:
-        robot_torque(body, pose, velocity, acceleration)
+_DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotState: robot_torque}
 
 
-# A function around them would take all the arrays of a state once more, number by number.
-_DRIVES: dict[type, Any] = {FigureState: figure_torque, RobotState: robot_torque}
-
-
-@overload(drive, strict=False)
-def _drive(body: Any, pose: Any, velocity: Any, acceleration: Any) -> Any:
-    return _DRIVES[body.instance_class].py_func
+def drive_unit(body: BodyState) -> Unit:
+    """The unit that sets a body's torques for the reference of a control tick: pose, velocity, acceleration."""
+    return Unit.of(_DRIVES[type(body)], typeof(body), VECTOR, VECTOR, VECTOR)

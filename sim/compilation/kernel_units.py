@@ -5,17 +5,14 @@ laws of force and the kinds of map that it uses, each once for each version of t
 very function that Python calls.
 """
 
-from collections.abc import Callable, Iterable
-from functools import cache
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
 
 from controllers.fields.program import LAW_ARGUMENTS, LAW_KERNELS
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
-from sim.compilation.compiled import entry_point
+from sim.compilation.units import Unit
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -32,7 +29,7 @@ def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
     units = np.zeros(max(MAP_KERNELS) + 1, dtype=np.int64)
     for kind, params in maps:
         for needed in kinds_of(kind, params):
-            units[needed] = _address(MAP_KERNELS[needed], MAP_ARGUMENTS)
+            units[needed] = _map_unit(needed).address()
     return units
 
 
@@ -41,16 +38,23 @@ def law_units(ops: IntArray) -> IntArray:
     units = np.zeros(max(LAW_KERNELS) + 1, dtype=np.int64)
     for opcode in ops[:, 0].tolist():
         if opcode in LAW_KERNELS:
-            units[opcode] = _address(LAW_KERNELS[opcode], LAW_ARGUMENTS)
+            units[opcode] = _law_unit(opcode).address()
     return units
 
 
-_alive: list[Any] = []  # compiled units: their code must outlive every address
+def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
+    """Units that a map needs."""
+    return tuple(_map_unit(needed) for needed in kinds_of(kind, params))
 
 
-@cache
-def _address(kernel: Callable[..., None], arguments: tuple[Any, ...]) -> int:
-    unit: Any = entry_point(getattr(kernel, "py_func"))  # noqa: B009 - a dispatcher, which pyright takes for a function
-    _alive.append(unit)
-    compiled = unit.get_compile_result(types.void(*arguments))
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+def units_of_laws(ops: IntArray) -> tuple[Unit, ...]:
+    """Units that the instructions (n, 4) of a field need, each once."""
+    return tuple(_law_unit(opcode) for opcode in sorted(set(ops[:, 0].tolist()) & LAW_KERNELS.keys()))
+
+
+def _map_unit(kind: int) -> Unit:
+    return Unit.of(MAP_KERNELS[kind], *MAP_ARGUMENTS)
+
+
+def _law_unit(opcode: int) -> Unit:
+    return Unit.of(LAW_KERNELS[opcode], *LAW_ARGUMENTS)

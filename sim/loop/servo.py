@@ -23,13 +23,15 @@ from numba import njit
 from controllers.fields.instructions import TRACE_SIZE, Program
 from controllers.fields.program import evaluate_units
 from controllers.fields.soft_wall import raise_walls
+from controllers.kernel_call import call_as_given
 from controllers.safety.energy_tank import TANK_ENERGY, guard_energy
 from controllers.safety.limiter import limit_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
-from sim.body.drive import BodyState, drive
+from sim.body.drive import BodyState, drive_unit
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import law_units
-from sim.reference.reference import update_reference
+from sim.compilation.kernel_units import law_units, map_units
+from sim.errors import SimError
+from sim.reference.reference import update_unit
 from sim.reference.reference_state import CompiledReference
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.world.plant import Hand, Plant, advance
@@ -66,7 +68,8 @@ class Servo(NamedTuple):
     """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
     `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or of the
-    field's memory, where a walker is that the field moves.
+    field's memory, where a walker is that the field moves. `units` (2,) are the addresses of what updates the reference
+    and of what drives the body: a change in one of them is not one of the loop.
     """
 
     plant: Plant
@@ -77,6 +80,16 @@ class Servo(NamedTuple):
     figure: BodyState
     figure_ticks: int
     argument: Array
+    units: IntArray = np.zeros(2, dtype=np.int64)
+
+    def linked(self) -> "Servo":
+        """The same with the addresses of all kernels that it calls; compiles what is not kept."""
+        field, reference = self.field, self.reference
+        return self._replace(
+            units=np.array([update_unit(reference).address(), drive_unit(self.figure).address()]),
+            field=field._replace(units=law_units(field.ops)),
+            reference=reference._replace(units=map_units([(reference.kind, reference.params)])),
+        )
 
 
 class TickLog(NamedTuple):
@@ -153,9 +166,11 @@ def field_force(servo: Servo) -> None:
 @njit(inline="always")
 def move_figure(servo: Servo) -> None:
     """Update the animation at the map's argument, and the torques that follow it."""
-    reference = servo.reference
-    update_reference(reference, servo.argument, servo.field.memory[:TRACE_SIZE])
-    drive(servo.figure, reference.pose, reference.velocity, reference.acceleration)
+    reference, units = servo.reference, servo.units
+    if units[0] == 0 or units[1] == 0:
+        raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
+    call_as_given(units[0], (reference, servo.argument, servo.field.memory[:TRACE_SIZE]))
+    call_as_given(units[1], (servo.figure, reference.pose, reference.velocity, reference.acceleration))
 
 
 @entry_point

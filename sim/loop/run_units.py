@@ -1,0 +1,30 @@
+"""Which units of compiled code a servo's loop needs: said before any of them is compiled."""
+
+from numba import typeof, types
+
+from sim.body.drive import drive_unit
+from sim.compilation.kernel_units import units_of_laws, units_of_map
+from sim.compilation.units import Unit
+from sim.loop.loop import make_logs
+from sim.loop.servo import Servo, run_block
+from sim.reference.reference import poses_unit, update_unit
+
+
+def run_units(servo: Servo) -> tuple[Unit, ...]:
+    """Units of the loop over a servo, of what it calls, and of poses along a path, by which runs begin and end.
+
+    Parameters
+    ----------
+    servo : Servo
+        With all arrays that it will have, but no address need be there (see `Servo.linked`).
+    """
+    ticks, frames = make_logs(servo, servo.figure_ticks)
+    number, flag, reference = types.int64, types.boolean, servo.reference
+    return (
+        Unit.of(run_block, typeof(servo), number, number, flag, typeof(ticks), typeof(frames)),
+        update_unit(reference),
+        drive_unit(servo.figure),
+        *units_of_map(reference.kind, reference.params),
+        *units_of_laws(servo.field.ops),
+        poses_unit(),
+    )
