@@ -5,7 +5,6 @@ from dataclasses import replace
 from controllers.fields.instructions import Program
 from controllers.safety.energy_tank import EnergyTank
 from experiments.config.run_config import RunConfig
-from experiments.setups.clips import load_clips
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop, Observer
@@ -35,8 +34,7 @@ def loop_with(
     ModelError, ControllerError, SimError
         As `experiments.setups.wiring.wire`.
     """
-    clips, remarks = load_clips(config.clips)
-    session = wire(config, clips, remarks)
+    session = wire(config)
     field = session.servo.field.of(program)
     if tank is not None:
         field = field._replace(budget=tank.params(), tank=tank.fresh_memory())

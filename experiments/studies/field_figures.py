@@ -21,7 +21,8 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.program import evaluate
 from controllers.fields.river import River, integrate
 from controllers.state import HandState
-from experiments.setups.modes import ADMISSION, HYSTERESIS, SIGMA, Field
+from experiments.setups.parts import Field
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 Array = npt.NDArray[np.float64]

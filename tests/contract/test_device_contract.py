@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from controllers.state import HandState
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.run import config_dict
-from experiments.setups.clips import load_clips
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from sim.devices.base import Device, DeviceError
@@ -28,8 +27,8 @@ MakeDevice = Callable[[], Device]
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.h5"
-    config = RunConfig(clips=("cheer",), seconds=TICKS * 1e-3)
-    session = wire(config, load_clips(config.clips)[0])
+    config = run_config(clips=("cheer",), seconds=TICKS * 1e-3)
+    session = wire(config)
     with Recorder(path, config_dict(config), config.seed, groups(session.servo), session.static()) as recorder:
         Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(config.seconds)
     return path

@@ -11,7 +11,8 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.expressive import EXPRESSIVE
 from experiments import compiling
 from experiments.compiling import compile_once, compiled_parts
-from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.run_config import ArmConfig
+from experiments.config.words import run_config
 from experiments.setups.robot_arm import wire_arm
 
 
@@ -32,7 +33,7 @@ def test_parts_are_the_loop_the_maps_and_the_laws():
 
 
 def test_a_process_is_started_when_a_part_is_missing_and_with_the_run_s_configuration(started, tmp_path, capsys):
-    config = RunConfig(seconds=3.0, mode="bunny")
+    config = run_config(seconds=3.0, mode="bunny")
     (tmp_path / "figure.compiled").touch()
     compile_once(Console(), config, ("figure", "law-1"))
     assert started == [config]

@@ -9,7 +9,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.expression import expressive_figure, oriented
 from experiments.setups.wiring import wire
@@ -30,7 +30,7 @@ def rotations(poses, joint):
 
 @pytest.fixture(scope="module")
 def figure_map():
-    return expressive_figure(wire(RunConfig(clips=("walk",), seconds=0.1), load_clips(("walk",))[0]).haptic_map)
+    return expressive_figure(wire(run_config(clips=("walk",), seconds=0.1), load_clips(("walk",))[0]).haptic_map)
 
 
 def placed(pose):
@@ -84,12 +84,12 @@ def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name
 def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_bent():
     curve = Trajectory.circle(0.05, 4.0)
     program = Follow(curve, 300.0, 8.0).program()
-    assert oriented(program, RunConfig(), curve) is program
-    assert len(oriented(program, RunConfig(orientation_damping=1e-3), curve).ops) == len(program.ops) + 2
+    assert oriented(program, run_config(), curve) is program
+    assert len(oriented(program, run_config(orientation_damping=1e-3), curve).ops) == len(program.ops) + 2
     for config, says in (
-        (RunConfig(mode="stretch", orientation_stiffness=0.1), "needs a curve that stays; stretch bends it"),
-        (RunConfig(orientation_stiffness=-0.1), "k_o must be finite and at least 0"),
-        (RunConfig(orientation_damping=np.nan), "b_o must be finite"),
+        (run_config(mode="stretch", orientation_stiffness=0.1), "needs a curve that stays; stretch bends it"),
+        (run_config(orientation_stiffness=-0.1), "k_o must be finite and at least 0"),
+        (run_config(orientation_damping=np.nan), "b_o must be finite"),
     ):
         with pytest.raises(ParameterError, match=says):
             oriented(program, config, curve)

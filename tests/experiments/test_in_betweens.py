@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from experiments.config.run_config import FIGURE_CLIPS, RunConfig
+from experiments.config.run_config import FIGURE_CLIPS
+from experiments.config.words import run_config
 from experiments.setups.balance import nearest_supported
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_maps import clip_map
@@ -17,7 +18,7 @@ from models.mocap.dynamics.floor_forces import Floor, residual
 from sim.reference.reference import poses_along
 
 TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
-CONFIG = RunConfig(seconds=1.0)
+CONFIG = run_config(seconds=1.0)
 STANDING = ("walk", "cheer", "angry", "squat_dance")
 STEPPING = (
     ("walk", "run"),
@@ -33,7 +34,7 @@ MANY = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0
 @pytest.fixture(scope="module")
 def maps():
     return {
-        clips: wire(RunConfig(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
+        clips: wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
         for clips in (FIGURE_CLIPS, STANDING, *STEPPING)
     }
 
@@ -84,7 +85,7 @@ def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
 
 @pytest.mark.parametrize("clips", [("walk", "angry", "cheer"), ("ginga", "angry", "walk"), ("run", "walk", "cheer")])
 def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
-    h_map = wire(RunConfig(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
+    h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
     places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
     for feet in places:
         assert slide(feet) < 0.01
@@ -103,7 +104,7 @@ DRAGGED = {
 
 @pytest.mark.parametrize("clips", DRAGGED)
 def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip_alone(clips):
-    config = RunConfig(clips=clips, seconds=1.0)
+    config = run_config(clips=clips, seconds=1.0)
     h_map = clip_map(config, load_clips(clips)[0], Trajectory.circle(config.radius, config.lap), figure_model())
     for rows in (ROWS, 217):
         for r, z in DRAGGED[clips]:

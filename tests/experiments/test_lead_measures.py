@@ -7,10 +7,9 @@ from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
 from controllers.haptic_map.led import Led
 from experiments.cli import main
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.results.lead_measures import LeadSummary, _Retrace, _Soles, support_at
-from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from experiments.setups.lead import gait_remark, law, leading_hand, led_map, s_curve, walker_argument
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
@@ -104,7 +103,7 @@ def test_how_far_soles_slide_while_they_touch() -> None:
 
 
 def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
-    field = law(RunConfig(mode="lead"), GAIT)
+    field = law(run_config(mode="lead"), GAIT)
     path = leading_hand(field).path
     for place in path[::50]:
         phantom_angles(place)
@@ -119,7 +118,7 @@ def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
 def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
     led, gait = led_map(embedded(name), figure_legs(figure_model()), 0)
     assert gait.support[0] == most
-    field = law(RunConfig(mode="lead"), gait)
+    field = law(run_config(mode="lead"), gait)
     assert support_at(field, np.array([0.0]))[0] == most
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
@@ -164,9 +163,9 @@ def test_the_lines_tell_it() -> None:
     ],
 )
 def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
-    config = RunConfig(mode="lead", **options)
+    config = run_config(mode="lead", **options)
     with pytest.raises(ParameterError, match=says):
-        wire(config, load_clips(config.clips)[0])
+        wire(config)
 
 
 def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from experiments.setups.modes import law, river_time
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
@@ -11,13 +12,13 @@ from controllers.fields.higher_order import HigherOrder, higher_order_wrench
 from controllers.fields.instructions import TRACE_RIVER
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.hands import user_arm
-from experiments.setups.modes import law, river_time
 from sim.users.arm import hand_force
 
 MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s] of what the hand moves, about the Phantom's
 CURVE = Trajectory.circle(0.0477, 4.0)
-RIVERS = RunConfig(mode="rivers", user="push", seconds=4.0)
+RIVERS = run_config(mode="rivers", user="push", seconds=4.0)
 
 
 def field_of(config: RunConfig) -> HigherOrder:
@@ -70,6 +71,6 @@ def test_the_default_push_takes_the_hand_from_the_level_river_into_another_which
 
 def test_a_hand_that_does_not_push_stays_and_with_the_gains_of_one_curve_the_push_takes_it_nowhere() -> None:
     assert np.all(rivers_of_a_hand(replace(RIVERS, user="relaxed")) == 0.0)
-    alone = RunConfig()
+    alone = run_config()
     stiff = replace(RIVERS, river_stiffness=alone.stiffness, river_damping=alone.damping)
     assert not np.all(rivers_of_a_hand(stiff)[2600:] > 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.files.map_files import load_figure_map
 from experiments.run import run
 from sim.recording.recording import Recording
@@ -52,7 +52,7 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
 def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
     residuals = []
     for seed in (1, 2, 3):
-        config = RunConfig(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
+        config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
         summary = run(config, tmp_path / "bent", True, 0.0)
         assert summary.stretch is not None
         assert summary.stretch.edits == 3
@@ -67,7 +67,7 @@ def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map
 
 
 def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
-    run(RunConfig(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
+    run(run_config(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
         assert (recording.channel("ticks", "river")[:] == 0.0).all()
         assert recording.channel("ticks", "distance")[:].max() < 1e-3
@@ -77,7 +77,7 @@ def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file
 def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_run_or_falls_into_a_walk(
     map_file: Path, tmp_path: Path, first: str, second: str
 ) -> None:
-    config = RunConfig(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
+    config = run_config(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
     summary = run(config, tmp_path / "pushed", True, 0.0)
     (change,) = summary.changes
     assert (change.before, change.after) == (first, second)

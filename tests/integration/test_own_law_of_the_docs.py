@@ -9,12 +9,12 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.own_law import loop_with
 from sim.errors import SimError
 from sim.loop.loop import Loop
 
-CONFIG = RunConfig(clips=("cheer", "angry"), seconds=0.2)
+CONFIG = run_config(clips=("cheer", "angry"), seconds=0.2)
 FOLLOW = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube).program()
 
 

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from experiments.setups.modes import law
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
@@ -15,8 +16,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
 from experiments.certify.certify import certified_rivers
 from experiments.certify.crossing_simulation import simulated_course
-from experiments.config.run_config import RunConfig
-from experiments.setups.modes import law
+from experiments.config.words import run_config
 from experiments.studies.switching_trials import straight_pair, trials
 
 CLOCK = Sampling(1e-3)
@@ -176,7 +176,7 @@ def test_failures_are_told_apart():
 
 @pytest.mark.slow
 def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
-    config = RunConfig(mode="rivers")
+    config = run_config(mode="rivers")
     main = certified_rivers(config)[""]
     curve, clock = main.curve, main.sampling
     verdict = certify_rivers(config, main, HandRange(), 0.5, {"": curve})["switching"]
