@@ -82,8 +82,9 @@ _PROCESS = """
 import numpy as np
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from sim import kernel_units
+from sim.units import unit_function
 kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
-(unit,) = kernel_units._alive
+unit = unit_function("controllers.haptic_map.robot_arm", "robot_arm_map")
 print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()), kernel_units.__file__)
 """
 
