@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -204,7 +204,7 @@ def tracked_motion(
     contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
     # Rows of what is not contiguous are of another type, and nothing checks that.
     motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
-    numbers = (
+    numbers: tuple[Any, ...] = (
         figure.state, config.control_steps, *motion, poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
     )  # fmt: skip
     drive = drive_unit(figure.state)
