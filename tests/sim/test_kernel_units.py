@@ -82,14 +82,15 @@ _PROCESS = """
 import numpy as np
 from controllers.haptic_map.robot_arm import ROBOT_ARM
 from sim.compilation import kernel_units
+from sim.compilation.units import unit_function
 kernel_units.map_units([(ROBOT_ARM, np.zeros(0))])
-(unit,) = kernel_units._alive
+unit = unit_function("controllers.haptic_map.robot_arm", "robot_arm_map")
 print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values()), kernel_units.__file__)
 """
 
 
 def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
-    here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
+    here, copy = Path(kernel_units.__file__).parent.parent, tmp_path / "copy"
     for package in ("models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     told = [
