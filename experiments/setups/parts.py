@@ -14,10 +14,11 @@ from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.state import Array, HandState, Wrench
 from experiments.config.modes import Rivers
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import Clock, Figure, Phantom
 from experiments.results.summary import RunSummary
 from experiments.setups.expression import expressive_figure
 from models.mocap.clip import Clip
+from models.scene import SceneConfig
 from sim.body.figure import FigureGains
 from sim.recording.recording import Recording
 from sim.users.arm import Arm
@@ -37,6 +38,35 @@ class Field(Protocol):
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force at one hand state."""
+        ...
+
+
+class Settings(Protocol):
+    """What of a run is not its field, its map or its hand."""
+
+    @property
+    def figure(self) -> Figure:
+        """The figure."""
+        ...
+
+    @property
+    def device(self) -> Phantom:
+        """The device."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """The rates."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Of where exactly the hand lets go."""
+        ...
+
+    @property
+    def scene(self) -> SceneConfig:
+        """Of the world."""
         ...
 
 
@@ -197,8 +227,8 @@ class Parts:
 
     Attributes
     ----------
-    config : RunConfig
-        With all that was left to defaults.
+    config : Settings
+        Of figure, device and clock, with all that was left to defaults; of a configured run its `RunConfig`.
     maps : MapParts
         The map, its clips and its curve.
     field : Field
@@ -231,7 +261,7 @@ class Parts:
         What the mode adds to a summary.
     """
 
-    config: RunConfig
+    config: Settings
     maps: MapParts[HapticMap]
     field: Field
     program: Program

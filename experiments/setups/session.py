@@ -7,8 +7,7 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.base import HapticMap
-from experiments.config.run_config import RunConfig
-from experiments.setups.parts import Field, Parts
+from experiments.setups.parts import Field, Parts, Settings
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import P_WH
@@ -28,8 +27,8 @@ class Session:
     remarks: tuple[str, ...]
 
     @property
-    def config(self) -> RunConfig:
-        """The configuration, with all that was left to defaults."""
+    def config(self) -> Settings:
+        """Figure, device and clock; of a configured run its `RunConfig`, with all that was left to defaults."""
         return self.parts.config
 
     @property

@@ -12,7 +12,7 @@ from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
-from experiments.setups.parts import MapParts, Parts
+from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of, resolved
 from experiments.setups.stylus import UPRIGHT, stylus_path
@@ -53,26 +53,60 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
-    _check_rates(config)
+    if config.seconds < 2.0 * config.clock.servo_period * ticks_of(config):
+        least = 2.0 * config.clock.servo_period * ticks_of(config)
+        raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
+    check_rates(config)
     world = World(config.scene)
-    maps = map_parts(config, world.figure, clips)
-    draft = parts_of(config, maps)
+    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
+
+
+def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready) -> Session:
+    """Put the parts of a run together that a map makes.
+
+    Parameters
+    ----------
+    world : World
+        That is stepped.
+    maps : MapParts
+        The map.
+    parts_of : callable
+        From the map to the parts; called again when the map has been improved.
+    ready : callable
+        See `Ready`.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `wire`.
+    """
+    draft = parts_of(maps)
     ready(_units(draft, _servo(draft, world)[0]))
     # Whatever takes compiled code to find is found when everything has been checked.
     refined = maps.refine()
-    parts = draft if refined is maps else parts_of(config, refined)
+    parts = draft if refined is maps else parts_of(refined)
     servo, figure = _servo(parts, world)
     servo = servo.linked()
     _begin(parts, servo, world)
     return Session(parts, world, figure, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
 
-def _check_rates(config: RunConfig) -> None:
-    config.scene.substeps()
-    period = config.clock.servo_period * (config.figure.figure_ticks or 1)
-    if config.seconds < 2.0 * period:
-        raise ParameterError(f"a run of {config.seconds} s; expected {2.0 * period:g} s or more, and finite")
-    check_reference(period, config.figure.smoothing, config.figure.blend)
+def check_rates(settings: Settings) -> None:
+    """Refuse rates that do not divide, or cannot be filtered.
+
+    Raises
+    ------
+    ModelError, SimError
+        If they are so.
+    """
+    settings.scene.substeps()
+    figure = settings.figure
+    check_reference(settings.clock.servo_period * ticks_of(settings), figure.smoothing, figure.blend)
+
+
+def ticks_of(settings: Settings) -> int:
+    """Servo ticks between two updates of the figure."""
+    return settings.figure.figure_ticks or 1
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
@@ -85,7 +119,7 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
     memory, compiled = program.fresh_memory(), parts.maps.whole_map.compiled()
-    period, ticks = config.clock.servo_period, config.figure.figure_ticks or 1
+    period, ticks = config.clock.servo_period, ticks_of(config)
     limiter, legs = ForceLimiter(period), packed_legs(world.figure)
     port = phantom_port(world.model, world.data, period, config.device.cutoff)
     if parts.walker is not None:
