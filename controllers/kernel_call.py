@@ -5,6 +5,7 @@ each is compiled, and kept, by itself. Calling convention and errors are those o
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, cast
 
 from numba import types
@@ -44,3 +45,11 @@ def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, 
         return signature, generate
 
     return cast(Callable[[int, tuple[Any, ...]], None], call)
+
+
+@cache
+def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
+    """Address of a kernel, an ``njit`` function, compiled in this process for these types; it stays alive."""
+    kernel.compile(arguments)
+    compiled = kernel.get_compile_result(types.void(*arguments))
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

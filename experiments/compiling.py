@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from controllers.fields.program import LAW_KERNELS
+from controllers.fields.law import Program
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import kinds_of
-from controllers.state import IntArray
 from experiments.config.run_config import ArmConfig, RunConfig
 from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.kernel_units import is_kept
 
 Config = RunConfig | ArmConfig
 
 
-def compiled_parts(body: str, haptic_map: CompiledMap, ops: IntArray | None = None) -> tuple[str, ...]:
+def compiled_parts(body: str, haptic_map: CompiledMap, program: Program | None = None) -> tuple[str, ...]:
     """Names of what is compiled by itself for a run: the loop for a body, kernels of the map and of the field's laws.
 
     Parameters
@@ -27,12 +27,13 @@ def compiled_parts(body: str, haptic_map: CompiledMap, ops: IntArray | None = No
         ``figure`` or ``arm``.
     haptic_map : CompiledMap
         Whose poses the body follows, and whose walls the field may have.
-    ops : IntArray, optional
-        Instructions (n, 4) of the field, if it is known.
+    program : Program, optional
+        The field, if it is known.
     """
     kinds = kinds_of(haptic_map.kind, haptic_map.params)
-    laws = set() if ops is None else {int(opcode) for opcode in ops[:, 0]} & LAW_KERNELS.keys()
-    return (body, *(f"map-{kind}" for kind in kinds), *(f"law-{opcode}" for opcode in sorted(laws)))
+    kernels = () if program is None else program.kernels
+    laws = {getattr(kernel, "__name__") for kernel in kernels if is_kept(kernel)}  # noqa: B009 - a dispatcher
+    return (body, *(f"map-{kind}" for kind in kinds), *(f"law-{name}" for name in sorted(laws)))
 
 
 def compile_once(console: Console, config: Config, parts: tuple[str, ...]) -> None:

@@ -39,7 +39,7 @@ def leading_field(config: RunConfig, clip: Clip) -> Leading:
         If a number is out of its interval, or the clip cannot be led.
     """
     figure = figure_model(config.scene.stature, config.scene.mass)
-    return law(config, led_map(clip, figure_legs(figure), 0)[1])
+    return law(config, led_map(clip, figure_legs(figure))[1])
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.instructions import Program
+from controllers.fields.law import Program
 from controllers.fields.orientation import Orientation
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint

@@ -8,10 +8,9 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
-from controllers.state import HandState, Wrench
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes import Field, law
 from models.mocap.clip import Clip
@@ -103,7 +102,7 @@ def governed_law(
 
 
 @dataclass(frozen=True, eq=False)
-class Governed:
+class Governed(Law):
     """A field over a curve together with the governor of the animation under it."""
 
     field: Field
@@ -111,8 +110,4 @@ class Governed:
 
     def program(self) -> Program:
         """Compiled form of the sum."""
-        return self.field.program() + self.governor.program()
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Sum of both at one hand state."""
-        return Wrench(self.field.wrench(hand).force + self.governor.wrench(hand).force, np.zeros(3))
+        return self.field + self.governor

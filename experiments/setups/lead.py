@@ -35,7 +35,7 @@ _FLYING_LATERAL = 1.2
 _RUNNING_FORWARD = 1.0
 
 
-def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
+def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
 
     Raises
@@ -53,7 +53,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
+    led = Led((clip.poses, clip.fps), legs, phases[first], standing, None if made else Capture(CONTACT_RADIUS))
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies

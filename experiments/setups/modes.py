@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,15 +14,14 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import Program
-from controllers.fields.program import evaluate
+from controllers.fields.law import Law, Program
+from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import HandState, Wrench
+from controllers.state import HandState
 from experiments.config.run_config import RunConfig
 
 Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
 # at a right angle is not: it is √2 from it.
@@ -38,16 +36,7 @@ GATE = 0.4  # the admission of rivers that say what speeds they take: a hand tha
 WAVE = 0.6  # height of the wave, of the map's half width
 
 
-class Field(Protocol):
-    """A law of force: evaluated from Python, or compiled into the servo."""
-
-    def program(self) -> Program:
-        """Compiled form."""
-        ...
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state."""
-        ...
+Field = Law
 
 
 def law(
@@ -155,11 +144,11 @@ def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsil
 
 @njit
 def _ticks(
-    ops: IntArray, params: Array, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
+    field: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
 ) -> float:
     wrench, total = np.zeros(6), 0.0
     for i in range(hands.shape[0]):
-        evaluate(ops, params, memory, hands[i], wrench)
+        evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)
         limit_force(limits, limiter, wrench, force)
         total += force[0]
     return total
@@ -188,6 +177,6 @@ def tick_microseconds(program: Program, hands: Array) -> float:
     for lap in range(6):
         rows = hands[:2] if lap == 0 else hands
         begin = time.thread_time()
-        _ticks(program.ops, program.params, memory, limiter.limits(), heat, rows, np.zeros(3))
+        _ticks(program.compiled(), memory, limiter.limits(), heat, rows, np.zeros(3))
         best = best if lap == 0 else min(best, time.thread_time() - begin)
     return 1e6 * best / len(hands)

@@ -30,9 +30,8 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm_model
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT
 from sim.body.robot import REPORT_SATURATED, robot_state
-from sim.compilation.kernel_units import law_units
 from sim.loop.loop import Loop, groups, tick_channels
-from sim.loop.servo import Field, FrameLog, Servo, TickLog
+from sim.loop.servo import FrameLog, Servo, TickLog, compiled_field
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.reference.reference import check_reference, make_reference, poses_along
@@ -156,17 +155,13 @@ def wire_arm(
     port = phantom_port(world.model, world.data, period, config.cutoff)
     check_reference(period * config.arm_ticks, config.smoothing, 0.0)
     # The map looks at its domain with compiled code, when everything else has been checked.
-    ready(compiled_parts("arm", CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), program.ops))
+    ready(compiled_parts("arm", CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), program))
     compiled = robot_arm_map().compiled()
     world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
     servo = Servo(
         plant=make_plant(world),
         port=port,
-        field=Field(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory(),
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
-            wrench=np.zeros(6), force=np.zeros(3),
-        ),
+        field=compiled_field(program, limiter, tank),
         hand=make_hand(Arm(pushes=pushes)),
         reference=make_reference(world.arm, compiled, period * config.arm_ticks, config.smoothing),
         figure=robot_state(world, RATE),

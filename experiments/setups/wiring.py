@@ -11,8 +11,8 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
-from controllers.fields.instructions import TRACE_SIZE, Program
-from controllers.fields.leading import ARGUMENT, PATH, Leading
+from controllers.fields.law import Program
+from controllers.fields.leading import Leading
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.haptic_map.cylindrical import Cylindrical
@@ -44,9 +44,7 @@ from experiments.setups.walls import figure_walls
 from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.body.figure import Figure, FigureGains
-from sim.compilation.kernel_units import law_units
-from sim.loop.servo import Field as CompiledField
-from sim.loop.servo import Servo
+from sim.loop.servo import Servo, compiled_field
 from sim.reference.map_derivative import map_derivative
 from sim.reference.reference import begin_in_motion, check_reference, make_reference, poses_along
 from sim.reference.settling import stood
@@ -107,7 +105,7 @@ def wire(
         phantom_angles(curve.point(phase))
     rivers, led, course = None, None, curve
     if leading:
-        blended, gait = led_map(only(clips), figure_legs(world.figure), TRACE_SIZE + PATH)
+        blended, gait = led_map(only(clips), figure_legs(world.figure))
         led = lead_law(config, gait)
         remarks += lap_remark(only(clips)) + gait_remark(only(clips).name, blended)
     elif config.map.endswith(MAP_SUFFIX):
@@ -130,7 +128,7 @@ def wire(
         config = replace(config, grabs=stretch_grabs(curve, config.rubber_tube, share))
     parts = _assemble(config, (curve, course), blended, rivers, led, world)
     remarks += hand_remarks(config, curve)
-    ready(compiled_parts("figure", parts.compiled, parts.program.ops))
+    ready(compiled_parts("figure", parts.compiled, parts.program))
     if isinstance(blended, Cylindrical) and not config.map.endswith(MAP_SUFFIX):
         # Its sway is found with compiled code, when everything has been checked.
         blended = balanced(blended, world.figure, config.lap)
@@ -142,10 +140,11 @@ def wire(
         blended = balanced_on_ground(blended, led.gait, world.figure)
         parts = _assemble(config, (curve, course), blended, rivers, led, world)
     haptic_map, field, program, compiled, user, limiter, tank, port = parts
-    memory = program.fresh_memory()
-    if leading:
-        # The path that the figure is on is the one that the field lays.
-        compiled = compiled._replace(memory=memory)
+    law, walker = compiled_field(program, limiter, tank), None
+    if led is not None:
+        # The field moves the walker, the map shows it.
+        walker = led.walker(law.memory, program.slot_of(led))
+        compiled = compiled._replace(memory=walker.path)
     period = config.scene.servo_period * config.figure_ticks
     legs, bends = packed_legs(world.figure), config.mode in STRETCHING
     # Where a curve is bent, a hand may hold the figure in the middle of a flight.
@@ -157,8 +156,7 @@ def wire(
     moves = isinstance(blended, Lifted | RiverClips) and not bends
     begin = beginning(curve, np.random.default_rng(config.seed), moves)
     poses = np.empty((1, haptic_map.nq))
-    walker = memory[TRACE_SIZE + ARGUMENT :][:7]
-    argument = walker[None] if leading else stylus_path(begin.point[None])
+    argument = stylus_path(begin.point[None]) if walker is None else walker.argument[None]
     poses_along(compiled.kind, compiled.params, compiled.memory.copy(), argument, poses)
     if bends:
         stood(legs, poses[0])
@@ -178,16 +176,12 @@ def wire(
     servo = Servo(
         plant=make_plant(world),
         port=port,
-        field=CompiledField(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=memory,
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
-            wrench=np.zeros(6), force=np.zeros(3),
-        ),
+        field=law,
         hand=make_hand(user),
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
-        argument=walker if leading else port.hand[1:8],
+        argument=port.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)

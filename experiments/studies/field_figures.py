@@ -93,7 +93,7 @@ def _felt(field: Field, way: Array) -> Array:
     forces: list[float] = []
     for x in way:
         hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
-        evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
         forces.append(float(np.linalg.norm(wrench[:3])))
     return np.array(forces)
 

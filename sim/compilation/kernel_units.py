@@ -13,8 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from controllers.fields.program import LAW_ARGUMENTS, LAW_KERNELS
+from controllers.fields.instructions import LAW_ARGUMENTS
+from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
+from controllers.kernel_call import address_of
 from sim.compilation.compiled import entry_point
 
 Array = npt.NDArray[np.float64]
@@ -36,13 +38,18 @@ def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
     return units
 
 
-def law_units(ops: IntArray) -> IntArray:
-    """Addresses of the kernels that the instructions (n, 4) of a field need, by opcode; likewise."""
-    units = np.zeros(max(LAW_KERNELS) + 1, dtype=np.int64)
-    for opcode in ops[:, 0].tolist():
-        if opcode in LAW_KERNELS:
-            units[opcode] = _address(LAW_KERNELS[opcode], LAW_ARGUMENTS)
-    return units
+def law_units(program: Program) -> IntArray:
+    """Addresses of the kernels of a field's laws, in their order; likewise."""
+    return np.array([_law_address(kernel) for kernel in program.kernels], dtype=np.int64)
+
+
+def is_kept(kernel: Callable[..., None]) -> bool:
+    """Whether a law's kernel is kept on disk: not one about a function of the user's, a change of which goes unseen."""
+    return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
+
+
+def _law_address(kernel: Callable[..., None]) -> int:
+    return (_address if is_kept(kernel) else address_of)(kernel, LAW_ARGUMENTS)
 
 
 _alive: list[Any] = []  # compiled units: their code must outlive every address

@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
+from controllers.fields.own_law import law
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.expressive import EXPRESSIVE
 from experiments import compiling
@@ -27,8 +31,11 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
 def test_parts_are_the_loop_the_maps_and_the_laws():
     expressive = CompiledMap(EXPRESSIVE, np.array([1.0, 0.0]), np.zeros(1))
     assert compiled_parts("figure", expressive) == ("figure", "map-6", "map-1")
-    ops = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [3, 0, 0, 0], [12, 0, 0, 0], [0, 0, 0, 0]])
-    assert compiled_parts("figure", expressive, ops) == ("figure", "map-6", "map-1", "law-0", "law-1")
+    curve = Trajectory.circle(0.05, 4.0)
+    follow, bunny = Follow(curve, 200.0, 4.0), Bunny(curve, 200.0, 4.0, 0.02)
+    own = law(compiled=True)(lambda hand: (0.0, 0.0, 1.0))
+    laws = ("law-bunny_wrench", "law-follow_wrench")
+    assert compiled_parts("figure", expressive, bunny + follow + own + follow) == ("figure", "map-6", "map-1", *laws)
 
 
 def test_a_process_is_started_when_a_part_is_missing_and_with_the_run_s_configuration(started, tmp_path, capsys):
