@@ -143,9 +143,7 @@ def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsil
 
 
 @njit
-def _ticks(
-    field: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
-) -> float:
+def _ticks(field: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array) -> float:
     wrench, total = np.zeros(6), 0.0
     for i in range(hands.shape[0]):
         evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)

@@ -218,9 +218,7 @@ def lifted_microseconds(m: int) -> float:
 
 
 @njit
-def _wall_many(
-    units: IntArray, feeds: IntArray, field: Compiled, memory: Array, hands: Array, wrench: Array
-) -> None:
+def _wall_many(units: IntArray, feeds: IntArray, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
         feed_maps(units, feeds, field.params, memory, hands[i])
         evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)

@@ -53,4 +53,4 @@ def test_a_process_is_started_when_a_part_is_missing_and_with_the_run_s_configur
 def test_a_robot_arm_says_what_it_needs_before_it_is_made():
     told: list[tuple[str, ...]] = []
     wire_arm(ArmConfig(), told.append)
-    assert told == [("arm", "map-4", "law-0")]
+    assert told == [("arm", "map-4", "law-follow_wrench")]
