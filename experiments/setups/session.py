@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.law import Law
 from controllers.haptic_map.base import HapticMap
-from experiments.setups.parts import Field, Parts, Settings
+from experiments.setups.parts import Parts, Settings
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import P_WH
@@ -42,7 +43,7 @@ class Session:
         return self.parts.course
 
     @property
-    def field(self) -> Field:
+    def field(self) -> Law:
         """Law of force of the mode."""
         return self.parts.field
 

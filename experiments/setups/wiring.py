@@ -21,7 +21,7 @@ from models.scene import FIGURE
 from sim.body.figure import Figure
 from sim.compilation.units import Unit
 from sim.loop.run_units import run_units
-from sim.loop.servo import Field, Servo
+from sim.loop.servo import Servo, unlinked_field
 from sim.reference.map_derivative import derivative_unit, map_derivative
 from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along, unlinked_reference
 from sim.reference.settling import stood, stood_unit
@@ -86,7 +86,7 @@ def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts]
     refined = maps.refine()
     parts = draft if refined is maps else parts_of(refined)
     servo, figure = _servo(parts, world)
-    servo = servo.linked()
+    servo = servo.linked(parts.program)
     _begin(parts, servo, world)
     return Session(parts, world, figure, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
@@ -112,28 +112,26 @@ def ticks_of(settings: Settings) -> int:
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     """Compiled code of a run."""
     more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((stood_unit(),) if parts.bends else ())
-    return run_units(servo) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
+    return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
 def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
-    memory, compiled = program.fresh_memory(), parts.maps.whole_map.compiled()
+    compiled, walker = parts.maps.whole_map.compiled(), None
     period, ticks = config.clock.servo_period, ticks_of(config)
     limiter, legs = ForceLimiter(period), packed_legs(world.figure)
     port = phantom_port(world.model, world.data, period, config.device.cutoff)
+    field = unlinked_field(program, limiter, parts.tank)
     if parts.walker is not None:
-        # The path that the figure is on is the one that the field lays.
-        compiled = compiled._replace(memory=memory)
+        # The field moves the walker, the map shows it.
+        walker = parts.walker(field.memory)
+        compiled = compiled._replace(memory=walker.path)
     figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
     servo = Servo(
         plant=make_plant(world),
         port=port,
-        field=Field(
-            units=np.zeros(0, dtype=np.int64), ops=program.ops, params=program.params, memory=memory,
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=parts.tank.params(),
-            tank=parts.tank.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
-        ),
+        field=field,
         hand=make_hand(parts.user),
         reference=unlinked_reference(
             world.figure, compiled, period * ticks, config.figure.smoothing, config.figure.blend, legs,
@@ -141,7 +139,7 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
         ),
         figure=figure.state,
         figure_ticks=ticks,
-        argument=port.hand[1:8] if parts.walker is None else memory[parts.walker],
+        argument=port.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
     return servo, figure
 
