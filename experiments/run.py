@@ -133,9 +133,8 @@ def _simulate(
         page.show(servo.plant.qpos, ticks.hand[n - 1, 1:4], ticks.force[n - 1])
 
     laws = session.parts.program.python_laws
-    loop = Loop(
-        servo, session.world, observe, python_laws=laws, block_seconds=VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
-    )
+    block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
+    loop = Loop(servo, session.world, observe, block, laws)
     first = servo.plant.period * servo.figure_ticks
     loop.run(first)
     first_tick = time.perf_counter() - started

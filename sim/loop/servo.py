@@ -86,8 +86,8 @@ class Servo(NamedTuple):
     """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
     `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or that of
-    a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the reference
-    and of what drives the body: a change in one of them is not one of the loop.
+    a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the
+    reference and of what drives the body: a change in one of them is not one of the loop.
     """
 
     plant: Plant
@@ -101,7 +101,7 @@ class Servo(NamedTuple):
     units: IntArray = np.zeros(2, dtype=np.int64)
 
     def linked(self, program: Program) -> "Servo":
-        """The same with the addresses of all kernels that it and its field's program call; compiles what is not kept."""
+        """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
         field, reference = self.field, self.reference
         return self._replace(
             units=np.array([update_unit(reference).address(), drive_unit(self.figure).address()]),

@@ -98,10 +98,10 @@ if sys.argv[1] == "deferred":
 import numpy as np
 from controllers.fields.follow import Follow
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.program import LAW_KERNELS
+from controllers.fields.follow import follow_wrench
 from numba import njit
 program = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
-law = njit(LAW_KERNELS[0].py_func)
+law = njit(follow_wrench.py_func)
 row, memory, wrench = program.ops[0], program.fresh_memory(), np.zeros(6)
 for t in np.linspace(0.0, 25.0, 200):
     hand = np.zeros(15)
