@@ -19,8 +19,8 @@ class Circle:
         [m]
     """
 
-    lap: float = above(0.0, 4.0, "s")
-    radius: float = above(0.0, 0.0477, "m")
+    lap: float = above(0.0, default=4.0, unit="s")
+    radius: float = above(0.0, default=0.0477, unit="m")
 
 
 @part
@@ -41,8 +41,8 @@ class Cylindrical:
 
     kind: Literal["cylindrical"] = "cylindrical"
     clips: tuple[str, ...] = ("squat_dance", "cheer", "angry", "spin")
-    around: Circle = Field(default_factory=Circle)
-    reach: float = above(0.0, 0.025, "m")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
 
 
@@ -60,8 +60,8 @@ class Composite:
 
     kind: Literal["composite"] = "composite"
     clips: tuple[str, ...] = ("squat_dance", "angry", "cheer")
-    around: Circle = Field(default_factory=Circle)
-    reach: float = above(0.0, 0.025, "m")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
 
 
@@ -79,8 +79,8 @@ class RiverClips:
 
     kind: Literal["rivers"] = "rivers"
     clips: tuple[str, ...] = ("squat_dance", "cheer", "angry")
-    around: Circle = Field(default_factory=Circle)
-    reach: float = above(0.0, 0.025, "m")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
 
 
@@ -102,8 +102,8 @@ class MapFile:
     kind: Literal["file"] = "file"
     file: str
     curve: str = ""
-    around: Circle = Field(default_factory=Circle)
-    reach: float = above(0.0, 0.025, "m")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
 
     @property

@@ -19,8 +19,8 @@ class OrientationMoment:
         [N m s/rad]
     """
 
-    orientation_stiffness: float = at_least(0.0, 0.0, "N m/rad")
-    orientation_damping: float = at_least(0.0, 0.0, "N m s/rad")
+    orientation_stiffness: float = at_least(0.0, default=0.0, unit="N m/rad")
+    orientation_damping: float = at_least(0.0, default=0.0, unit="N m s/rad")
 
 
 @part
@@ -33,7 +33,7 @@ class SpeedGovernor:
         Of the hand's speed beyond what is admissible [N s/m].
     """
 
-    governor_drag: float = at_least(0.0, 8.0, "N s/m")
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m")
 
 
 @part
@@ -50,9 +50,9 @@ class JointWalls:
         Greatest speed of a joint without resistance [rad/s].
     """
 
-    wall_stiffness: float = at_least(0.0, 0.1, "N m/rad")
-    wall_margin: float = at_least(1e-6, 0.09, "rad")
-    joint_speed: float = at_least(1e-6, 20.0, "rad/s", infinite=True)
+    wall_stiffness: float = at_least(0.0, default=0.1, unit="N m/rad")
+    wall_margin: float = at_least(1e-6, default=0.09, unit="rad")
+    joint_speed: float = at_least(1e-6, default=20.0, unit="rad/s", infinite=True)
 
 
 @part
@@ -72,9 +72,9 @@ class Follow:
     """
 
     kind: Literal["follow"] = "follow"
-    stiffness: float = at_least(0.0, 300.0, "N/m")
-    damping: float = at_least(0.0, 8.0, "N s/m")
-    tube: float = at_least(1e-4, 0.25, "m", infinite=True)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
     walls: JointWalls | None = None
@@ -101,9 +101,9 @@ class Bunny:
     """
 
     kind: Literal["bunny"] = "bunny"
-    stiffness: float = at_least(0.0, 300.0, "N/m")
-    damping: float = at_least(0.0, 8.0, "N s/m")
-    bunny_width: float = at_least(1e-4, 0.05, "m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    bunny_width: float = at_least(1e-4, default=0.05, unit="m")
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
     orientation: OrientationMoment | None = None
@@ -131,9 +131,9 @@ class Rivers:
     """
 
     kind: Literal["rivers"] = "rivers"
-    stiffness: float | None = above(0.0, None, "N/m")
-    damping: float | None = above(0.0, None, "N s/m")
-    river_tube: float = at_least(1e-4, 0.015, "m")
+    stiffness: float | None = above(0.0, default=None, unit="N/m")
+    damping: float | None = above(0.0, default=None, unit="N s/m")
+    river_tube: float = at_least(1e-4, default=0.015, unit="m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
@@ -161,11 +161,11 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, None, "N/m")
-    rubber: float = at_least(0.0, 150.0, "N/m")
-    tube_damping: float | None = at_least(0.0, None, "N s/m")
-    rubber_tube: float = at_least(1e-4, 0.008, "m")
-    bump: float = above(0.0, 0.5, "s")
+    seek: float | None = at_least(0.0, default=None, unit="N/m")
+    rubber: float = at_least(0.0, default=150.0, unit="N/m")
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
+    bump: float = above(0.0, default=0.5, unit="s")
     walls: JointWalls | None = None
 
 
@@ -184,14 +184,14 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, None, "N/m")
-    rubber: float = at_least(0.0, 150.0, "N/m")
-    tube_damping: float | None = at_least(0.0, None, "N s/m")
-    rubber_tube: float = at_least(1e-4, 0.008, "m")
-    bump: float = above(0.0, 0.5, "s")
-    stiffness: float = at_least(0.0, 300.0, "N/m")
-    damping: float = at_least(0.0, 8.0, "N s/m")
-    tube: float = at_least(1e-4, 0.25, "m", infinite=True)
+    seek: float | None = at_least(0.0, default=None, unit="N/m")
+    rubber: float = at_least(0.0, default=150.0, unit="N/m")
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
+    bump: float = above(0.0, default=0.5, unit="s")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     walls: JointWalls | None = None
 
 
@@ -210,9 +210,9 @@ class Lead:
     """
 
     kind: Literal["lead"] = "lead"
-    leash: float = at_least(0.0, 120.0, "N/m")
-    damping: float = at_least(0.0, 8.0, "N s/m")
-    floor_scale: float | None = at_least(1e-3, None)
+    leash: float = at_least(0.0, default=120.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    floor_scale: float | None = at_least(1e-3, default=None)
 
 
 Mode = Annotated[Follow | Bunny | Rivers | Stretch | StretchThenFollow | Lead, Field(discriminator="kind")]

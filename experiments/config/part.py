@@ -16,7 +16,7 @@ _Part = TypeVar("_Part")
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
 
 
-def at_least(least: float, default: Any = ..., unit: str = "", infinite: bool = False) -> Any:
+def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False) -> Any:
     """Number of a part that is `least` or more, by default finite; `unit` is for messages.
 
     Without a default it stands in the annotation, where the command line is to find the default itself.
@@ -24,12 +24,12 @@ def at_least(least: float, default: Any = ..., unit: str = "", infinite: bool = 
     return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
-def whole(least: int, default: Any = ...) -> Any:
+def whole(least: int, *, default: Any = ...) -> Any:
     """Whole number of a part from `least` on, within what a file's 64 bits hold."""
     return Field(default=default, ge=least, lt=2**63)
 
 
-def above(least: float, default: Any = ..., unit: str = "") -> Any:
+def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
     """Number of a part that is greater than `least`, and finite."""
     return Field(default=default, gt=least, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
@@ -100,7 +100,8 @@ def one_line(error: ValidationError, cls: type) -> str:
         infinite = field is not None and any(getattr(m, "allow_inf_nan", None) is True for m in field.metadata)
         return f"{option} is {float(first['input']):g}; expected {bound}{'' if infinite else finite}"
     if kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_positional_argument"):
-        known = ", ".join(field.name for field in fields(cast(Any, cls)))
+        within = _within(cls, place[:-1])
+        known = ", ".join(field.name for field in fields(cast(Any, within)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
     if kind == "less_than":
         return f"{option} is {first['input']}; expected less than {context['lt']}"
@@ -111,20 +112,31 @@ def one_line(error: ValidationError, cls: type) -> str:
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
     where = ".".join(map(str, place))
+    if kind in ("missing", "missing_argument"):
+        return f"{where} is missing"
     return f"{where or cls.__name__} is {first['input']!r}; {first['msg'][0].lower()}{first['msg'][1:]}"
 
 
 def _field(cls: type, place: Sequence[str | int]) -> Any:
     """Pydantic's field at a place of a part; None where there is none."""
-    found: Any = None
+    for depth in reversed(range(len(place))):
+        table = getattr(_within(cls, place[:depth]), "__pydantic_fields__", {})
+        if place[depth] in table:
+            return table[place[depth]]
+    return None
+
+
+def _within(cls: type, place: Sequence[str | int]) -> type:
+    """The part that is at a place of another."""
     for name in place:
-        # In a union the kind of the member stands in the place.
-        cls = next((m for m in get_args(cls) if getattr(m, "kind", None) == name), cls)
         table = getattr(cls, "__pydantic_fields__", {})
         if name in table:
-            found = table[name]
-            cls = found.annotation
-    return found
+            cls = table[name].annotation
+        # In a union the kind of the member, or its name, stands in the place.
+        cls = next((m for m in get_args(cls) if name in (getattr(m, "kind", None), getattr(m, "__name__", ""))), cls)
+        members = [m for m in get_args(cls) if m is not type(None)]
+        cls = members[0] if len(members) == 1 else cls
+    return cls
 
 
 def _unit(cls: type, place: Sequence[str | int]) -> str:

@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
-
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Map
 from experiments.config.modes import Follow, Mode
@@ -58,11 +56,11 @@ class Figure:
         Time in which one clip goes over into another [s].
     """
 
-    stature: float = above(0.0, DEFAULT_STATURE, "m")
-    mass: float = above(0.0, DEFAULT_MASS, "kg")
-    smoothing: float = above(0.0, 6.0, "Hz")
-    figure_ticks: int | None = whole(1, None)
-    blend: float = at_least(0.0, 0.4, "s")
+    stature: float = above(0.0, default=DEFAULT_STATURE, unit="m")
+    mass: float = above(0.0, default=DEFAULT_MASS, unit="kg")
+    smoothing: float = above(0.0, default=6.0, unit="Hz")
+    figure_ticks: int | None = whole(1, default=None)
+    blend: float = at_least(0.0, default=0.4, unit="s")
 
 
 @part
@@ -76,7 +74,7 @@ class Phantom:
     """
 
     kind: Literal["phantom"] = "phantom"
-    cutoff: float = above(0.0, 150.0, "Hz")
+    cutoff: float = above(0.0, default=150.0, unit="Hz")
 
 
 @part
@@ -113,14 +111,14 @@ class RunConfig:
         Of where exactly the hand lets go of the stylus at the start.
     """
 
-    mode: Mode = Field(default_factory=Follow)
-    map: Map = Field(default_factory=Cylindrical)
-    user: User = Field(default_factory=User)
-    figure: Figure = Field(default_factory=Figure)
-    device: Phantom = Field(default_factory=Phantom)
-    clock: Clock = Field(default_factory=Clock)
-    seconds: float = above(0.0, 20.0, "s")
-    seed: int = whole(0, 1)
+    mode: Mode = Follow()
+    map: Map = Cylindrical()
+    user: User = User()
+    figure: Figure = Figure()
+    device: Phantom = Phantom()
+    clock: Clock = Clock()
+    seconds: float = above(0.0, default=20.0, unit="s")
+    seed: int = whole(0, default=1)
 
     def __post_init__(self) -> None:
         if (self.mode.kind == "lead") != (self.map.kind == "led"):

@@ -29,7 +29,7 @@ _NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADD
 class Word:
     """An option: its type, what it means, and the parts that it belongs to."""
 
-    type: Any
+    hint: Any
     help: str
     parts: tuple[type, ...]
 
@@ -59,7 +59,7 @@ def _vocabulary() -> dict[str, Word]:
                 shown = f" Default: {_shown(default)}." if default not in (None, "", False) else ""
                 words[option.name] = Word(_plain(hints[option.name]), said + shown, (cls,))
             else:
-                words[option.name] = Word(known.type, known.help, (*known.parts, cls))
+                words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
     return words
 
 
@@ -183,9 +183,11 @@ class _Words:
 
 def _kind(cls: type) -> str:
     """How a part is chosen on the command line."""
-    added = next((f"--{name}" for name, part in ADDED.items() if part is cls), None)
+    added = next((name for name, part in ADDED.items() if part is cls), None)
+    if added in _SWITCHES:
+        return f"--{added}"
     if added is not None:
-        return added
+        return ", ".join(_kind(mode) for mode in MODES if added in _names(mode))
     kind = cast(Any, cls).__pydantic_fields__.get("kind")
     what = "--map" if cls in MAPS else "--mode"
     if cls is MapFile:
@@ -211,7 +213,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     for name in _SWITCHES:
         yield option(name, bool, (ADDED[name].__doc__ or "").strip().split("\n")[0], False)
     for name, word in VOCABULARY.items():
-        yield option(name, word.type, word.help, () if name == "clips" else False if word.type is bool else None)
+        yield option(name, word.hint, word.help, () if name == "clips" else False if word.hint is bool else None)
 
 
 RunOptions = make_dataclass("RunOptions", list(_options()), frozen=True)
@@ -227,20 +229,31 @@ def config_of_options(options: object) -> RunConfig:
         As `run_config`, or if the file holds no configuration.
     """
     given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
-    given = {name: value for name, value in given.items() if value not in (None, False, "", ())}
+    # A zero is given, although it equals False.
+    given = {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
     file = given.pop("config", None)
     return run_config(**given) if file is None else changed(load_config(cast(Path, file)), given)
 
 
 def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
-    """A configuration with some of its words changed.
+    """A configuration with some of its words changed; a mode or a map of another kind begins with its own defaults.
 
     Raises
     ------
     ParameterError
         As `run_config`.
     """
-    return run_config(**(words_of(config) | dict(words)))  # pyright: ignore[reportArgumentType]
+    kept, left = words_of(config), set[str]()
+    kinds = str(words.get("mode", config.mode.kind)), str(words.get("map", kept.get("map", "")))
+    leads = (kinds[0] == "lead") != (config.mode.kind == "lead")
+    if kinds[0] != config.mode.kind:
+        left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
+    if leads or ("file" if kinds[1].endswith(MAP_SUFFIX) else kinds[1]) != config.map.kind:
+        left |= _names(type(config.map)) | _names(Circle) | {"map"}
+    if leads:
+        left |= {"user"}
+    kept = {name: value for name, value in kept.items() if name not in left}
+    return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
 
 
 def words_of(config: RunConfig) -> dict[str, object]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 
+from experiments.config.modes import Follow, Rivers, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.bunny import bunny_laws, bunny_parts
 from experiments.setups.certified_law import CertifiedLaw
@@ -31,6 +32,18 @@ LANDS = ("file", "rivers", "led")
 """Kinds of map whose clips are played as they are: a foot lands between two updates of the figure."""
 
 
+def _no_drag(mode: object) -> float:
+    return 0.0
+
+
+def _damping(mode: Follow | StretchThenFollow) -> float:
+    return mode.damping
+
+
+def _river_drag(mode: Rivers) -> float:
+    return gains(mode)[1]
+
+
 class ModeSetup(NamedTuple):
     """What a mode makes of a configuration.
 
@@ -49,7 +62,7 @@ class ModeSetup(NamedTuple):
 
     parts: Callable[..., Parts]
     laws: Callable[..., dict[str, CertifiedLaw]]
-    drag: Callable[..., float] = lambda mode: 0.0
+    drag: Callable[..., float] = _no_drag
     soft: dict[str, float] = {}  # noqa: RUF012 - never written
     firm: dict[str, float] = {}  # noqa: RUF012
 
@@ -61,22 +74,21 @@ def _pair(gains: tuple[float, float], names: tuple[str, str]) -> dict[str, float
 _K_B, _SEARCH = ("stiffness", "damping"), ("seek", "tube_damping")
 _SOFT, _FIRM = _pair((SOFT_SEEK, SOFT_DAMPING), _SEARCH), _pair((SEEK, DAMPING), _SEARCH)
 MODE_SETUPS = {
-    "follow": ModeSetup(follow_parts, follow_laws, lambda mode: mode.damping),
+    "follow": ModeSetup(follow_parts, follow_laws, _damping),
     "bunny": ModeSetup(bunny_parts, bunny_laws),
     "rivers": ModeSetup(
         rivers_parts,
         rivers_laws,
-        lambda mode: gains(mode)[1],
+        _river_drag,
         _pair(GAINS["file"], _K_B),
         _pair(GAINS["default"], _K_B),
     ),
     "stretch": ModeSetup(stretch_parts, stretch_laws, soft=_SOFT, firm=_FIRM),
-    "stretch-then-follow": ModeSetup(
-        stretch_then_follow_parts, stretch_then_follow_laws, lambda mode: mode.damping, _SOFT, _FIRM
-    ),
+    "stretch-then-follow": ModeSetup(stretch_then_follow_parts, stretch_then_follow_laws, _damping, _SOFT, _FIRM),
     "lead": ModeSetup(lead_parts, lead_laws),
 }
 """By kind of mode."""
+_MAPS: dict[str, Callable[..., MapParts[Any]]] = {**MAP_SETUPS, "led": led_parts}
 
 
 def resolved(config: RunConfig) -> RunConfig:
@@ -99,8 +111,7 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
     remarks: tuple[str, ...] = ()
     if clips is None:
         clips, remarks = load_clips(config.map.clips)
-    setup = (MAP_SETUPS | {"led": led_parts})[config.map.kind]
-    return setup(config, config.map, clips, figure).said(remarks)
+    return _MAPS[config.map.kind](config, config.map, clips, figure).said(remarks)
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from controllers.state import HandState
+from experiments.config.part import to_dict
 from experiments.config.words import run_config
-from experiments.run import config_dict
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from sim.devices.base import Device, DeviceError
@@ -29,7 +29,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.h5"
     config = run_config(clips=("cheer",), seconds=TICKS * 1e-3)
     session = wire(config)
-    with Recorder(path, config_dict(config), config.seed, groups(session.servo), session.static()) as recorder:
+    with Recorder(path, to_dict(config), config.seed, groups(session.servo), session.static()) as recorder:
         Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(config.seconds)
     return path
 

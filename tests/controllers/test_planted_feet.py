@@ -12,9 +12,9 @@ from controllers.haptic_map.led import Led
 from controllers.legs.planted import levels, planted_ends, window
 from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
-from experiments.config.words import run_config
+from experiments.config.modes import Lead
 from experiments.setups.figure_legs import figure_legs
-from experiments.setups.lead import law, led_map
+from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, load_clip
@@ -126,7 +126,7 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
     led, gait = led_map(clip, figure_legs(figure))
     assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
     # Its limbs swing as fast already as they do in the run.
-    assert law(run_config(mode="lead"), gait).forward == 1.0
+    assert leading(Lead(), gait).forward == 1.0
     # Of its six steps the lap that repeats itself best has two.
     assert led.stride == pytest.approx(2 * Capture.step)
     assert 0.4 < led.pace < 0.8

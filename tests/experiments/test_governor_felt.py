@@ -58,7 +58,7 @@ def test_a_run_governs_its_field_by_its_own_animation():
     config = run_config(clips=("backflip",), governor=True, seconds=1.0)
     session = wire(config)
     assert isinstance(session.field, Governed)
-    assert session.field.governor.speeds[:, 0].max() > session.curve.length / config.lap
+    assert session.field.governor.speeds[:, 0].max() > session.curve.length / config.map.around.lap
     plain = wire(run_config(clips=("backflip",), seconds=1.0), session.clips)
     assert session.servo.field.budget[0] > plain.servo.field.budget[0]
     gated = wire(run_config(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True), load_clips(
@@ -70,10 +70,12 @@ def test_a_run_governs_its_field_by_its_own_animation():
 def test_a_curve_under_which_nobody_flies_asks_for_no_speed():
     config = run_config(clips=("cheer", "angry"))
     session = wire(config)
-    clip = animation_along(session.haptic_map, Trajectory.circle(config.radius, config.lap))
+    clip = animation_along(
+        session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, config.map.around.lap)
+    )
     assert not clip_ballistics(clip).flights
 
 
 def test_a_curve_that_is_bent_has_no_governor():
-    with pytest.raises(ParameterError, match="no governor"):
+    with pytest.raises(ParameterError, match="--governor has no meaning with --mode stretch"):
         wire(run_config(mode="stretch", governor=True, clips=("cheer",)), load_clips(("cheer",))[0])

@@ -11,8 +11,8 @@ import numpy as np
 from controllers.fields.leading import Gait
 from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
-from experiments.config.words import run_config
-from experiments.setups.lead import law, leading_hand
+from experiments.config.modes import Lead
+from experiments.setups.lead import leading, leading_hand
 from sim.users.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")
@@ -21,7 +21,7 @@ MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 19.0, 250
 
 
 def _run() -> dict[str, list]:
-    field = law(run_config(mode="lead"), GAIT)
+    field = leading(Lead(), GAIT)
     program, arm = field.program(), leading_hand(field).compiled()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
     p, v, ways = np.array([*field.start, 0.001]), np.zeros(3), []

@@ -5,7 +5,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from experiments.setups.modes import river_bundle
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
@@ -15,6 +14,7 @@ from experiments.setups.balance import nearest_supported
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.rests import with_rests
+from experiments.setups.rivers import river_bundle
 from experiments.setups.stylus import stylus_path
 from experiments.studies.change_trials import (
     BLEND,

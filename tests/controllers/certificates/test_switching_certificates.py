@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from experiments.setups.modes import law
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
@@ -17,6 +16,7 @@ from experiments.certify.certified_rivers import certified_bundle, certify_river
 from experiments.certify.certify import certified_rivers
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.words import run_config
+from experiments.setups.rivers import default_choice, law_of
 from experiments.studies.switching_trials import straight_pair, trials
 
 CLOCK = Sampling(1e-3)
@@ -183,7 +183,7 @@ def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
-    found, field = verdict.counterexample, law(config, curve)
+    found, field = verdict.counterexample, law_of(config.mode, default_choice(config.mode, curve, config.map.reach))
     way = _in_mujoco(field, clock, found)
     ended = failure(way.river, clock.period, found["river"], any(found["force"]))
     assert ended.kind == found["kind"]

@@ -16,6 +16,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.river import River
 from controllers.state import HandState
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 from experiments.studies.field_figures import SPEED, crossing, eight, straight_river
 
 SCALE = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
