@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from experiments.setups.modes import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 from field_probes import force_of, largest_jump, mass_in, run_over
 from hypothesis import given, settings
 from hypothesis import strategies as st
