@@ -70,7 +70,9 @@ def test_a_run_governs_its_field_by_its_own_animation():
 def test_a_curve_under_which_nobody_flies_asks_for_no_speed():
     config = run_config(clips=("cheer", "angry"))
     session = wire(config)
-    clip = animation_along(session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, config.map.around.lap))
+    clip = animation_along(
+        session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, config.map.around.lap)
+    )
     assert not clip_ballistics(clip).flights
 
 

@@ -15,14 +15,16 @@ from sim.errors import SimError
 from sim.loop.loop import Loop
 
 CONFIG = run_config(clips=("cheer", "angry"), seconds=0.2)
-FOLLOW = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube).program()
+AROUND, MODE = CONFIG.map.around, CONFIG.mode
+LAW = Follow(Trajectory.circle(AROUND.radius, AROUND.lap), MODE.stiffness, MODE.damping, MODE.tube)
+FOLLOW = LAW.program()
 
 
 def _run(program, seconds=0.2):
     logs = []
 
     def keep(ticks, frames, n):
-        m = -(-n // CONFIG.figure_ticks)
+        m = -(-n // session.servo.figure_ticks)
         logs.append([a[:n].copy() for a in ticks] + [a[:m].copy() for a in frames])
 
     session, loop = loop_with(CONFIG, program, keep)
@@ -58,9 +60,8 @@ def test_a_tick_with_a_law_in_python_is_the_compiled_tick_to_the_last_bit():
 
 
 def test_a_built_in_law_called_from_python_gives_the_same_run_to_the_last_digits():
-    law = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube)
     _, plain = _run(FOLLOW)
-    _, logged = _run(PythonLaw(lambda hand: law.wrench(hand).force).program())
+    _, logged = _run(PythonLaw(lambda hand: LAW.wrench(hand).force).program())
     np.testing.assert_allclose(logged[-1][0][:, 1:4], plain[-1][0][:, 1:4], atol=2e-5)
 
 

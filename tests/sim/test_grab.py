@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.run_config import Phantom
 from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
@@ -79,7 +79,7 @@ def test_the_device_tells_of_the_switch() -> None:
     world = World()
     world.reset(np.array([0.03, 0.02, 0.02]), rest_pose())
     arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), duration=0.03, hold=0.0),))
-    with SimulatedPhantom(world, arm, run_config().cutoff) as phantom:
+    with SimulatedPhantom(world, arm, Phantom().cutoff) as phantom:
         switches = []
         for _ in range(80):
             switches.append(phantom.read().switch)
