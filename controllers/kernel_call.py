@@ -5,6 +5,7 @@ each is compiled, and kept, by itself. Calling convention and errors are those o
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, cast
 
 from numba import types
@@ -52,3 +53,11 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     with cgutils.if_unlikely(builder, status.is_error):
         convention.return_status_propagate(builder, status)
     return context.get_dummy_value()
+
+
+@cache
+def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
+    """Address of a kernel, an ``njit`` function, compiled in this process for these types; it stays alive."""
+    kernel.compile(arguments)
+    compiled = kernel.get_compile_result(types.void(*arguments))
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

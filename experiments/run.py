@@ -1,8 +1,10 @@
 """A run from a configuration to a folder: recording, summary, animations, figures, page."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from rich.console import Console
@@ -74,8 +76,9 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     for remark in session.remarks:
         console.print(remark, highlight=False)
     clear_folder(out)
-    (out / CONFIG).write_text(to_json(session.config), encoding="utf-8")
-    summary = record(session, out, session.config.seconds, started, console, view)
+    whole = cast(RunConfig, session.config)
+    (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
+    summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
     write_animations(out, session)
     (out / SUMMARY).write_text(json_text(asdict(summary) | {"lines": summary.lines()}) + "\n", encoding="utf-8")
     write_report_of(out)
@@ -86,8 +89,9 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
 
 
 def record(
-    session: Session, out: Path, seconds: float, started: float, console: Console, view: bool = False
-) -> RunSummary:
+    session: Session, out: Path, config: Mapping[str, object], seconds: float, started: float, console: Console,
+    view: bool = False,
+) -> RunSummary:  # fmt: skip
     """Run a session and record it into a folder that is there; returns what happened.
 
     Parameters
@@ -96,6 +100,8 @@ def record(
         That has not begun.
     out : Path
         Folder.
+    config : Mapping
+        What it was made of, as the recording keeps it.
     seconds : float
         Simulated time [s].
     started : float
@@ -105,7 +111,7 @@ def record(
     view : bool
         As in `run`.
     """
-    servo, config = session.servo, to_dict(session.config)
+    servo = session.servo
     with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
@@ -126,7 +132,9 @@ def _simulate(
         record(ticks, frames, n)
         page.show(servo.plant.qpos, ticks.hand[n - 1, 1:4], ticks.force[n - 1])
 
-    loop = Loop(servo, session.world, observe, block_seconds=VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS)
+    laws = session.parts.program.python_laws
+    block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
+    loop = Loop(servo, session.world, observe, block, laws)
     first = servo.plant.period * servo.figure_ticks
     loop.run(first)
     first_tick = time.perf_counter() - started

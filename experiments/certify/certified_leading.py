@@ -40,7 +40,7 @@ def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
         If a number is out of its interval, or the clip cannot be led.
     """
     figure = figure_model(config.scene.stature, config.scene.mass)
-    return leading(mode, led_map(clip, figure_legs(figure), 0)[1])
+    return leading(mode, led_map(clip, figure_legs(figure))[1])
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:

@@ -21,7 +21,7 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
         return _clips_of_rivers(session, stride)
     kind, params, memory = session.haptic_map.compiled()
     if session.parts.walker is not None:
-        memory = session.servo.field.memory.copy()
+        memory = session.parts.walker(session.servo.field.memory).path.copy()
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         poses = np.empty((len(nearest), session.haptic_map.nq))

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,7 +19,7 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
-from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
+from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
@@ -42,24 +43,60 @@ AnyMap = Cylindrical | Composite | RiverClips | MapFile
 LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other
 
 
-def _cylindrical_parts(
-    config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel
-) -> ClipMapParts:
-    motions = _motions(clips, 4, part.kind)
-    curve, radii = _circle(part.around), _radii(part)
-    made = _cylinder(motions, radii, (-part.reach, part.reach), figure_legs(figure))
-    parts = _about_circle(part, made, clips, curve)
-    return replace(parts, refined=lambda: balanced(made, figure, part.around.lap))
+class Place(NamedTuple):
+    """Where a map of clips lies about its curve.
+
+    Attributes
+    ----------
+    curve : Trajectory
+        A lap about the z axis, timed as the hand is to move.
+    radius : float
+        Of the middle of the map's domain [m].
+    reach : float
+        Half width of the domain in radius and in height [m].
+    expressive : bool
+        Whether the stylus's orientation turns the figure.
+    """
+
+    curve: Trajectory
+    radius: float
+    reach: float
+    expressive: bool
 
 
-def _composite_parts(
-    config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel
-) -> ClipMapParts:
-    lower, red, blue = _motions(clips, 3, part.kind)
-    legs = figure_legs(figure)
+def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+    """Four clips at the corners of a cylinder; fewer are repeated.
+
+    Raises
+    ------
+    ControllerError
+        If there are none, or more than four, or they do not fit together.
+    """
+    motions, reach = _motions(clips, 4, "cylindrical"), place.reach
+    made = _cylinder(motions, (place.radius - reach, place.radius + reach), (-reach, reach), figure_legs(figure))
+    return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
+
+
+def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+    """The lower body of the first clip, the upper body blended between two more; fewer are repeated.
+
+    Raises
+    ------
+    ControllerError
+        If there are none, or more than three, or they do not fit together.
+    """
+    lower, red, blue = _motions(clips, 3, "composite")
+    legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
     upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    made = CompositeMap(lower, red, blue, sorted(upper), _radii(part), legs)
-    return _about_circle(part, made, clips, _circle(part.around))
+    return _about_circle(place, CompositeMap(lower, red, blue, sorted(upper), radii, legs), clips)
+
+
+def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    return cylindrical_parts(clips, _place(part), figure)
+
+
+def _composite(config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    return composite_parts(clips, _place(part), figure)
 
 
 def _river_clips_parts(
@@ -68,10 +105,10 @@ def _river_clips_parts(
     mode = config.mode
     if not isinstance(mode, Rivers) or mode.crossing == "sum":
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
-    motions, curve = _motions(clips, 3, part.kind), _circle(part.around)
-    curves = [river.curve for river in default_choice(mode, curve, part.reach).bundle.rivers]
+    motions, place = _motions(clips, 3, part.kind), _place(part)
+    curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
     made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure))
-    parts = _about_circle(part, made, clips, curve)
+    parts = _about_circle(place, made, clips)
     return replace(parts, moves=True, plays_rivers=True, refined=lambda: with_rests(made, figure))
 
 
@@ -83,26 +120,27 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
     else:
-        parts = _about_circle(part, made, clips, _circle(part.around))
+        parts = _about_circle(_place(part), made, clips)
     remark = f"the clips are those of the map: {', '.join(made.names)}"
     return replace(parts.said((remark,)), static={"map_sha256": map_digest(path)})
 
 
 MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
-    "cylindrical": _cylindrical_parts,
-    "composite": _composite_parts,
+    "cylindrical": _cylindrical,
+    "composite": _composite,
     "rivers": _river_clips_parts,
     "file": _file_parts,
 }
 """What each kind of map gives a run."""
 
 
-def _about_circle(part: AnyMap, made: ClipMap, clips: tuple[Clip, ...], curve: Trajectory) -> ClipMapParts:
+def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipMapParts:
+    curve, reach = place.curve, place.reach
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
-        rivers=lambda mode: default_choice(mode, curve, part.reach),
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
+        rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds), course=lambda damping: curve,
-        expressive=part.expressive, held_seconds=made.lap_seconds,
+        expressive=place.expressive, held_seconds=made.lap_seconds,
     )  # fmt: skip
 
 
@@ -124,22 +162,23 @@ def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array,
     return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
 
 
-def _circle(around: Circle) -> Trajectory:
-    """The default curve.
+def _place(part: AnyMap) -> Place:
+    around = part.around
+    curve = reached(Trajectory.circle(around.radius, around.lap))
+    return Place(curve, around.radius, part.reach, part.expressive)
+
+
+def reached(curve: Trajectory) -> Trajectory:
+    """The curve, if the Phantom reaches it.
 
     Raises
     ------
     SimError
-        If the Phantom does not reach it.
+        If it does not.
     """
-    curve = Trajectory.circle(around.radius, around.lap)
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
     return curve
-
-
-def _radii(part: AnyMap) -> tuple[float, float]:
-    return part.around.radius - part.reach, part.around.radius + part.reach
 
 
 def _cylinder(

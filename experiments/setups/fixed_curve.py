@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.fields.orientation import Orientation
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
@@ -15,7 +15,7 @@ from experiments.results.measures import trace_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import tank_for
 from experiments.setups.hands import handled, resolved_user, turning_remark, user_arm
-from experiments.setups.parts import ClipMapParts, Field, Measuring, Notes, Parts
+from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from sim.users.intent import Push
@@ -28,7 +28,7 @@ class FixedField(NamedTuple):
 
     Attributes
     ----------
-    law : Field
+    law : Law
         Law of force, governed if it is.
     course : Trajectory
         Along which it leads.
@@ -46,7 +46,7 @@ class FixedField(NamedTuple):
         Default of a hand that pushes.
     """
 
-    law: Field
+    law: Law
     course: Trajectory
     power: float
     springs: Sequence[tuple[float, float]]

@@ -7,12 +7,11 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.governor import Governor
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
-from controllers.state import HandState, Wrench
 from experiments.config.modes import SpeedGovernor
-from experiments.setups.parts import ClipMapParts, Field
+from experiments.setups.parts import ClipMapParts
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 
@@ -77,7 +76,7 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 
-def governed(governor: SpeedGovernor | None, law: Field, curve: Trajectory, maps: ClipMapParts) -> tuple[Field, float]:
+def governed(governor: SpeedGovernor | None, law: Law, curve: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
     """A field over a curve with the governor of the animation under it, and the speed [m/s] to which that urges a hand.
 
     Raises
@@ -93,16 +92,12 @@ def governed(governor: SpeedGovernor | None, law: Field, curve: Trajectory, maps
 
 
 @dataclass(frozen=True, eq=False)
-class Governed:
+class Governed(Law):
     """A field over a curve together with the governor of the animation under it."""
 
-    field: Field
+    field: Law
     governor: Governor
 
     def program(self) -> Program:
         """Compiled form of the sum."""
-        return self.field.program() + self.governor.program()
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Sum of both at one hand state."""
-        return Wrench(self.field.wrench(hand).force + self.governor.wrench(hand).force, np.zeros(3))
+        return self.field + self.governor

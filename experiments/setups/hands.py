@@ -116,7 +116,7 @@ def handled(user: User) -> tuple[tuple[float, float], ...]:
     """From and until when [s] a hand does something else than push: it grabs or traces."""
     if user.does == "trace":
         return ((0.0, np.inf),)
-    return tuple((grab.start, grab.end) for grab in user.grabs)
+    return tuple((grab.at, grab.end) for grab in user.grabs)
 
 
 def turning_remark(user: User, expressive: bool) -> tuple[str, ...]:

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, PATH, Gait, Leading
+from controllers.fields.leading import Gait, Leading
 from controllers.haptic_map.led import Led
 from controllers.legs.grounded import runs
 from controllers.legs.limbs import Limb
@@ -50,7 +49,7 @@ _FLYING_LATERAL = 1.2
 _RUNNING_FORWARD = 1.0
 
 
-def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
+def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
 
     Raises
@@ -68,7 +67,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
+    led = Led((clip.poses, clip.fps), legs, phases[first], standing, None if made else Capture(CONTACT_RADIUS))
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
@@ -170,7 +169,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
     """
     if len(clips) != 1:
         raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
-    made, gait = led_map(clips[0], figure_legs(figure), TRACE_SIZE + PATH)
+    made, gait = led_map(clips[0], figure_legs(figure))
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
         refined=lambda: balanced_on_ground(made, gait, figure),
@@ -185,7 +184,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
     gait = field.gait
     static = {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
-    notes, at = Notes(0.0, "", "the figure's path", "leads", static), TRACE_SIZE + ARGUMENT
+    notes = Notes(0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
         lead = lead_summary(of.recording, field, of.memory, config.scene, summary.figure.fell_at)
@@ -193,7 +192,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
 
     return Parts(
         config=config, maps=maps, field=field, program=field.program(), course=course, user=leading_hand(field),
-        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=slice(at, at + 7),
+        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=field.walker,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law
 from controllers.safety.energy_tank import EnergyTank
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
@@ -12,7 +12,7 @@ from sim.loop.loop import Loop, Observer
 
 def loop_with(
     config: RunConfig,
-    program: Program,
+    law: Law,
     observe: Observer = lambda ticks, frames, n: None,
     tank: EnergyTank | None = None,
 ) -> tuple[Session, Loop]:
@@ -22,7 +22,7 @@ def loop_with(
     ----------
     config : RunConfig
         Everything but the field: clips, hand, figure, device.
-    program : Program
+    law : Law
         The field; its laws in Python are called at every tick.
     observe : Observer
         What is done with each block of ticks.
@@ -34,7 +34,7 @@ def loop_with(
     ModelError, ControllerError, SimError
         As `experiments.setups.wiring.wire`.
     """
-    session = wire(config)
+    session, program = wire(config), law.program()
     field = session.servo.field.of(program)
     if tank is not None:
         field = field._replace(budget=tank.params(), tank=tank.fresh_memory())

@@ -8,16 +8,18 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
-from controllers.state import Array, HandState, Wrench
+from controllers.state import Array
+from controllers.walking.walker import Walker
 from experiments.config.modes import Rivers
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import Clock, Figure, Phantom
 from experiments.results.summary import RunSummary
 from experiments.setups.expression import expressive_figure
 from models.mocap.clip import Clip
+from models.scene import SceneConfig
 from sim.body.figure import FigureGains
 from sim.recording.recording import Recording
 from sim.users.arm import Arm
@@ -28,15 +30,32 @@ Static = Mapping[str, npt.ArrayLike | str]
 """What a recording keeps beside its channels."""
 
 
-class Field(Protocol):
-    """A law of force: evaluated from Python, or compiled into the servo."""
+class Settings(Protocol):
+    """What of a run is not its field, its map or its hand."""
 
-    def program(self) -> Program:
-        """Compiled form."""
+    @property
+    def figure(self) -> Figure:
+        """The figure."""
         ...
 
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state."""
+    @property
+    def device(self) -> Phantom:
+        """The device."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """The rates."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Of where exactly the hand lets go."""
+        ...
+
+    @property
+    def scene(self) -> SceneConfig:
+        """Of the world."""
         ...
 
 
@@ -197,11 +216,11 @@ class Parts:
 
     Attributes
     ----------
-    config : RunConfig
-        With all that was left to defaults.
+    config : Settings
+        Of figure, device and clock, with all that was left to defaults; of a configured run its `RunConfig`.
     maps : MapParts
         The map, its clips and its curve.
-    field : Field
+    field : Law
         Law of force of the mode.
     program : Program
         The field as it runs, with all that is added.
@@ -219,8 +238,8 @@ class Parts:
         Whether the curve is bent, so that the figure begins at rest.
     held_seconds : float
         Where a hand may hold the figure in the middle of a flight, time of the clips [s].
-    walker : slice or None
-        Where in the field's memory the map's argument is; None: it is where the stylus is.
+    walker : callable, optional
+        From the field's memory to the walker whose place is the map's argument; by default that is where the stylus is.
     argument_at : callable
         From nearest points (n, 3) and phases (n,) to what the default animation is evaluated at, (n, 7).
     handled : tuple of (float, float)
@@ -231,9 +250,9 @@ class Parts:
         What the mode adds to a summary.
     """
 
-    config: RunConfig
+    config: Settings
     maps: MapParts[HapticMap]
-    field: Field
+    field: Law
     program: Program
     course: Trajectory
     user: Arm
@@ -243,7 +262,7 @@ class Parts:
     argument_at: Callable[[Array, Array], Array]
     bends: bool = False
     held_seconds: float = 0.0
-    walker: slice | None = None
+    walker: Callable[[Array], Walker] | None = None
     handled: tuple[tuple[float, float], ...] = ()
     remarks: tuple[str, ...] = ()
     summarise: Callable[[RunSummary, Measuring], RunSummary] = lambda summary, of: summary

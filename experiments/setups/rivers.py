@@ -8,6 +8,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.law import Law
 from controllers.fields.river import River
 from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Rivers
@@ -16,7 +17,7 @@ from experiments.setups.budget import fastest
 from experiments.setups.certified_law import CertifiedLaw
 from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.governor import governed, speeds_along
-from experiments.setups.parts import ClipMapParts, Field, Notes, Parts, RiverChoice, Static
+from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
 
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
 # at a right angle is not: it is √2 from it.
@@ -77,8 +78,8 @@ def river_time(mode: Rivers) -> float:
     return damping / stiffness
 
 
-def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Field:
-    """Field of rivers: their sum, or of higher order."""
+def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
+    """Law of rivers: their sum, or of higher order."""
     bundle, pace, hysteresis = choice
     if mode.crossing == "sum":
         return bundle

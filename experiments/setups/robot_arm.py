@@ -20,7 +20,7 @@ from models.scene import PHANTOM
 from sim.body.robot import robot_state
 from sim.compilation.units import Unit
 from sim.loop.run_units import run_units
-from sim.loop.servo import Field, Servo
+from sim.loop.servo import Servo, unlinked_field
 from sim.reference.reference import check_reference, poses_along, unlinked_reference
 from sim.users.arm import Arm
 from sim.world.phantom_port import phantom_port
@@ -91,11 +91,7 @@ def wire_arm(
     servo = Servo(
         plant=make_plant(world),
         port=port,
-        field=Field(
-            units=np.zeros(0, dtype=np.int64), ops=program.ops, params=program.params, memory=program.fresh_memory(),
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
-            wrench=np.zeros(6), force=np.zeros(3),
-        ),
+        field=unlinked_field(program, limiter, tank),
         hand=make_hand(Arm(pushes=pushes)),
         reference=unlinked_reference(world.arm, nothing, arm_period, config.smoothing),
         figure=robot_state(world, RATE),
@@ -103,8 +99,8 @@ def wire_arm(
         argument=port.hand[1:8],
     )  # fmt: skip
     # The map looks at its domain with compiled code, when everything else has been checked.
-    ready(run_units(servo))
+    ready(run_units(servo, program))
     compiled = robot_arm_map().compiled()
     world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
     reference = unlinked_reference(world.arm, compiled, arm_period, config.smoothing)
-    return servo._replace(reference=reference).linked(), world, curve
+    return servo._replace(reference=reference).linked(program), world, curve

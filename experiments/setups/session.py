@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.law import Law
 from controllers.haptic_map.base import HapticMap
-from experiments.config.run_config import RunConfig
-from experiments.setups.parts import Field, Parts
+from experiments.setups.parts import Parts, Settings
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import P_WH
@@ -28,8 +28,8 @@ class Session:
     remarks: tuple[str, ...]
 
     @property
-    def config(self) -> RunConfig:
-        """The configuration, with all that was left to defaults."""
+    def config(self) -> Settings:
+        """Figure, device and clock; of a configured run its `RunConfig`, with all that was left to defaults."""
         return self.parts.config
 
     @property
@@ -43,7 +43,7 @@ class Session:
         return self.parts.course
 
     @property
-    def field(self) -> Field:
+    def field(self) -> Law:
         """Law of force of the mode."""
         return self.parts.field
 

@@ -12,7 +12,7 @@ from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
-from experiments.setups.parts import MapParts, Parts
+from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of, resolved
 from experiments.setups.stylus import UPRIGHT, stylus_path
@@ -21,7 +21,7 @@ from models.scene import FIGURE
 from sim.body.figure import Figure
 from sim.compilation.units import Unit
 from sim.loop.run_units import run_units
-from sim.loop.servo import Field, Servo
+from sim.loop.servo import Servo, unlinked_field
 from sim.reference.map_derivative import derivative_unit, map_derivative
 from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along, unlinked_reference
 from sim.reference.settling import stood, stood_unit
@@ -53,53 +53,85 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
-    _check_rates(config)
+    if config.seconds < 2.0 * config.clock.servo_period * ticks_of(config):
+        least = 2.0 * config.clock.servo_period * ticks_of(config)
+        raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
+    check_rates(config)
     world = World(config.scene)
-    maps = map_parts(config, world.figure, clips)
-    draft = parts_of(config, maps)
+    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
+
+
+def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready) -> Session:
+    """Put the parts of a run together that a map makes.
+
+    Parameters
+    ----------
+    world : World
+        That is stepped.
+    maps : MapParts
+        The map.
+    parts_of : callable
+        From the map to the parts; called again when the map has been improved.
+    ready : callable
+        See `Ready`.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `wire`.
+    """
+    draft = parts_of(maps)
     ready(_units(draft, _servo(draft, world)[0]))
     # Whatever takes compiled code to find is found when everything has been checked.
     refined = maps.refine()
-    parts = draft if refined is maps else parts_of(config, refined)
+    parts = draft if refined is maps else parts_of(refined)
     servo, figure = _servo(parts, world)
-    servo = servo.linked()
+    servo = servo.linked(parts.program)
     _begin(parts, servo, world)
     return Session(parts, world, figure, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
 
-def _check_rates(config: RunConfig) -> None:
-    config.scene.substeps()
-    period = config.clock.servo_period * (config.figure.figure_ticks or 1)
-    if config.seconds < 2.0 * period:
-        raise ParameterError(f"a run of {config.seconds} s; expected {2.0 * period:g} s or more, and finite")
-    check_reference(period, config.figure.smoothing, config.figure.blend)
+def check_rates(settings: Settings) -> None:
+    """Refuse rates that do not divide, or cannot be filtered.
+
+    Raises
+    ------
+    ModelError, SimError
+        If they are so.
+    """
+    settings.scene.substeps()
+    figure = settings.figure
+    check_reference(settings.clock.servo_period * ticks_of(settings), figure.smoothing, figure.blend)
+
+
+def ticks_of(settings: Settings) -> int:
+    """Servo ticks between two updates of the figure."""
+    return settings.figure.figure_ticks or 1
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     """Compiled code of a run."""
     more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((stood_unit(),) if parts.bends else ())
-    return run_units(servo) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
+    return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
 def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
-    memory, compiled = program.fresh_memory(), parts.maps.whole_map.compiled()
-    period, ticks = config.clock.servo_period, config.figure.figure_ticks or 1
+    compiled, walker = parts.maps.whole_map.compiled(), None
+    period, ticks = config.clock.servo_period, ticks_of(config)
     limiter, legs = ForceLimiter(period), packed_legs(world.figure)
     port = phantom_port(world.model, world.data, period, config.device.cutoff)
+    field = unlinked_field(program, limiter, parts.tank)
     if parts.walker is not None:
-        # The path that the figure is on is the one that the field lays.
-        compiled = compiled._replace(memory=memory)
+        # The field moves the walker, the map shows it.
+        walker = parts.walker(field.memory)
+        compiled = compiled._replace(memory=walker.path)
     figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
     servo = Servo(
         plant=make_plant(world),
         port=port,
-        field=Field(
-            units=np.zeros(0, dtype=np.int64), ops=program.ops, params=program.params, memory=memory,
-            limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=parts.tank.params(),
-            tank=parts.tank.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
-        ),
+        field=field,
         hand=make_hand(parts.user),
         reference=unlinked_reference(
             world.figure, compiled, period * ticks, config.figure.smoothing, config.figure.blend, legs,
@@ -107,7 +139,7 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
         ),
         figure=figure.state,
         figure_ticks=ticks,
-        argument=port.hand[1:8] if parts.walker is None else memory[parts.walker],
+        argument=port.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
     return servo, figure
 

@@ -16,8 +16,8 @@ from numba import njit
 
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.program import evaluate
-from controllers.fields.soft_wall import raise_walls
+from controllers.fields.map_feed import feed_maps, feed_rows
+from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import HandState
@@ -219,10 +219,10 @@ def lifted_microseconds(m: int) -> float:
 
 
 @njit
-def _wall_many(units: IntArray, ops: IntArray, params: Array, memory: Array, hands: Array, wrench: Array) -> None:
+def _wall_many(units: IntArray, feeds: IntArray, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
-        raise_walls(units, ops, params, memory, hands[i])
-        evaluate(ops, params, memory, hands[i], wrench)
+        feed_maps(units, feeds, field.params, memory, hands[i])
+        evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)
 
 
 def walls_microseconds(session: Session) -> float:
@@ -233,8 +233,9 @@ def walls_microseconds(session: Session) -> float:
     walls = figure_walls(session.haptic_map, numbers.wall_stiffness, numbers.wall_margin, numbers.joint_speed)
     program, wrench = walls.program(), np.empty(6)
     memory, units = program.fresh_memory(), session.servo.reference.units
-    _wall_many(units, program.ops, program.params, memory, hands[:2], wrench)
-    return _microseconds(lambda: _wall_many(units, program.ops, program.params, memory, hands, wrench), len(hands))
+    feeds, field = feed_rows(program.map_feeds), program.compiled()
+    _wall_many(units, feeds, field, memory, hands[:2], wrench)
+    return _microseconds(lambda: _wall_many(units, feeds, field, memory, hands, wrench), len(hands))
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:

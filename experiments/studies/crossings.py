@@ -15,8 +15,9 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER, Program
-from controllers.fields.program import evaluate
+from controllers.fields.instructions import TRACE_RIVER
+from controllers.fields.law import Program
+from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
 from experiments.config.maps import Circle, Cylindrical
@@ -67,14 +68,14 @@ class Passage(NamedTuple):
 
 @njit
 def _pass(
-    plant: Plant, port: PhantomPort, hand: Hand, ops: IntArray, params: Array, memory: Array, limits: Array,
+    plant: Plant, port: PhantomPort, hand: Hand, field: Compiled, memory: Array, limits: Array,
     limiter: Array, p: Array, force: Array, river: Array,
 ) -> None:  # fmt: skip
     wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
     for k in range(p.shape[0]):
         t = k * plant.period
         sense(port, t, 0.0)
-        evaluate(ops, params, memory, port.hand, wrench)
+        evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
         limit_force(limits, limiter, wrench, force[k])
         actuate(port, force[k])
         p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
@@ -113,7 +114,7 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     n = round(seconds / scene.servo_period)
     p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
     _pass(
-        plant, port, make_hand(Arm(pushes=pushes)), program.ops, program.params, program.fresh_memory(),
+        plant, port, make_hand(Arm(pushes=pushes)), program.compiled(), program.fresh_memory(),
         limiter.limits(), limiter.fresh_memory(), p, force, river,
     )  # fmt: skip
     return Passage(p, force, river)

@@ -8,7 +8,7 @@ from numba import njit
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import Program
+from controllers.fields.law import Program
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force

@@ -16,7 +16,8 @@ from controllers.easing import smooth_step
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER, Program
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
+from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
 from experiments.config.words import run_config

@@ -5,7 +5,7 @@ from typing import Any, TypeAlias
 
 from numba import typeof
 
-from controllers.fields.program import VECTOR
+from controllers.fields.instructions import VECTOR
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
 from sim.body.whole_body import figure_torque

@@ -12,6 +12,7 @@ This reaches into numba. With a version that it was not tested with, numba is le
 # What is patched here is numba's own, and TESTED says of which versions.
 
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numba
 from llvmlite import ir
@@ -47,6 +48,9 @@ class _Depth:
         _Depth.now -= 1
 
 
+_defining: "WeakValueDictionary[str, UnitLibrary]" = WeakValueDictionary()
+
+
 class UnitLibrary(codegen.JITCodeLibrary):
     """Code of one function: emitted if the compilation began with it, else kept to be linked into what did.
 
@@ -61,10 +65,10 @@ class UnitLibrary(codegen.JITCodeLibrary):
         self.deferred = _Depth.now > 1
 
     def add_ir_module(self, ir_module: ir.Module) -> None:
-        """Add a module; what refers to a function by its symbol, as recursion does, has to be emitted after all."""
-        prefix = codegen.RuntimeLinker.PREFIX
-        if any(name.startswith(prefix) for name in ir_module.globals):
-            self.deferred = False
+        """Add a module of IR; where its functions are is kept in mind, for those that refer to them by name."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                _defining[function.name] = self
         super().add_ir_module(ir_module)
 
     def finalize(self) -> None:
@@ -75,6 +79,10 @@ class UnitLibrary(codegen.JITCodeLibrary):
             return
         self._linking_libraries = _needed(self._linking_libraries)
         super().finalize()
+        # Recursion goes by way of the address of a function, which therefore has to have one.
+        for name in referred_by_name(self._final_module):
+            if name in _defining and _defining[name].deferred:
+                _defining[name].get_pointer_to_function(name)
 
     def get_pointer_to_function(self, name: str) -> int:
         """Address of a function; a library that was to be linked only is then emitted."""
@@ -99,6 +107,12 @@ class UnitLibrary(codegen.JITCodeLibrary):
         if missing:
             raise UndefinedSymbol(f"{self.name} refers to {', '.join(sorted(missing))}, which nothing defines")
         super()._optimize_final_module()
+
+
+def referred_by_name(module: Any) -> list[str]:
+    """Functions that a module of LLVM calls by addresses which numba finds while it runs: those that are recursive."""
+    prefix = codegen.RuntimeLinker.PREFIX
+    return [v.name.removeprefix(prefix) for v in module.global_variables if v.name.startswith(prefix)]
 
 
 def undefined_symbols(module: Any) -> set[str]:
@@ -192,9 +206,10 @@ def _spare_wrappers() -> None:
 
 def _set_environments(library: UnitLibrary) -> None:
     """Tell emitted code where the constants of all functions in it are, as numba does for code that it has cached."""
+    library._ensure_finalized()
     for variable in library._final_module.global_variables:
         environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
-        if environment is not None:
+        if environment is not None and library.codegen._engine.get_global_value_address(variable.name):
             library.codegen.set_env(variable.name, environment)
 
 

@@ -5,13 +5,15 @@ laws of force and the kinds of map that it uses, each once for each version of t
 very function that Python calls.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.program import LAW_ARGUMENTS, LAW_KERNELS
+from controllers.fields.instructions import LAW_ARGUMENTS
+from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
+from controllers.kernel_call import address_of
 from sim.compilation.units import Unit
 
 Array = npt.NDArray[np.float64]
@@ -33,13 +35,18 @@ def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
     return units
 
 
-def law_units(ops: IntArray) -> IntArray:
-    """Addresses of the kernels that the instructions (n, 4) of a field need, by opcode; likewise."""
-    units = np.zeros(max(LAW_KERNELS) + 1, dtype=np.int64)
-    for opcode in ops[:, 0].tolist():
-        if opcode in LAW_KERNELS:
-            units[opcode] = _law_unit(opcode).address()
-    return units
+def law_units(program: Program) -> IntArray:
+    """Addresses of the kernels of a field's laws, in their order; likewise."""
+    addresses = [
+        _law_unit(kernel).address() if is_kept(kernel) else address_of(kernel, LAW_ARGUMENTS)
+        for kernel in program.kernels
+    ]
+    return np.array(addresses, dtype=np.int64)
+
+
+def is_kept(kernel: Callable[..., None]) -> bool:
+    """Whether a law's kernel is a unit of its own, kept on disk: not one about a function of the user's."""
+    return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
 
 
 def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
@@ -47,14 +54,14 @@ def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
     return tuple(_map_unit(needed) for needed in kinds_of(kind, params))
 
 
-def units_of_laws(ops: IntArray) -> tuple[Unit, ...]:
-    """Units that the instructions (n, 4) of a field need, each once."""
-    return tuple(_law_unit(opcode) for opcode in sorted(set(ops[:, 0].tolist()) & LAW_KERNELS.keys()))
+def units_of_laws(program: Program) -> tuple[Unit, ...]:
+    """Units that the laws of a field need, each once."""
+    return tuple(_law_unit(kernel) for kernel in program.kernels if is_kept(kernel))
 
 
 def _map_unit(kind: int) -> Unit:
     return Unit.of(MAP_KERNELS[kind], *MAP_ARGUMENTS)
 
 
-def _law_unit(opcode: int) -> Unit:
-    return Unit.of(LAW_KERNELS[opcode], *LAW_ARGUMENTS)
+def _law_unit(kernel: Callable[..., None]) -> Unit:
+    return Unit.of(kernel, *LAW_ARGUMENTS)

@@ -6,7 +6,7 @@ Units that nobody has asked for in a long time are removed.
 """
 
 # pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
-# The cache of a dispatcher is not public in numba; `sim.compilation.deferred_codegen` says for which versions.
+# The cache of a dispatcher is not public in numba; `deferred_codegen` says of which versions this is true.
 
 import hashlib
 import os
@@ -24,7 +24,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from sim.compilation.deferred_codegen import is_nested
+from sim.compilation.deferred_codegen import is_nested, referred_by_name
 from sim.compilation.unit_key import unit_key
 
 _SUFFIX = ".unit"
@@ -67,8 +67,7 @@ class UnitCache(_Cache):
             If no key can be made of it.
         """
         arguments: Iterable[Any] = sigutils.normalize_signature(signature)[0]
-        name = f"{self._function.__module__}.{self._function.__qualname__}".replace("<", "").replace(">", "")
-        return cache_folder() / f"{name}-{unit_key(self._function, arguments, self._options)}{_SUFFIX}"
+        return cache_folder() / f"{self._name()}-{unit_key(self._function, arguments, self._options)}{_SUFFIX}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled unit, or None."""
@@ -90,7 +89,7 @@ class UnitCache(_Cache):
         """Keep a unit; a folder that cannot be written to is done without."""
         if not self._enabled or is_nested():
             return
-        if data.lifted or data.library.has_dynamic_globals:
+        if data.lifted or data.library.has_dynamic_globals or referred_by_name(data.library._final_module):
             warnings.warn(f"{self._function.__qualname__} holds an address, so it cannot be kept", stacklevel=2)
             return
         content = dumps(data._reduce())
@@ -109,8 +108,11 @@ class UnitCache(_Cache):
 
     def flush(self) -> None:
         """Remove the units of this function, of all versions."""
-        for path in cache_folder().glob(f"{self._function.__module__}.{self._function.__qualname__}-*{_SUFFIX}"):
+        for path in cache_folder().glob(f"{self._name()}-*{_SUFFIX}"):
             path.unlink(missing_ok=True)
+
+    def _name(self) -> str:
+        return f"{self._function.__module__}.{self._function.__qualname__}".replace("<", "").replace(">", "")
 
 
 def is_sound(path: Path) -> bool:

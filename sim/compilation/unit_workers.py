@@ -12,6 +12,10 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit, types
 
 from sim.compilation.unit_key import reached_functions
 from sim.compilation.units import Unit, unit_function
@@ -57,6 +61,20 @@ def _size(unit: Unit) -> int:
     return len(reached_functions(unit_function(unit.module, unit.name).py_func))
 
 
+def _type_common_parts() -> None:
+    """Compile what nearly all units have in them of numba's own, so that the workers begin with it."""
+
+    def assign(target: Any, source: Any) -> Any:
+        work, rows = np.empty(3), np.zeros((2, 3))
+        work[:] = source
+        rows[0, :2] = source[:2]
+        target[:] = work
+        return max(min(work[0], rows.sum()), abs(source[1])) + len(source)
+
+    vector = types.Array(types.float64, 1, "C")
+    njit(nogil=True)(assign).compile((vector, vector))
+
+
 def _compile(task: tuple[int, Unit]) -> tuple[int, bool]:
     number, unit = task
     try:
@@ -70,6 +88,8 @@ def _work(units: Sequence[Unit]) -> None:
     ways = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("fork" if "fork" in ways else "spawn")
     workers = min(len(units), _MOST_WORKERS, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2)
+    if len(units) > 1:
+        _type_common_parts()
     gc.freeze()  # what is imported stays shared between the workers
     with context.Pool(workers, maxtasksperchild=1) as pool:
         for number, compiled in pool.imap_unordered(_compile, enumerate(units)):

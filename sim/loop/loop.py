@@ -7,15 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.instructions import (
-    EXTERNAL,
-    TRACE_DISTANCE,
-    TRACE_PHASE,
-    TRACE_POINT,
-    TRACE_RIVER,
-    TRACE_SIZE,
-    PythonFunction,
-)
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
 from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
@@ -110,9 +102,9 @@ class Loop:
         What is done with each block, such as `record_into`.
     block_seconds : float
         Simulated time of a block [s], rounded to whole figure updates.
-    python_laws : sequence of PythonFunction
-        `Program.python_laws` of the servo's field. With any, blocks go tick by tick: the hand is sensed, the laws
-        are called, and the compiled loop does the rest of the tick.
+    python_laws : sequence of callable
+        `Program.python_laws` of the servo's field: from the measured hand to six numbers. With any, blocks go tick by
+        tick: the hand is sensed, the laws are called, and the compiled loop does the rest of the tick.
 
     Raises
     ------
@@ -126,14 +118,13 @@ class Loop:
         world: World | RobotWorld,
         observe: Observer = lambda ticks, frames, n: None,
         block_seconds: float = BLOCK_SECONDS,
-        python_laws: Sequence[PythonFunction] = (),
+        python_laws: Sequence[Callable[[HandState], Array]] = (),
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
         self._block = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
-        field = servo.field
-        self._slots = [int(slot) for slot in field.ops[field.ops[:, 0] == EXTERNAL, 2]]
+        self._slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
         if len(self._laws) != len(self._slots):
             raise SimError(
@@ -178,7 +169,7 @@ class Loop:
             read_phantom(servo.port, servo.hand, tick * servo.plant.period)
             hand = HandState.of(servo.port.hand)
             for slot, law in zip(self._slots, self._laws, strict=True):
-                servo.field.memory[slot : slot + 3] = law(hand)
+                servo.field.memory[slot : slot + 6] = law(hand)
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
             run_block(servo, tick, 1, False, tick_rows, frame_rows)

@@ -2,6 +2,7 @@
 
 from numba import typeof, types
 
+from controllers.fields.law import Program
 from sim.body.drive import drive_unit
 from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
@@ -10,13 +11,15 @@ from sim.loop.servo import Servo, run_block
 from sim.reference.reference import poses_unit, update_unit
 
 
-def run_units(servo: Servo) -> tuple[Unit, ...]:
+def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
     """Units of the loop over a servo, of what it calls, and of poses along a path, by which runs begin and end.
 
     Parameters
     ----------
     servo : Servo
         With all arrays that it will have, but no address need be there (see `Servo.linked`).
+    program : Program
+        Of its field.
     """
     ticks, frames = make_logs(servo, servo.figure_ticks)
     number, flag, reference = types.int64, types.boolean, servo.reference
@@ -25,6 +28,6 @@ def run_units(servo: Servo) -> tuple[Unit, ...]:
         update_unit(reference),
         drive_unit(servo.figure),
         *units_of_map(reference.kind, reference.params),
-        *units_of_laws(servo.field.ops),
+        *units_of_laws(program),
         poses_unit(),
     )

@@ -20,12 +20,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.fields.instructions import TRACE_SIZE, Program
-from controllers.fields.program import evaluate_units
-from controllers.fields.soft_wall import raise_walls
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.law import Program
+from controllers.fields.map_feed import feed_maps, feed_rows
+from controllers.fields.program import evaluate
 from controllers.kernel_call import call_as_given
-from controllers.safety.energy_tank import TANK_ENERGY, guard_energy
-from controllers.safety.limiter import limit_force
+from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, guard_energy
+from controllers.safety.limiter import ForceLimiter, limit_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from sim.body.drive import BodyState, drive_unit
 from sim.compilation.compiled import entry_point
@@ -43,13 +44,17 @@ IntArray = npt.NDArray[np.int64]
 class Field(NamedTuple):
     """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench.
 
-    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`).
+    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), none before they are linked;
+    `slots` the places in the memory of what laws in Python give, `maps` what its laws are told of the haptic map (see
+    `controllers.fields.map_feed`).
     """
 
     units: IntArray
     ops: IntArray
     params: Array
     memory: Array
+    slots: IntArray
+    maps: IntArray
     limits: Array
     limiter: Array
     budget: Array
@@ -58,18 +63,31 @@ class Field(NamedTuple):
     force: Array
 
     def of(self, program: Program) -> "Field":
-        """The same limits and budget about another program, with a fresh memory."""
-        return self._replace(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory()
-        )
+        """The same limits and budget about another program, with a fresh memory; its laws are compiled if needed."""
+        return Field(*_program_parts(program), *self[6:])._replace(units=law_units(program))
+
+
+def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:
+    """A field for a new run, without the addresses of its laws: nothing has to be compiled for it."""
+    return Field(
+        *_program_parts(program), limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(),
+        tank=tank.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
+    )  # fmt: skip
+
+
+def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray]:
+    """The first of the attributes of a `Field`."""
+    slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
+    memory, maps = program.fresh_memory(), feed_rows(program.map_feeds)
+    return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps
 
 
 class Servo(NamedTuple):
     """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
-    `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or of the
-    field's memory, where a walker is that the field moves. `units` (2,) are the addresses of what updates the reference
-    and of what drives the body: a change in one of them is not one of the loop.
+    `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or that of
+    a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the
+    reference and of what drives the body: a change in one of them is not one of the loop.
     """
 
     plant: Plant
@@ -82,12 +100,12 @@ class Servo(NamedTuple):
     argument: Array
     units: IntArray = np.zeros(2, dtype=np.int64)
 
-    def linked(self) -> "Servo":
-        """The same with the addresses of all kernels that it calls; compiles what is not kept."""
+    def linked(self, program: Program) -> "Servo":
+        """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
         field, reference = self.field, self.reference
         return self._replace(
             units=np.array([update_unit(reference).address(), drive_unit(self.figure).address()]),
-            field=field._replace(units=law_units(field.ops)),
+            field=field._replace(units=law_units(program)),
             reference=reference._replace(units=map_units([(reference.kind, reference.params)])),
         )
 
@@ -155,8 +173,8 @@ class FrameLog(NamedTuple):
 def field_force(servo: Servo) -> None:
     """Evaluate and limit the field at the measured hand, within the tank's budget, and command the motors."""
     field, hand = servo.field, servo.port.hand
-    raise_walls(servo.reference.units, field.ops, field.params, field.memory, hand)
-    evaluate_units(field.units, field.ops, field.params, field.memory, hand, field.wrench)
+    feed_maps(servo.reference.units, field.maps, field.params, field.memory, hand)
+    evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
     limit_force(field.limits, field.limiter, field.wrench, field.force)
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     guard_energy(field.budget, field.tank, p, v, field.force)

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, typeof, types
 
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
-from controllers.fields.program import VECTOR
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, VECTOR
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of

@@ -76,9 +76,9 @@ def test_the_default_tour_is_told_as_the_field_keeps_it(tmp_path: Path, monkeypa
         assert press_summaries(recording, CURVE, EPSILON) == presses
         assert [press.what for press in press_summaries(recording, CURVE, EPSILON, 6.0)] == ["held"]
     assert [press.what for press in presses] == ["held", "held", "undo", "redo", "pushed"]
-    starts = [grab.start + (grab.place is not None) * grab.reach for grab in grabs]
+    starts = [grab.at + (grab.place is not None) * grab.reach for grab in grabs]
     assert [press.start for press in presses] == pytest.approx(starts, abs=2e-3)
-    assert [press.seconds for press in presses] == pytest.approx([g.duration + g.hold for g in grabs], abs=2e-3)
+    assert [press.seconds for press in presses] == pytest.approx([g.seconds + g.hold for g in grabs], abs=2e-3)
     edits, bent = field.edits(memory), field.edited(memory)
     assert len(edits) == 3
     bending = [press for press in presses if press.lap is not None]
@@ -124,10 +124,10 @@ def test_a_hand_bends_the_curve_before_it_pushes(mode: str, seconds: float) -> N
     """A push during the tour would carry the click that undoes, and a held point faster than a body goes."""
     grabs = stretch_grabs(CURVE, EPSILON)
     parts = parts_with(mode, "push", seconds=seconds, grabs=grabs)
-    starts = [push.start for push in parts.user.pushes]
+    starts = [push.at for push in parts.user.pushes]
     assert min(starts) > edited_until(grabs) + CURVE.duration
     assert len(starts) == (4 if seconds == 30.0 else 2)
-    assert parts.handled == tuple((grab.start, grab.end) for grab in grabs)
+    assert parts.handled == tuple((grab.at, grab.end) for grab in grabs)
     assert len(parts.remarks) == (1 if seconds == 8.0 else 0)
     assert parts_with(mode, "push", seconds=seconds).user.grabs == grabs, "what it does by default"
 
@@ -135,7 +135,7 @@ def test_a_hand_bends_the_curve_before_it_pushes(mode: str, seconds: float) -> N
 def test_hands_that_push_in_other_modes_do_so_from_the_second_lap_on() -> None:
     for seconds in (3.0, 9.0, 20.0, 22.0):
         parts = parts_with(user="push", seconds=seconds)
-        starts = [push.start for push in parts.user.pushes[::2]]
+        starts = [push.at for push in parts.user.pushes[::2]]
         laps = range(1, max(2, int(seconds / 4.0)))
         assert starts == [4.0 * lap + 0.4 for lap in laps]
         assert parts.remarks == ()

@@ -5,8 +5,9 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from controllers.fields.higher_order import HigherOrder, higher_order_wrench
+from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
+from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers
@@ -31,14 +32,13 @@ def rivers_of_a_hand(parts: Parts) -> np.ndarray:
     """Which river has the default hand, a mass with friction, at each tick from the beginning of the level river on."""
     assert isinstance(parts.field, HigherOrder)
     program, arm = parts.field.program(), parts.user.compiled()
-    at, slot = int(program.ops[0, 1]), int(program.ops[0, 2])
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
     p, v = CURVE.point(0.0), CURVE.velocity(0.0)
     rivers = np.empty(round(SECONDS / PERIOD))
     for k in range(len(rivers)):
         hand[0] = k * PERIOD
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
-        higher_order_wrench(program.params, at, 0, memory, slot, hand, wrench)
+        evaluate(*program.compiled(), memory, hand, wrench)
         rivers[k] = memory[TRACE_RIVER]
         hand_force(arm, k * PERIOD, p, v, user)
         slowing = FRICTION * v / max(float(np.linalg.norm(v)), 1e-3)

@@ -67,7 +67,7 @@ def test_a_push_begins_before_the_transition_on_the_curve_and_goes_towards_the_o
     assert (4.0 - np.arctan2(place[1], place[0])) % TURN == pytest.approx(0.36 / 2.2 * TURN, rel=1e-3)
     towards = np.array([0.006 * np.cos(4.0), 0.006 * np.sin(4.0), 0.004]) * (1.0 if second == 1 else -1.0)
     np.testing.assert_allclose(direction, towards, atol=1e-9)
-    assert push.peak == pytest.approx(3.6 * 20.0 * np.hypot(0.006, 0.004))
+    assert push.force == pytest.approx(3.6 * 20.0 * np.hypot(0.006, 0.004))
 
 
 def test_a_hand_that_pushes_goes_over_at_the_first_curve_s_best_transition_and_comes_back():
@@ -75,7 +75,7 @@ def test_a_hand_that_pushes_goes_over_at_the_first_curve_s_best_transition_and_c
     for curve in ("first", "second"):
         there, back = default_pushes(h_map, curve, MODE)
         assert np.array(there.direction) == pytest.approx(-np.array(back.direction))
-        assert (there.start, back.start) == pytest.approx((2.2, 8.8))
+        assert (there.at, back.at) == pytest.approx((2.2, 8.8))
 
 
 def test_a_curve_without_a_transition_is_told_which_there_are():

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, Gait
+from controllers.fields.leading import Gait
 from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Lead
@@ -29,10 +28,10 @@ def _run() -> dict[str, list]:
     for k in range(round(SECONDS / PERIOD)):
         hand[0] = k * PERIOD
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
-        evaluate(program.ops, program.params, memory, hand, wrench)
+        evaluate(*program.compiled(), memory, hand, wrench)
         hand_force(arm, k * PERIOD, p, v, user)
         if k % EVERY == 0:
-            ways.append([*p.tolist(), float(memory[TRACE_SIZE + ARGUMENT])])
+            ways.append([*p.tolist(), float(field.walker(memory).argument[0])])
         v = v + PERIOD / MASS * (wrench[:3] + user)
         p = p + PERIOD * v
     return {"ways": ways}

@@ -142,7 +142,7 @@ def test_the_device_protocol_from_python_does_what_the_compiled_loop_does(clips:
         path = []
         for _ in range(300):
             hand = phantom.read().vector()
-            evaluate(field.ops, field.params, field.memory, hand, field.wrench)
+            evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
             limit_force(field.limits, field.limiter, field.wrench, field.force)
             phantom.write(field.force)
             path.append(hand[1:4])

@@ -12,7 +12,7 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
+from controllers.fields.leading import Gait, Leading, leading_wrench
 from controllers.state import HandState
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
@@ -96,9 +96,9 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
 
     def course(x, ticks):
         memory, out = program.fresh_memory(), []
-        walker = memory[TRACE_SIZE:]
+        walker = field.walker(memory)
         for k in range(ticks):
-            out.append(np.append(x, walker[[ARGUMENT, SPEED]]))
+            out.append(np.append(x, [walker.argument[0], walker.speed[0]]))
             state = HandState.at(place + jacobian @ x[:3], loop.measured_velocity[0] @ x, k * sampling.period)
             wrench = np.zeros(6)
             leading_wrench(program.params, 0, 0, memory, TRACE_SIZE, state.vector(), wrench)

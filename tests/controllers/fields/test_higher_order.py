@@ -33,7 +33,7 @@ def _pair(degrees):
 
 def _run(program, hands):
     memory, wrenches = program.fresh_memory(), np.empty((len(hands), 6))
-    run_over(program.ops, program.params, memory, np.array([hand.vector() for hand in hands]), wrenches)
+    run_over(*program.compiled(), memory, np.array([hand.vector() for hand in hands]), wrenches)
     return wrenches[:, :3], memory
 
 
