@@ -13,9 +13,7 @@ PACKAGES = ("models", "controllers", "sim", "experiments")
 def imports() -> dict[str, set[str]]:
     """Files of the packages by path, and what each imports of them, also within functions."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")] + [ROOT / "hvf.py"]
-    modules = {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files
-    }
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
     graph: dict[str, set[str]] = {}
     for path in files:
         names: list[str] = []
