@@ -378,7 +378,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf {version('haptic-vector-fields')}")
         return 0
     try:
-        return _parsed(arguments)()
+        return parsed(arguments)()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -393,7 +393,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 130
 
 
-def _parsed(arguments: Sequence[str] | None) -> Command:
+def parsed(arguments: Sequence[str] | None) -> Command:
     """The command that was typed.
 
     Raises
