@@ -1,4 +1,4 @@
-"""Configurations: every number has an interval, every option its place, and JSON and words say the same as the parts."""
+"""Configurations: every number has an interval, every option its place; JSON and words say the same as the parts."""
 
 import json
 from dataclasses import fields, is_dataclass, replace
@@ -120,8 +120,10 @@ def test_the_message_says_what_would_be_right() -> None:
         (lambda: Outer(count=2**64), f"--count is {2**64}; expected less than {2**63}"),
         (lambda: Inner(length=0.0), "--length is 0; expected more than 0 m, and finite"),
         (lambda: Inner(length=inf), "--length is inf; expected more than 0 m, and finite"),
-        (lambda: from_dict(Outer, {"inner": {"length": 0.0}}, "x"), "x: --length is 0; expected more than 0 m, and finite"),
-        (lambda: from_dict(Outer, {"inner": {"width": 1.0}}, "x"), "x: inner.width is not known; expected some of length"),
+        (lambda: from_dict(Outer, {"inner": {"length": -1.0}}, "x"),
+         "x: --length is -1; expected more than 0 m, and finite"),
+        (lambda: from_dict(Outer, {"inner": {"width": 1.0}}, "x"),
+         "x: inner.width is not known; expected some of length"),
     ):  # fmt: skip
         with pytest.raises(ParameterError) as error:
             options()
