@@ -109,7 +109,8 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     elif other is not None:
         top = positions[:, other]
     else:
-        raise MotionFileError(motion.path, 0, "the skeleton has neither arms, head nor chest", "a human body")
+        # Legs alone: their trunk is taken to go on straight.
+        top = hips.mean(axis=1) + (hips - knees).mean(axis=1)
     toes = paired("foot", end=True)
     for k, side in enumerate(SIDES):
         joint = roles.ends.get(f"{side}_foot", roles.segments.get(f"{side}_foot"))
@@ -132,3 +133,12 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
 
 def _sine(a: Array, b: Array) -> Array:
     return np.linalg.norm(np.cross(unit(a), unit(b)), axis=1)
+
+
+def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
+    """A joint and all that hang on it: a body without what a program puts above or beside it."""
+    below = {top}
+    for joint, parent in enumerate(parents):
+        if parent in below:
+            below.add(joint)
+    return sorted(below)

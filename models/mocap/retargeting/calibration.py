@@ -11,7 +11,8 @@ from frames T_S(t) built of positions alone:
 - upper and lower limbs: the bone, exactly, and for the turn about it the hinge, thigh × shank and upper arm × forearm
   (w grows with the bend beyond 12°: a straight limb has no plane). Where a limb is never bent: its parent's axis;
 - feet: the floor's vertical while they stand, and ahead the toes;
-- head, clavicles, hands have no line that every rig shows: on the average they are as their parents.
+- the head is level on the average; clavicles and hands, of which not every rig shows a line, are on the average as
+  their parents.
 
 Re-drawing a rig (other joint frames G_J D, other zero pose) changes C_S to D⁻¹ C_S and R_S not at all.
 """
@@ -35,9 +36,12 @@ _BEND = np.sin(np.deg2rad(12.0))  # limbs bent less have no plane: knees lie up 
 _UNBENT = 0.01  # what a limb's parent counts beside its hinge: as much as a bend by 15°
 _STILL = 0.3  # legs per second, below which ankle and toes of a foot are at rest: walkers' feet pass at 3
 _TURNS = 1.5  # rad/s, above which a foot rolls over heel or toe: it does at 3 to 8 in a walk
+_PATIENCE = (1.0, 2.0, 4.0)  # times either, tried in turn: runners and 16 frames a second show no foot at rest
 _LOW = 0.05  # legs: an ankle that is so little above the lowest ones of the motion has its heel on the floor
 _ALIKE = np.deg2rad(5.0)  # soles that lie so much alike are the same stance: captured ones roll by 2 to 3° in it
+_UPRIGHT = np.cos(np.deg2rad(50.0))  # of a chest to the vertical, up to which a head can be level
 _ROUNDS = 5  # of laying the trunk line: each leaves a third of the angle, the pelvis being a third of the line
+_ANKLE = np.deg2rad(20.0)  # within which of the mean ankle a sole is likely to lie
 _POINTING = 0.3  # cosine between toes and sole, below which toes do not tell where a foot looks
 _LEAST = 3  # frames that tell how a sole lies
 
@@ -118,14 +122,21 @@ def calibrate(
             put(body, of("pelvis"))
             continue
         wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
-        put(body, _carried(source, wanted, straight))
+        turned = _carried(source, wanted, straight)
+        if body == "pelvis":
+            # Rigs with hip joints of their own, beside the pelvis, turn the hip line in it.
+            turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
+        put(body, turned)
     if "abdomen" not in roles.segments:
         put("abdomen", quaternions.slerped(of("pelvis"), of("chest"), 0.5))
-    for body in ("head", "left_clavicle", "right_clavicle"):
+    for body in ("left_clavicle", "right_clavicle"):
         source = joint(body)
         put(body, of("chest") if source is None else _carried(source, of("chest"), straight))
+    source = joint("head")
+    put("head", of("chest") if source is None else _head(source, of("chest"), up, straight))
     if lines.has_arms:
-        _set_trunk_line(segments, trunk)
+        clavicled = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
+        _set_lines(segments, trunk, shoulders, clavicled)
     counts: list[int] = []
     for k, side in enumerate(SIDES):
         sign = 1.0 - 2.0 * k
@@ -136,7 +147,9 @@ def calibrate(
             put(body, _limb(joint(body), (end - start)[:, k], elbow, of(parent), (1, sign), 2))
         hand = joint(f"{side}_hand")
         everywhere = np.ones(n)
-        put(f"{side}_hand", of(f"{side}_forearm") if hand is None else _carried(hand, of(f"{side}_forearm"), everywhere))
+        put(
+            f"{side}_hand", of(f"{side}_forearm") if hand is None else _carried(hand, of(f"{side}_forearm"), everywhere)
+        )
         knee = lines.knee_normals()[:, k]
         leg = (("pelvis", f"{side}_thigh", lines.hips, lines.knees),
                (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles))  # fmt: skip
@@ -162,22 +175,44 @@ def _own_trunk(has_arms: bool) -> Array:
     return _frames(np.array([[0.0, 1.0, 0.0]]), unit(np.array([[top[0], 0.0, top[2]]])))[0]
 
 
-def _set_trunk_line(segments: Array, trunk: Array) -> None:
-    """Lay the figure's trunk line on the source's in every frame: its spine is not jointed where the source's is.
+def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
+    """R of the head: level on the average of the frames in which the body is upright, looking where the chest does.
 
-    Abdomen and chest, with all they carry but the arms, turn as one, by some degrees.
+    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). Somebody who never is upright looks ahead.
+    """
+    upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
+    if upright.sum() < 1e-6:
+        return _carried(source, chest, straight)
+    left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
+    left = unit(left - (left @ up)[:, None] * up)
+    level = _frames(left, np.broadcast_to(up, left.shape))
+    return _carried(source, level, upright)
+
+
+def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
+    """Lay the figure's trunk and shoulder lines on the source's: its spine is not jointed where the source's is.
+
+    Abdomen and chest, with all they carry but the arms, turn as one by some degrees, then the clavicles, where the source has them.
     """
     model = figure_model()
-    carried = [BODIES.index(body) for body in ("abdomen", "chest", "head", "left_clavicle", "right_clavicle")]
+    abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
+    sides = [BODIES.index(f"{side}_clavicle") for side in SIDES]
+    carried = [BODIES.index(body) for body in ("abdomen", "chest", "head")] + sides
     for _ in range(_ROUNDS):
-        own = quaternions.rotated(segments[:, 0], model.body("abdomen").pos)
-        own = own + quaternions.rotated(segments[:, 1], model.body("chest").pos)
-        for side in SIDES:
-            clavicle, arm = model.body(f"{side}_clavicle").pos, model.body(f"{side}_upper_arm").pos
-            own = own + quaternions.rotated(segments[:, 2], clavicle) / 2.0
-            own = own + quaternions.rotated(segments[:, BODIES.index(f"{side}_clavicle")], arm) / 2.0
-        turn = _arcs(unit(own), np.where(np.isnan(trunk), unit(own), trunk))
+        ends = [
+            quaternions.rotated(segments[:, 2], model.body(BODIES[clavicle]).pos)
+            + quaternions.rotated(segments[:, clavicle], model.body(f"{side}_upper_arm").pos)
+            for side, clavicle in zip(SIDES, sides, strict=True)
+        ]
+        own = quaternions.rotated(segments[:, 0], abdomen) + quaternions.rotated(segments[:, 1], chest)
+        own = unit(own + (ends[0] + ends[1]) / 2.0)
+        turn = _arcs(own, np.where(np.isnan(trunk), own, trunk))
         segments[:, carried] = quaternions.product(turn[:, None], segments[:, carried])
+        if not clavicled:
+            continue
+        own = quaternions.rotated(turn, unit(ends[0] - ends[1]))
+        turn = _arcs(own, np.where(np.isnan(shoulders), own, shoulders))
+        segments[:, sides] = quaternions.product(turn[:, None], segments[:, sides])
 
 
 def _frames(left: Array, along: Array) -> Array:
@@ -231,11 +266,15 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
     places = [lines.lowest_joints[:, k]]
     if not np.isnan(lines.toes[:, k]).any():
         places.append(lines.toes[:, k])
-    still = np.linalg.norm(quaternions.velocities(source, fps), axis=1) < _TURNS
-    for place in places:
-        still &= np.linalg.norm(np.gradient(place, axis=0), axis=1) * fps < _STILL * lines.leg
+    turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
+    passing = np.max([np.linalg.norm(np.gradient(place, axis=0), axis=1) for place in places], axis=0) * fps / lines.leg
     heights = lines.lowest_joints @ up
-    return np.flatnonzero(still & (heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg))
+    low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
+    for factor in _PATIENCE:
+        flat = np.flatnonzero(low & (passing < factor * _STILL) & (turning < factor * _TURNS))
+        if len(flat) >= _LEAST:
+            return flat
+    return np.zeros(0, dtype=np.intp)
 
 
 def _foot(
@@ -249,9 +288,12 @@ def _foot(
     resting = _carried(source, shank, straight)
     vertical = quaternions.rotated(back[flat], up)
     alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
-    told = alike[np.argmax(alike.sum(axis=1))] if len(flat) else np.zeros(0, dtype=bool)
+    neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
+    # In captures whose feet roll with spread legs the sole lies in two ways: the one nearer to a level ankle is right.
+    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
+    told = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
     if told.sum() < min(_LEAST, len(source)):
-        normal = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
+        normal = neutral
         told = np.zeros(0, dtype=bool)
     else:
         normal = unit(vertical[told].mean(axis=0))

@@ -19,7 +19,7 @@ from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import body_lines
+from models.mocap.retargeting.body_lines import body_lines, joints_below
 from models.mocap.retargeting.calibration import calibrate
 from models.mocap.retargeting.footing import on_the_floor
 from models.mocap.retargeting.leading_pose import without_leading_pose
@@ -148,18 +148,19 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rotations = calibrating.global_rotations()
     positions = calibrating.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
-    up = up_axis(motion, lines, positions, hints.up)
+    body = joints_below(roles.segments["pelvis"], motion.parents)
+    up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
     frame = None if rest is None else rest - (dropped - skipped)
-    body = calibrate(roles, motion.parents, lines, rotations, up.axis, motion.fps, frame)
-    axes = _world_axes(body.segments[skipped, 0], up.axis)
-    segments = quaternions.product(axes, body.segments[skipped:])
+    calibrated = calibrate(roles, motion.parents, lines, rotations, up.axis, motion.fps, frame)
+    axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
+    segments = quaternions.product(axes, calibrated.segments[skipped:])
     own_leg = _own_leg("left_foot" in roles.segments or "left_shank" in roles.ends)
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     remarks: list[str] = []
-    if body.bend > _BENT and rest is None:
+    if calibrated.bend > _BENT and rest is None:
         remarks.append("the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it")
     report = RetargetReport(
         {body: motion.joints[joint] for body, joint in roles.segments.items()},

@@ -23,7 +23,9 @@ Array = npt.NDArray[np.float64]
 
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 _CUSTOM = 0.1  # β
-_CERTAIN = 0.25  # least lead of the best axis over the next; over the files of ../shared/mocap the least is said in docs
+_CERTAIN = (
+    0.25  # least lead of the best axis over the next; over the files of ../shared/mocap the least is said in docs
+)
 _BEARING = 0.12  # joints within this share of a leg of the lowest one may bear load: an ankle is so high over its toes
 _SAMPLES = 200  # frames that are looked at
 _DIRECTIONS = 16  # in which the hull of the bearing joints is bounded
@@ -46,7 +48,7 @@ class Up(NamedTuple):
 
 
 def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
-    """The file's axis that points up: as said, as the format has it, else as the motion tells.
+    """The file's axis that points up: as said, as the format has it, else as the body's joints (n, m, 3) tell.
 
     Raises
     ------
