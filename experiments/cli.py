@@ -23,6 +23,7 @@ from controllers.haptic_map.lifting.room import Room  # noqa: E402
 from experiments.config.options import above, at_least, check_numbers  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
+from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -317,6 +318,7 @@ Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
+    | Annotated[Prepare, tyro.conf.subcommand("prepare")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
     | Annotated[Lift, tyro.conf.subcommand("lift")]

@@ -39,6 +39,9 @@ Array = npt.NDArray[np.float64]
 _MARGIN = 0.02  # to the joints' limits [rad]
 _STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
 _KNOT, _STEP = 0.08, 0.02  # of the change and of the instants [s]; 50 and 12.5 ms cost twice as much for a point less
+_SWING, _ROLL = 0.025, 0.008  # least heights of swinging feet and of the lifted end of a standing one [m] ...
+_RISE = 0.08  # ... reached so long before and after they stand [s]; captured feet swing at 2 to 5 cm
+_TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
 _ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
@@ -129,7 +132,7 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 8, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
+    clip: Clip, schedule: Stances, iterations: int = 16, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
 ) -> Feasible:
     """The nearest motion with these contacts that needs no help.
 
@@ -173,6 +176,7 @@ class _Problem:
         self.grounded = self.standing | schedule.sliding[frames]
         self.pinned = np.repeat(self.standing[:, :, None], 3, axis=2).astype(np.float64)
         self.pinned[:, :, 2] = self.grounded
+        self.clearance = _clearance(schedule, change.clip.fps, change.closed)[frames]
         self.model = figure_model()
         self.data = mujoco.MjData(self.model)
         self.spheres = [int(self.model.geom(name).id) for name in FOOT_CONTACTS]
@@ -189,7 +193,7 @@ class _Problem:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from no change, until the cost falls by less than 1 %."""
+        """Levenberg–Marquardt from no change, until the cost falls by less than `_TOLERANCE`."""
         change = self.change
         x = np.zeros(change.n_points * N_TANGENT)
         damping = 1e-4
@@ -213,7 +217,7 @@ class _Problem:
                 break
             x, damping = trial, max(damping / 8.0, 1e-8)
             costs.append(cost)
-            if costs[-2] - cost < 0.01 * cost:
+            if costs[-2] - cost < _TOLERANCE * cost:
                 break
             errors = self.errors(x, True)
         return x, costs
@@ -244,7 +248,7 @@ class _Problem:
         scale = np.where(self.pushing.any(axis=1), 1.0, w.flight)[:, None] / weight
         scale = scale * np.repeat([w.force, w.moment], 3)
         slip = w.slip * self.pinned * (demand.spheres - self.places)
-        low = w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS, 0.0) * ~self.grounded
+        low = w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance, 0.0) * ~self.grounded
         vectors = quaternions.logarithm(state.q[:, 7:].reshape(m, 17, 4)).reshape(m, 51)
         excess = vectors - np.clip(vectors, self.low, self.high)
         share = demand.torque_on(grip)[:, 33:] / torque_limit()[33:]
@@ -284,9 +288,9 @@ class _Dynamics:
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, 8, 3)), np.empty((m, 3))
         bodies = [1 + body for body in _LEGS]
         anchors, frames, root = np.empty((m, 6, 3)), np.empty((m, 6, 9)), np.empty((m, 3, 3))
-        if with_jacobian:
-            by = np.zeros((m, 3, N_TANGENT, N_TANGENT))
-            self.spheres, self.com = np.zeros((m, 8, 3, N_TANGENT)), np.zeros((m, 3, N_TANGENT))
+        many = m if with_jacobian else 0
+        by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
+        self.spheres, self.com = np.zeros((many, 8, 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
         result, moved, full = np.zeros(N_TANGENT), np.zeros(model.nq), np.empty((N_TANGENT, N_TANGENT))
         step = np.zeros(N_TANGENT)
         kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
@@ -351,12 +355,40 @@ class _Dynamics:
         self.torque = by[:, :, 39:57]
 
 
+def _clearance(schedule: Stances, fps: float, closed: bool) -> Array:
+    """Least heights of the parts of the feet that swing [m], rising from where they stand, shape (n, 8).
+
+    A foot that swings a few millimetres over the floor is taken for a standing one by whatever follows the motion.
+    """
+    grounded = schedule.standing | schedule.sliding
+    n = len(grounded)
+    laps = np.tile(grounded, (3, 1)) if closed else grounded
+    here = slice(n, 2 * n) if closed else slice(0, n)
+    clearance = np.zeros((n, 8))
+    for foot in range(2):
+        mine = slice(4 * foot, 4 * foot + 4)
+        swings = ~laps[:, mine].any(axis=1)
+        for sphere in range(4 * foot, 4 * foot + 4):
+            stands = np.flatnonzero(laps[:, sphere])
+            if not len(stands):
+                continue
+            frames = np.arange(len(laps))
+            after = np.searchsorted(stands, frames)
+            away = np.minimum(
+                np.abs(frames - stands[np.minimum(after, len(stands) - 1)]),
+                np.abs(frames - stands[np.maximum(after - 1, 0)]),
+            )
+            least = np.where(swings, _SWING, _ROLL) * np.minimum(away / (_RISE * fps), 1.0)
+            clearance[:, sphere] = least[here]
+    return clearance
+
+
 def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
     """M as a full matrix, whichever way this version of MuJoCo is asked for it."""
     try:
         mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
     except TypeError:
-        mujoco.mj_fullM(model, full, data.qM)  # pyright: ignore[reportCallIssue, reportArgumentType]
+        mujoco.mj_fullM(model, full, data.qM)  # pyright: ignore[reportCallIssue, reportArgumentType, reportAttributeAccessIssue]
 
 
 def _cross(w: Array) -> Array:
@@ -364,3 +396,11 @@ def _cross(w: Array) -> Array:
     zero = np.zeros(w.shape[:-1])
     rows = ((zero, -w[..., 2], w[..., 1]), (w[..., 2], zero, -w[..., 0]), (-w[..., 1], w[..., 0], zero))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def contact_residual(clip: Clip, schedule: Stances) -> float:
+    """RMS of the force that these contacts cannot give a clip as it is [body weights]."""
+    change = Change(clip, _KNOT, _STEP)
+    problem = _Problem(change, schedule, _WEIGHTS)
+    errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
+    return float(np.sqrt(np.mean(np.sum(errors.residual[:, :3] ** 2, axis=1)))) / problem.floor.body_weight

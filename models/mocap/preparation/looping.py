@@ -16,9 +16,10 @@ from models.mocap.preparation.poses import inverse, plus
 
 Array = npt.NDArray[np.float64]
 
-_ALIKE = 0.30  # d of the ends of a cycle [rad]: the steps of one walker differ by 0.1 to 0.25
-_WRAPS = 0.60  # d that is still closed where the file says that it wraps
-_COVERS, _NEAR = 0.7, 0.5  # a cycle has a frame within this distance [rad] of so large a share of the clip
+_GAIT, _PLACE = 0.45, 0.30  # d of the ends of a gait's lap, of a cycle in place [rad]: walkers' steps differ by 0.1 to 0.3
+_WRAPS = 0.45  # d that is still closed where the file says that it wraps
+_COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
+_LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it
 _SHORTEST = 0.6  # of a cycle in place [s]
 _SHARE = 0.3  # of the clip, the least that a cycle in place lasts: less is a tremble
 _FADE = 0.25  # over which the ends are brought together [s]
@@ -109,18 +110,20 @@ def _cycle(clip: Clip) -> tuple[int, int, float] | None:
     frames = np.arange(0, clip.n_frames, every)
     apart = _distances(clip, frames)
     lap = lap_of(clip)
-    candidates: list[tuple[int, int, float]] = []
+    speeds = np.sqrt(np.mean(clip.velocities()[frames, 6:] ** 2, axis=1))
+    candidates: list[tuple[int, int, float, float]] = []
     if lap.clip.n_frames < clip.n_frames:
-        candidates.append((round(lap.start * clip.fps), round(lap.end * clip.fps), lap.gap))
+        candidates.append((round(lap.start * clip.fps), round(lap.end * clip.fps), lap.gap, _GAIT))
     least = max(_SHORTEST * clip.fps, _SHARE * clip.n_frames)
     long = np.where(frames[None, :] - frames[:, None] >= least, apart, np.inf)
     if np.isfinite(long).any():
         i, j = np.unravel_index(int(np.argmin(long)), long.shape)
-        candidates.append((int(frames[i]), int(frames[j]), float(long[i, j])))
-    for start, end, gap in candidates:
+        candidates.append((int(frames[i]), int(frames[j]), float(long[i, j]), _PLACE))
+    for start, end, gap, alike in candidates:
         inside = (frames >= start) & (frames <= end)
         covered = apart[:, inside].min(axis=1) < _NEAR
-        if gap < _ALIKE and covered.mean() >= _COVERS:
+        lively = speeds[inside].mean() >= _LIVELY * speeds.mean()
+        if gap < alike and lively and covered.mean() >= _COVERS:
             return start, end, gap
     return None
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, filtfilt
+from scipy.signal import butter, sosfiltfilt
 
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap import quaternions
@@ -12,7 +12,9 @@ from models.mocap.clip import Clip, PlanarDisplacement
 
 Array = npt.NDArray[np.float64]
 
-_PASSES = 0.802  # a Butterworth filter of second order run both ways halves the power at this share of its corner (Winter)
+_PASSES = (
+    0.802  # a Butterworth filter of second order run both ways halves the power at this share of its corner (Winter)
+)
 
 
 def plus(poses: Array, tangents: Array) -> Array:
@@ -39,14 +41,14 @@ def smoothed(clip: Clip, corner: float) -> Clip:
     """The motion without what is faster than a corner frequency [Hz]; a closed one goes on over its ends."""
     if clip.n_frames < 8 or corner >= 0.4 * clip.fps:
         return clip
-    numerator, denominator = butter(2, corner / (clip.fps / 2.0) / _PASSES)
+    sections = np.asarray(butter(2, corner / (clip.fps / 2.0) / _PASSES, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():
         poses, first = around(clip, pad)
-        smooth = filtfilt(numerator, denominator, poses, axis=0, padlen=0)[first : first + clip.n_frames]
+        smooth = sosfiltfilt(sections, poses, axis=0, padlen=0)[first : first + clip.n_frames]
         smooth[-1] = clip.displacement.moved(smooth[0])
     else:
-        smooth = filtfilt(numerator, denominator, clip.poses, axis=0, padlen=pad)
+        smooth = sosfiltfilt(sections, clip.poses, axis=0, padlen=pad)
     return Clip(smooth, clip.fps, clip.name)
 
 

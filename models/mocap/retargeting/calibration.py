@@ -1,8 +1,8 @@
 r"""How the frames of a rig's joints lie in the body: told by where joints are during the motion.
 
 A segment S of the figure is turned by a constant from the frame of its source joint J, R_S(t) = G_J(t) C_S, whatever
-the rig's zero pose is. As in the laboratory (Cappozzo et al. 1995, "anatomical frames"; Wu et al. 2002, 2005), C_S comes
-from frames T_S(t) built of positions alone:
+the rig's zero pose is. As in the laboratory (Cappozzo et al. 1995, "anatomical frames"; Wu et al. 2002, 2005), C_S
+comes from frames T_S(t) built of positions alone:
 
 .. math:: C_S = \operatorname{mean}_t\, w(t)\, G_J(t)^{-1} T_S(t)
 
@@ -192,7 +192,8 @@ def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
 def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
     """Lay the figure's trunk and shoulder lines on the source's: its spine is not jointed where the source's is.
 
-    Abdomen and chest, with all they carry but the arms, turn as one by some degrees, then the clavicles, where the source has them.
+    Abdomen and chest, with all they carry but the arms, turn as one by some degrees, then the
+    clavicles, where the source has them.
     """
     model = figure_model()
     abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
