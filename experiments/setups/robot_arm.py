@@ -31,6 +31,7 @@ from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_lengths, arm_limits, arm
 from models.scene import P_WH, PEDESTAL, PHANTOM, ROBOT
 from sim.body.robot import REPORT_SATURATED, robot_state
 from sim.compilation.kernel_units import law_units
+from sim.devices.simulated import simulated_phantom
 from sim.loop.loop import Loop, groups, tick_channels
 from sim.loop.servo import Field, FrameLog, Servo, TickLog
 from sim.recording.recorder import Group, Recorder
@@ -40,7 +41,7 @@ from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.replay_html import Target
 from sim.world.phantom_port import phantom_port
-from sim.world.plant import make_hand, make_plant
+from sim.world.plant import make_plant
 from sim.world.robot_world import RobotWorld
 
 Array = npt.NDArray[np.float64]
@@ -159,19 +160,19 @@ def wire_arm(
     ready(compiled_parts("arm", CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), program.ops))
     compiled = robot_arm_map().compiled()
     world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])
+    device = simulated_phantom(port, Arm(pushes=pushes))
     servo = Servo(
         plant=make_plant(world),
-        port=port,
+        device=device,
         field=Field(
             units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory(),
             limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
-        hand=make_hand(Arm(pushes=pushes)),
         reference=make_reference(world.arm, compiled, period * config.arm_ticks, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
-        argument=port.hand[1:8],
+        argument=device.hand[1:8],
     )  # fmt: skip
     return servo, world, curve
 

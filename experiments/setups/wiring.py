@@ -45,6 +45,7 @@ from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.body.figure import Figure, FigureGains
 from sim.compilation.kernel_units import law_units
+from sim.devices.simulated import simulated_phantom
 from sim.loop.servo import Field as CompiledField
 from sim.loop.servo import Servo
 from sim.reference.map_derivative import map_derivative
@@ -52,7 +53,7 @@ from sim.reference.reference import begin_in_motion, check_reference, make_refer
 from sim.reference.settling import stood
 from sim.users.arm import Arm
 from sim.world.phantom_port import PhantomPort, phantom_port, sense_in_motion
-from sim.world.plant import make_hand, make_plant
+from sim.world.plant import make_plant
 from sim.world.world import World, phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -175,19 +176,19 @@ def wire(
     if isinstance(blended, Led):
         gains = led_gains(blended)
     figure = Figure(world.model, world.data, world.figure, FIGURE, gains)
+    device = simulated_phantom(port, user)
     servo = Servo(
         plant=make_plant(world),
-        port=port,
+        device=device,
         field=CompiledField(
             units=law_units(program.ops), ops=program.ops, params=program.params, memory=memory,
             limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
             wrench=np.zeros(6), force=np.zeros(3),
         ),
-        hand=make_hand(user),
         reference=reference,
         figure=figure.state,
         figure_ticks=config.figure_ticks,
-        argument=walker if leading else port.hand[1:8],
+        argument=walker if leading else device.hand[1:8],
     )  # fmt: skip
     if not isinstance(blended, Led):
         remarks += _pace_remark(curve.duration, blended.lap_seconds)

@@ -33,7 +33,6 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
-from sim.world.plant import make_hand
 
 Array = npt.NDArray[np.float64]
 
@@ -127,7 +126,8 @@ class Bench:
         root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
         session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
         field = session.servo.field.of(program)
-        servo = session.servo._replace(field=field, hand=make_hand(Arm(400.0, 10.0, way, STEP)))
+        device = session.servo.device.held_by(Arm(400.0, 10.0, way, STEP))
+        servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
 
         def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:

@@ -20,7 +20,7 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.native import mj_differentiate_pos
 from sim.errors import SimError
-from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
+from sim.reference.reference_state import CompiledReference, NoReference, carry, follow_trail, look_around
 from sim.reference.river_changes import change_river, may_change, stop
 from sim.reference.settling import approach, let_down, slowness
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
@@ -158,6 +158,12 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
         )
     if not 0.0 <= blend < math.inf:
         raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
+
+
+def no_reference(compiled: CompiledMap | None = None) -> NoReference:
+    """The reference of a run without a figure; `compiled` is the map that soft walls of its field ask."""
+    maps = [] if compiled is None else [(compiled.kind, compiled.params)]
+    return NoReference(map_units(maps), np.zeros(0))
 
 
 def make_reference(
