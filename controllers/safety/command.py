@@ -8,15 +8,15 @@ A fault is not held to it: it lets go at once.
 import numpy as np
 from numba import njit
 
-from controllers.safety.energy_tank import TANK_SCALE, book_force, guard_energy
+from controllers.safety.energy_tank import book_force, guard_energy
 from controllers.safety.faults import (
     FAULT_CODE,
-    FAULT_RAMP,
     FORCE_NOT_FINITE,
     LIMITER_NOT_FINITE,
     TANK_NOT_FINITE,
     first_not_finite,
     latch,
+    ramp_in,
 )
 from controllers.safety.limiter import LIMITER_FAULT, LIMITER_FORCE, bound_force, slew_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
@@ -52,14 +52,13 @@ def command_force(
             latch(faults, FORCE_NOT_FINITE, t, first_not_finite(wrench[:3]))
         else:
             latch(faults, LIMITER_NOT_FINITE, t, first_not_finite(limiter))
-    if faults[FAULT_RAMP] < 1.0:
-        for i in range(3):
-            force[i] *= faults[FAULT_RAMP]
+    ramp_in(faults, force)
     if faults[FAULT_CODE] != 0.0:
         force[0] = force[1] = force[2] = 0.0
-    guard_energy(budget, tank, p, v, force)
-    if not np.isfinite(force[0] + force[1] + force[2] + tank[TANK_SCALE]):
+    # Before it is used: min(e_max, NaN) would be a full tank.
+    if not np.isfinite(np.sum(tank)):
         latch(faults, TANK_NOT_FINITE, t, first_not_finite(tank))
+    guard_energy(budget, tank, p, v, force)
     if faults[FAULT_CODE] == 0.0:
         slew_force(limits, limiter, force)
     else:

@@ -128,6 +128,8 @@ def judge_reading(
         if sequence == faults[_SEQUENCE]:
             if np.isnan(faults[_FRESH]):
                 faults[_FRESH] = t
+            if faults[_STARTED] == 0.0:
+                faults[FAULT_RAMP] = 0.0
             if t - faults[_FRESH] > faults[_SILENCE]:
                 latch(faults, READING_STALE, t, t - faults[_FRESH])
             return HELD
@@ -163,9 +165,16 @@ def judge_reading(
         faults[_STILL_SINCE] = clock
     elif clock - faults[_STILL_SINCE] > faults[_STILL]:
         latch(faults, ENCODERS_FROZEN, t, clock - faults[_STILL_SINCE])
-    if faults[FAULT_RAMP] < 1.0:
-        faults[FAULT_RAMP] = min(1.0, faults[FAULT_RAMP] + period / faults[_RAMP_TIME])
     return verdict
+
+
+@njit
+def ramp_in(faults: Array, force: Array) -> None:
+    """Scale a force (3,) by the share that is ramped in, in place, and raise the share by a period's."""
+    if faults[FAULT_RAMP] < 1.0:
+        for i in range(3):
+            force[i] *= faults[FAULT_RAMP]
+        faults[FAULT_RAMP] = min(1.0, faults[FAULT_RAMP] + faults[_PERIOD] / faults[_RAMP_TIME])
 
 
 @njit

@@ -181,15 +181,15 @@ class Loop:
         """
         plant, every = self.servo.plant, self.servo.figure_ticks
         wanted = every * round(seconds / (plant.period * every))
-        left = ticks_of(self.servo.device)
-        if left is not None and self._tick + wanted > left:
-            end, rest = (self._tick + wanted) * plant.period, max(0, left - self._tick) * plant.period
+        left, first = ticks_of(self.servo.device), self._tick
+        if left is not None and first + wanted > left:
+            end, rest = (first + wanted) * plant.period, (left - first) * plant.period
             raise SimError(
-                f"the replayed hand ends after {left} ticks ({left * plant.period:g} s), the run would after {end:g} s; "
-                f"ask for {rest:g} s or less"
+                f"the replayed hand ends after {left} ticks ({left * plant.period:g} s), the run would end after "
+                f"{end:g} s; ask for {rest:g} s or less"
             )
         ticks, frames = make_logs(self.servo, self._block)
-        first, begin = self._tick, time.perf_counter()
+        begin = time.perf_counter()
         while self._tick < first + wanted:
             n = min(self._block, first + wanted - self._tick)
             if self._laws or self._before_tick is not None:

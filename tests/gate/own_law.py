@@ -4,16 +4,16 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from experiments.own_law import loop_with
-from sim.recorder import Recorder
+from experiments.setups.own_law import loop_with
+from sim.recording.recorder import Recorder
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra import Weight
 from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
-from experiments.config import RunConfig
-from sim.loop import groups, record_into
+from experiments.config.run_config import RunConfig
+from sim.loop.loop import groups, record_into
 
 
 def wall(hand: HandState) -> np.ndarray:

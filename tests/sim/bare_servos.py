@@ -1,7 +1,5 @@
 """Servos of a device and a FOLLOW field with no clips behind them, which are quick to compile."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
@@ -9,20 +7,21 @@ from controllers.fields.follow import Follow
 from controllers.fields.instructions import Program
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import HandState
 from models.humanoid.skeleton import rest_pose
+from models.phantom.kinematics import encoder_reading, gimbal_reading
 from models.scene import SceneConfig
 from sim.body.unsimulated import no_figure
+from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units
-from sim.devices.device import DeviceState
+from sim.devices.device import DeviceState, read_device, write_device
 from sim.devices.exchange import (
-    COMMAND_CLOCK,
     READING_CLOCK,
     READING_GIMBAL,
     READING_SEQUENCE,
     READING_SWITCH,
     READING_THETA,
     Exchange,
-    exchange,
     valid_torque,
 )
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
@@ -30,8 +29,8 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import Field, FrameLog, Servo, TickLog, run_block
 from sim.reference.reference import no_reference
 from sim.users.arm import Arm
-from sim.world.phantom_port import phantom_port
-from sim.world.plant import Hand, make_hand, make_plant
+from sim.world.phantom_port import PhantomPort, phantom_port
+from sim.world.plant import Hand, Plant, advance, make_plant
 from sim.world.world import World
 
 START = np.array([0.02, 0.01, 0.0])
@@ -73,6 +72,30 @@ def run(servo: Servo, n: int, first: int = 0) -> tuple[TickLog, FrameLog]:
     return ticks, frames
 
 
+@entry_point
+def pass_period(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: np.ndarray) -> None:
+    """A servo period of a simulated Phantom whose motors somebody else has set."""
+    advance(plant, port, user, t, False, applied)
+
+
+class Stepped:
+    """A simulated Phantom called from Python: read, then write, once a period."""
+
+    def __init__(self, world: World, arm: Arm | None = None, cutoff: float = CUTOFF):
+        self.device = simulated_phantom(phantom_port(world.model, world.data, world.config.servo_period, cutoff),
+                                        arm or Arm())  # fmt: skip
+        self.plant, self.ticks = make_plant(world), 0
+        self._applied = np.zeros((self.plant.substeps, self.device.user_torques))
+
+    def read(self) -> HandState:
+        read_device(self.device, self.ticks * self.plant.period)
+        return HandState.of(self.device.hand)
+
+    def write(self, force: np.ndarray) -> None:
+        write_device(self.device, self.plant, self.ticks * self.plant.period, force, self._applied)
+        self.ticks += 1
+
+
 class Driver:
     """What stands behind an `Exchange` here: a second simulated Phantom, whose encoders and motors it is wired to.
 
@@ -95,8 +118,6 @@ class Driver:
     def read(self) -> None:
         """Write a new reading."""
         port, r = self.phantom.port, self.device.reading
-        from models.phantom.kinematics import encoder_reading, gimbal_reading
-
         r[READING_THETA : READING_THETA + 3] = encoder_reading(tuple(port.qpos[list(port.arm_q)]))
         r[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_reading(tuple(port.qpos[list(port.gimbal_q)]))
         r[READING_SWITCH], r[READING_CLOCK] = 0.0, self.clock
@@ -104,9 +125,7 @@ class Driver:
 
     def write(self) -> None:
         """Apply the command that is valid, and let a period pass."""
-        from sim.world.plant import advance
-
         valid_torque(self.device.command, self.device.silence, self.clock, self.torque)
         self.plant.ctrl[list(self.phantom.port.motor)] = self.torque
-        advance(self.plant, self.phantom.port, self.phantom.user, self.clock, False, self._applied)
+        pass_period(self.plant, self.phantom.port, self.phantom.user, self.clock, self._applied)
         self.ticks += 1
