@@ -5,6 +5,7 @@ each is compiled, and kept, by itself. Calling convention and errors are those o
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, cast
 
 from numba import types
@@ -28,19 +29,35 @@ def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, 
 
     @intrinsic
     def call(typingctx: Any, address: Any, given: Any) -> Any:
-        signature = types.void(types.int64, types.Tuple(arguments))
-
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            convention = context.call_conv
-            kernel = convention.get_function_type(types.void, arguments).as_pointer()
-            status, _ = convention.call_function(
-                builder, builder.inttoptr(values[0], kernel), types.void, arguments,
-                cgutils.unpack_tuple(builder, values[1], len(arguments)),
-            )  # fmt: skip
-            with cgutils.if_unlikely(builder, status.is_error):
-                convention.return_status_propagate(builder, status)
-            return context.get_dummy_value()
-
-        return signature, generate
+        return types.void(types.int64, types.Tuple(arguments)), _generate
 
     return cast(Callable[[int, tuple[Any, ...]], None], call)
+
+
+@intrinsic
+def _call_as_given(typingctx: Any, address: Any, given: Any) -> Any:
+    return types.void(types.int64, types.Tuple(tuple(given.types))), _generate
+
+
+call_as_given = cast(Callable[[int, tuple[Any, ...]], None], _call_as_given)
+"""`kernel_call` of kernels whose arguments have the very types of those given."""
+
+
+def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    convention, arguments = context.call_conv, signature.args[1].types
+    kernel = convention.get_function_type(types.void, arguments).as_pointer()
+    status, _ = convention.call_function(
+        builder, builder.inttoptr(values[0], kernel), types.void, arguments,
+        cgutils.unpack_tuple(builder, values[1], len(arguments)),
+    )  # fmt: skip
+    with cgutils.if_unlikely(builder, status.is_error):
+        convention.return_status_propagate(builder, status)
+    return context.get_dummy_value()
+
+
+@cache
+def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
+    """Address of a kernel, an ``njit`` function, compiled in this process for these types; it stays alive."""
+    kernel.compile(arguments)
+    compiled = kernel.get_compile_result(types.void(*arguments))
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

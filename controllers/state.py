@@ -5,11 +5,11 @@ device's zero configuration): ``[t, p (3), quaternion wxyz (4), v (3), ω (3), s
 (3)]``, both in H, the moment about the stylus tip.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 Array: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -27,11 +27,12 @@ HAND_SWITCH = 14
 HAND_SIZE = 15
 
 
-@dataclass(frozen=True, eq=False)
-class HandState:
+class HandState(NamedTuple):
     """What the device measures of the hand at one tick.
 
-    Parameters
+    In compiled code (`hand_state`) vectors are tuples of floats.
+
+    Attributes
     ----------
     t : float
         Time since the start of the run [s].
@@ -70,6 +71,19 @@ class HandState:
     def vector(self) -> Array:
         """Array of the `HAND_SIZE` numbers that compiled laws read."""
         return np.concatenate(([self.t], self.p, self.q, self.v, self.w, [float(self.switch)]))
+
+
+@njit
+def hand_state(vector: Array) -> HandState:
+    """Hand of a vector of `HAND_SIZE` numbers, in compiled code: p, q, v and w are tuples."""
+    return HandState(
+        vector[HAND_TIME],
+        (vector[1], vector[2], vector[3]),  # pyright: ignore[reportArgumentType]
+        (vector[4], vector[5], vector[6], vector[7]),  # pyright: ignore[reportArgumentType]
+        (vector[8], vector[9], vector[10]),  # pyright: ignore[reportArgumentType]
+        (vector[11], vector[12], vector[13]),  # pyright: ignore[reportArgumentType]
+        vector[HAND_SWITCH] > 0.0,
+    )
 
 
 class Wrench(NamedTuple):

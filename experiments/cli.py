@@ -7,9 +7,14 @@ _STARTED = time.perf_counter()
 # The matrices here are small: more threads only get into each other's way. Read by NumPy when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import contextlib  # noqa: E402
+import io  # noqa: E402
+import itertools  # noqa: E402
+import re  # noqa: E402
 import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
 from dataclasses import dataclass, field  # noqa: E402
+from importlib.metadata import version  # noqa: E402
 from pathlib import Path  # noqa: E402
 from typing import Annotated  # noqa: E402
 
@@ -18,10 +23,11 @@ import tyro  # noqa: E402
 from controllers.certificates.flight.tolerance import BallisticTolerance, Judging  # noqa: E402
 from controllers.certificates.loop.hand import NO_HANDS, HandRange  # noqa: E402
 from controllers.certificates.report import Certificate, ChangedInputs  # noqa: E402
-from controllers.errors import ControllerError  # noqa: E402
+from controllers.errors import ControllerError, ParameterError  # noqa: E402
 from controllers.haptic_map.lifting.room import Room  # noqa: E402
-from experiments.config.options import above, at_least, check_numbers  # noqa: E402
+from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
+from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
@@ -34,7 +40,7 @@ Positional = tyro.conf.Positional
 class Run:
     """Run a hand, a field, a map and a figure, and write what happened into a folder."""
 
-    config: tyro.conf.OmitArgPrefixes[RunConfig]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]
     out: Path = Path("runs/run")
     """Folder to write."""
     overwrite: bool = False
@@ -46,7 +52,7 @@ class Run:
         """Run."""
         from experiments.run import run
 
-        run(self.config, self.out, self.overwrite, _STARTED, self.view)
+        run(config_of_options(self.options), self.out, self.overwrite, _STARTED, self.view)
         return 0
 
 
@@ -61,8 +67,8 @@ class Demo:
 
     def __call__(self) -> int:
         """Run."""
+        from experiments.demo import demo_config
         from experiments.run import run
-        from experiments.setups.demo import demo_config
 
         run(demo_config(), self.out, self.overwrite, _STARTED)
         return 0
@@ -89,13 +95,13 @@ class Convert:
         return 0
 
 
-@dataclass(frozen=True)
+@part
 class Track:
     """Let the physical figure follow clips on its own, and report how well it does."""
 
     clips: Positional[tuple[str, ...]] = ()
     """Names of embedded clips, or files; all embedded clips by default."""
-    seconds: float = above(0.0, 10.0, "s")
+    seconds: Annotated[float, above(0.0, unit="s")] = 10.0
     """Simulated time for each [s]."""
     json: bool = False
     """Print the reports as JSON."""
@@ -108,11 +114,11 @@ class Track:
         return 0
 
 
-@dataclass(frozen=True)
+@part
 class Certify:
     """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
-    config: tyro.conf.OmitArgPrefixes[RunConfig]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]
     run: Annotated[Path | None, tyro.conf.Positional] = None
     """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
     clip: str | None = None
@@ -120,15 +126,15 @@ class Certify:
     out: Path | None = None
     """Folder for the certificate, runs/certificate by default, runs/certificate-CLIP of a clip; one that is there
     already is taken if nothing has changed."""
-    delay: float = at_least(0.0, 0.0, "s")
+    delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
     """Of the motors' torques, for a field [s]."""
-    hand_push: float = at_least(0.0, 1.0, "N")
+    hand_push: Annotated[float, at_least(0.0, unit="N")] = 1.0
     """Largest force of the hand for which the distance from the curve is bounded [N]."""
     hand: HandRange = field(default_factory=HandRange)
     no_hand: bool = False
     """Certify for nobody's hand on the stylus."""
     tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
-    friction: float = above(0.0, Judging.friction)
+    friction: Annotated[float, above(0.0)] = Judging.friction
     """Coefficient of friction of soles on the floor, for clips."""
     verify: Path | None = None
     """Only check that this certificate.json is of the same field, hands, clips and code; exit code 1 if it is not."""
@@ -157,11 +163,12 @@ class Certify:
 
     def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
         """The field, and the clips that are certified with it; gains alone have none."""
-        if self.run is None and self.config.mode != "lead" and not self.config.map.endswith(".npz"):
-            return self.config, ()
+        config = config_of_options(self.options)
+        if self.run is None and config.map.kind not in ("led", "file"):
+            return config, ()
         from experiments.certify.certified_clips import run_and_clips
 
-        return run_and_clips(self.run, self.config)
+        return run_and_clips(self.run, config)
 
     def _made(self) -> Certificate:
         from experiments.certify.certify import certify_clip_into, certify_into
@@ -174,7 +181,8 @@ class Certify:
         return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
 
     def _checked(self, file: Path) -> Certificate | None:
-        from experiments.certify.certified_field import certificate_inputs, clip_inputs, verify_certificate
+        from experiments.certify.certified_field import certificate_inputs
+        from experiments.files.certificate_files import clip_inputs, verify_certificate
 
         if self.clip is not None:
             from experiments.setups.clips import load_clips
@@ -203,7 +211,7 @@ class Repair:
 
     def __call__(self) -> int:
         """Repair, and say what was changed."""
-        from experiments.certify.repair import repair_file
+        from experiments.flights.repair import repair_file
 
         for line in repair_file(self.source, self.target, self.overwrite).lines():
             print(line)
@@ -222,13 +230,13 @@ class TeleArm:
 
     def __call__(self) -> int:
         """Run."""
-        from experiments.setups.robot_arm import run_arm
+        from experiments.run_arm import run_arm
 
         run_arm(self.config, self.out, self.overwrite)
         return 0
 
 
-@dataclass(frozen=True)
+@part
 class Lift:
     """Author a curve for every clip, and one haptic map with all of them, from the clips alone."""
 
@@ -239,7 +247,7 @@ class Lift:
     room: Room = field(default_factory=Room)
     cyclic: tuple[str, ...] = ()
     """Clips that have to close; by default all those are closed curves that do."""
-    seed: int = at_least(0, 1)
+    seed: Annotated[int, whole(0)] = 1
     """Of the places from which the arrangement begins."""
     overwrite: bool = False
     """Replace the file if it exists."""
@@ -264,7 +272,7 @@ class Report:
 
     def __call__(self) -> int:
         """Draw."""
-        from experiments.run import write_report_of
+        from experiments.results.report_of import write_report_of
 
         write_report_of(self.folder)
         return 0
@@ -313,9 +321,32 @@ class Bench:
         return 0
 
 
+@dataclass(frozen=True)
+class Clips:
+    """Name the embedded clips."""
+
+    json: bool = False
+    """Print them as JSON."""
+
+    def __call__(self) -> int:
+        """Name them."""
+        from models.mocap.library import embedded, embedded_names
+
+        found = [embedded(name) for name in embedded_names()]
+        if self.json:
+            print(
+                json_text([{"name": c.name, "seconds": c.duration, "closed": c.closes(), "fps": c.fps} for c in found])
+            )
+            return 0
+        for clip in found:
+            print(f"{clip.name:14} {clip.duration:5.2f} s  {'closed' if clip.closes() else 'open'}")
+        return 0
+
+
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Clips, tyro.conf.subcommand("clips")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
@@ -343,10 +374,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    command: Command = tyro.cli(Command, prog="hvf", args=arguments, description=__doc__)  # pyright: ignore[reportArgumentType, reportUnknownVariableType, reportCallIssue]
+    if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        print(f"hvf {version('haptic-vector-fields')}")
+        return 0
     try:
-        check_numbers(command)
-        return command()
+        return _parsed(arguments)()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -359,6 +391,26 @@ def _run(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         print("hvf: stopped; what was recorded so far is kept", file=sys.stderr)
         return 130
+
+
+def _parsed(arguments: Sequence[str] | None) -> Command:
+    """The command that was typed.
+
+    Raises
+    ------
+    ParameterError
+        If it was mistyped: what tyro says in a box, in one line.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(Command, prog="hvf", args=arguments, description=__doc__)  # pyright: ignore[reportArgumentType, reportUnknownVariableType, reportCallIssue]
+    except SystemExit as ended:
+        if ended.code in (0, None):
+            raise
+        lines = [line.strip("│ ") for line in said.getvalue().splitlines() if line.startswith("│")]
+        first = " ".join(itertools.takewhile(lambda line: set(line) != {"─"}, lines))
+        raise ParameterError(re.sub(r"^Error parsing \w+: ", "", first) or said.getvalue().strip()) from None
 
 
 if __name__ == "__main__":

@@ -1,77 +1,33 @@
-"""What a run needs compiled, made in a process of its own, which gives back the memory that a compiler takes."""
+"""What a run needs compiled, made before it in processes of its own, while a bar tells what is still to be done."""
 
-import pickle
-import subprocess
-import sys
-from pathlib import Path
+from collections.abc import Sequence
 
-import numpy as np
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from controllers.fields.program import LAW_KERNELS
-from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.evaluate import kinds_of
-from controllers.state import IntArray
-from experiments.config.run_config import ArmConfig, RunConfig
-from sim.compilation.compiled import CACHE_FOLDER
-
-Config = RunConfig | ArmConfig
+from sim.compilation.unit_workers import compile_units, missing_units
+from sim.compilation.units import Unit
 
 
-def compiled_parts(body: str, haptic_map: CompiledMap, ops: IntArray | None = None) -> tuple[str, ...]:
-    """Names of what is compiled by itself for a run: the loop for a body, kernels of the map and of the field's laws.
+def compile_once(console: Console, units: Sequence[Unit]) -> None:
+    """Compile those of the units that are not kept, and say so.
 
-    Parameters
-    ----------
-    body : str
-        ``figure`` or ``arm``.
-    haptic_map : CompiledMap
-        Whose poses the body follows, and whose walls the field may have.
-    ops : IntArray, optional
-        Instructions (n, 4) of the field, if it is known.
+    A compilation that fails leaves it to the run itself, which then says what is wrong.
     """
-    kinds = kinds_of(haptic_map.kind, haptic_map.params)
-    laws = set() if ops is None else {int(opcode) for opcode in ops[:, 0]} & LAW_KERNELS.keys()
-    return (body, *(f"map-{kind}" for kind in kinds), *(f"law-{opcode}" for opcode in sorted(laws)))
-
-
-def compile_once(console: Console, config: Config, parts: tuple[str, ...]) -> None:
-    """Compile all that a run needs, if any of these parts has not been compiled by this version of the code.
-
-    It says so first. A compilation that fails leaves it to the run itself, which then says what is wrong.
-    """
-    if all(_mark(part).exists() for part in parts):
+    waiting = list(missing_units(units))
+    if not waiting:
         return
-    console.print("Compiling what this run needs; this happens once for each version of the code.")
-    subprocess.run(
-        [sys.executable, "-m", "experiments.compiling"], input=pickle.dumps(config), check=False, capture_output=True
-    )
+    console.print("Compiling what this run needs; it is kept until that changes.")
+    columns = (TextColumn("compiling"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
+    with Progress(*columns, TimeElapsedColumn(), TextColumn("{task.fields[names]}"), console=console) as progress:
+        task = progress.add_task("", total=len(waiting), names=_names(waiting))
+
+        def done(unit: Unit) -> None:
+            waiting.remove(unit)
+            progress.update(task, advance=1, names=_names(waiting))
+
+        compile_units(tuple(waiting), done)
 
 
-def _mark(part: str) -> Path:
-    return CACHE_FOLDER / f"{part}.compiled"
-
-
-def _compile(config: Config) -> None:
-    from sim.loop.loop import Loop
-
-    parts: set[str] = set()
-    if isinstance(config, ArmConfig):
-        from experiments.setups.robot_arm import wire_arm
-
-        servo, world, _ = wire_arm(config, parts.update)
-    else:
-        from experiments.run import default_poses
-        from experiments.setups.clips import load_clips
-        from experiments.setups.wiring import wire
-
-        session = wire(config, load_clips(config.clips)[0], ready=parts.update)
-        servo, world = session.servo, session.world
-        default_poses(session)(np.empty((0, 3)), np.empty(0), np.empty(0))
-    Loop(servo, world).run(servo.plant.period * servo.figure_ticks)
-    for part in parts:
-        _mark(part).touch()
-
-
-if __name__ == "__main__":
-    _compile(pickle.load(sys.stdin.buffer))
+def _names(units: Sequence[Unit]) -> str:
+    return ", ".join(unit.name.strip("_") for unit in units)

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
-from experiments.run import RECORDING, clips_of, config_of
+from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.setups.wiring import wire
 from sim.errors import SimError
 from sim.loop.loop import Loop, tick_channels
@@ -38,10 +39,11 @@ def _check_map(config: RunConfig, recording: Recording) -> None:
     recorded = recording.texts.get("map_sha256")
     if recorded is None:
         return
-    found = map_digest(Path(config.map))
+    path = config.map.file if isinstance(config.map, MapFile) else ""
+    found = map_digest(Path(path))
     if found != recorded:
         raise SimError(
-            f"{config.map}: the map has changed since the run was recorded: its SHA-256 is {found[:12]}…, expected "
+            f"{path}: the map has changed since the run was recorded: its SHA-256 is {found[:12]}…, expected "
             f"{recorded[:12]}…; put the file back that the run was made with, or make it again by the same hvf lift"
         )
 

@@ -4,11 +4,12 @@ from dataclasses import asdict
 
 from rich.console import Console
 
+from experiments.compiling import compile_once
 from experiments.files.json_text import json_text
 from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.body.tracking import track
-from sim.compilation.compiled import is_cached
+from sim.compilation.units import Unit
 
 
 def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
@@ -33,9 +34,11 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
     clips, remarks = load_clips(names)
     for remark in remarks:
         console.print(remark, highlight=False)
-    if not is_cached():
-        console.print("Compiling the figure's control; this happens once for each version of the code.")
-    reports = {name: track(clip, seconds) for name, clip in zip(names, clips, strict=True)}
+
+    def ready(units: tuple[Unit, ...]) -> None:
+        compile_once(console, units)
+
+    reports = {name: track(clip, seconds, ready=ready) for name, clip in zip(names, clips, strict=True)}
     if as_json:
         print(json_text({name: asdict(report) for name, report in reports.items()}))
         return

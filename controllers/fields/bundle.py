@@ -10,15 +10,15 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.fields.river import River
-from controllers.state import Array, HandState, Wrench
+from controllers.state import Array
 
 _KEYS = ("times", "positions", "quaternions", "numbers", "speeds")
 
 
 @dataclass(frozen=True, eq=False)
-class RiverBundle:
+class RiverBundle(Law):
     r"""Rivers that share a space.
 
     .. math:: V = \sum_i V_i, \qquad F = \sum_i F_i
@@ -60,10 +60,6 @@ class RiverBundle:
     def program(self) -> Program:
         """Compiled form of the force."""
         return reduce(add, (river.program() for river in self.rivers))
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state, by the compiled laws."""
-        return Wrench(np.sum([river.wrench(hand).force for river in self.rivers], axis=0), np.zeros(3))
 
     def arrays(self) -> dict[str, Array]:
         """The bundle as arrays by key, ``name/what``; `from_arrays` makes the same bundle of them, to the last bit."""

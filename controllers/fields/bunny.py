@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -11,8 +11,9 @@ from controllers.checks import checked, one_of
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import BUNNY, Program, leave_trace, wrench_of
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.fields.instructions import leave_trace
+from controllers.fields.law import Law, Program
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 
 _LONGEST_TICK = 0.05  # [s] a bunny that waits does not leap after a pause
 
@@ -29,33 +30,44 @@ def _square_to(params: Array, curve: int, phase: float, p: Array) -> float:
     return (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
 
 
+class BunnyGains(NamedTuple):
+    """Parameters of `bunny_wrench`: k_r [N/m], b_d [N s/m], 1/δ² [1/m²], and whether it pulls along, and waits."""
+
+    k_r: float
+    b_d: float
+    inverse_square: float
+    along: float
+    waits: float
+
+
 @njit
 def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction BUNNY: parameters [k_r, b_d, 1/δ², along, waits], memory [t*, t_b, time of the last tick]."""
+    """Kernel of `Bunny`: parameters `BunnyGains`, memory [t*, t_b, time of the last tick]."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
-    time, inverse_square = hand[HAND_TIME], params[at + 2]
+    gains = BunnyGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4])
+    time = hand[HAND_TIME]
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
     memory[slot] = phase
-    if params[at + 4] == 0.0:
+    if gains.waits == 0.0:
         bunny = params[curve + START] + time
     elif np.isnan(memory[slot + 1]):
         bunny = phase
     else:
-        pace = gaussian(_square_to(params, curve, memory[slot + 1], p), inverse_square)
+        pace = gaussian(_square_to(params, curve, memory[slot + 1], p), gains.inverse_square)
         bunny = memory[slot + 1] + pace * min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
     bunny = wrap_phase(params, curve, bunny)
     memory[slot + 1], memory[slot + 2] = bunny, time
-    pull = gaussian(_square_to(params, curve, bunny, p), inverse_square)
-    target = phase if params[at + 3] > 0.0 else bunny
+    pull = gaussian(_square_to(params, curve, bunny, p), gains.inverse_square)
+    target = phase if gains.along > 0.0 else bunny
     p_curve, v_curve = curve_point(params, curve, target), curve_velocity(params, curve, target)
     for i in range(3):
-        wrench[i] = pull * follow_force(p[i], v[i], p_curve[i], v_curve[i], params[at], params[at + 1])
+        wrench[i] = pull * follow_force(p[i], v[i], p_curve[i], v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
     leave_trace(params, curve, memory, phase, distance, bunny)
 
 
 @dataclass(frozen=True, eq=False)
-class Bunny:
+class Bunny(Law):
     r"""Attractor φ(t_b) that keeps its own pace and pulls the hand near it.
 
     .. math:: L = G_\delta(p - \varphi(t_b))\,\bigl(k_r\,(\varphi(s) - p) + b_d\,(\dot\varphi(s) - \dot p)\bigr)
@@ -102,13 +114,10 @@ class Bunny:
 
     @cached_property
     def _program(self) -> Program:
-        forms = [float(self.attraction == "along"), float(self.pace == "wait")]
-        return Program.law(BUNNY, [self.k_r, self.b_d, self.delta**-2, *forms], [np.nan] * 3, self.curve)
+        along, waits = float(self.attraction == "along"), float(self.pace == "wait")
+        gains = BunnyGains(self.k_r, self.b_d, self.delta**-2, along, waits)
+        return Program.of(self, bunny_wrench, gains, [np.nan] * 3, self.curve)
 
     def program(self) -> Program:
         """Compiled form of the field."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """L at one hand state, by the compiled law; a bunny that waits has just started."""
-        return wrench_of(bunny_wrench, self._program, hand)

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, reduce
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,17 +14,14 @@ from controllers.checks import checked, one_of
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
-from controllers.fields.follow import follow_at
-from controllers.fields.instructions import RECORDED, Program, wrench_of
+from controllers.fields.follow import FollowGains, follow_at
+from controllers.fields.law import Law, Program
 from controllers.fields.river import River, river_flow
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_TIME, Array, HandState, Wrench
+from controllers.state import HAND_POSITION, HAND_TIME, Array
 
 _SPACING = 0.01  # [s] between samples of a performance: finer than a hand moves, coarser than encoders count
 _LONGEST_TICK = 0.05  # [s] a recording that waits does not leap after a pause
-
-# Parameters: gains as FOLLOW's, then weight, 1/ε², whether it waits, and where the performed curve is.
-_WEIGHT, _INVERSE_SQUARE, _WAITS, _PERFORMED, _HEADER = 3, 4, 5, 6, 7
 
 
 @njit
@@ -34,13 +31,30 @@ def _nearness(params: Array, performed: int, s: float, inverse_square: float, p:
     return window(((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2) * inverse_square)
 
 
+class RecordedGains(NamedTuple):
+    """Parameters of `recorded_wrench`, before the packed curve φ': FOLLOW's gains, α, 1/ε², and whether it waits."""
+
+    k_r: float
+    b_d: float
+    river_inverse_square: float
+    weight: float
+    inverse_square: float
+    waits: float
+
+
+_HEADER = len(RecordedGains._fields)
+
+
 @njit
 def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction RECORDED: parameters see `Edited`, memory [t* of φ', s, time of the last tick]."""
-    p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + int(params[at + _PERFORMED])
-    inverse_square, start, end = params[at + _INVERSE_SQUARE], params[performed + START], params[performed + END]
+    """Kernel of a performance: parameters `RecordedGains` and φ', memory [t* of φ', s, time of the last tick]."""
+    gains = RecordedGains(
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
+    )  # fmt: skip
+    p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + _HEADER
+    inverse_square, start, end = gains.inverse_square, params[performed + START], params[performed + END]
     s, time = hand[HAND_TIME], hand[HAND_TIME]
-    if params[at + _WAITS] > 0.0:
+    if gains.waits > 0.0:
         s = start
         if not math.isnan(memory[slot + 1]):
             s = memory[slot + 1]
@@ -56,8 +70,9 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         there, speed = np.empty(3), np.empty(3)
         there[0], there[1], there[2] = curve_point(params, performed, s)
         speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
-        memory[slot], _ = follow_at(params, at, curve, memory[slot], there, speed, wrench)
-        share = params[at + _WEIGHT] * _nearness(params, performed, s, inverse_square, p)
+        follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square)
+        memory[slot], _ = follow_at(follow, params, curve, memory[slot], there, speed, wrench)
+        share = gains.weight * _nearness(params, performed, s, inverse_square, p)
         for i in range(3):
             wrench[i] *= -share
 
@@ -100,7 +115,31 @@ def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
 
 
 @dataclass(frozen=True, eq=False)
-class Edited:
+class Performance(Law):
+    """One performance of a user on a river as a field, α U: parameters as `Edited`'s."""
+
+    river: River
+    performed: Trajectory
+    weight: float
+    epsilon: float
+    pace: Literal["clock", "wait"]
+
+    @cached_property
+    def _program(self) -> Program:
+        river, waits = self.river, float(self.pace == "wait")
+        gains = RecordedGains(
+            river.drag / river.tau, river.drag, river.epsilon**-2, self.weight, self.epsilon**-2, waits
+        )  # fmt: skip
+        numbers = np.concatenate([gains, self.performed.packed()])
+        return Program.of(self, recorded_wrench, numbers, [np.nan] * 3, river.curve)
+
+    def program(self) -> Program:
+        """Compiled form of α U as a force."""
+        return self._program
+
+
+@dataclass(frozen=True, eq=False)
+class Edited(Law):
     r"""River V, and performances of a user as fields U_j on top of it, weighted.
 
     .. math:: V + \sum_j \alpha_j U_j, \qquad
@@ -148,25 +187,16 @@ class Edited:
         return tuple(curve.packed() for curve in (self.river.curve, *self.performed))
 
     @cached_property
-    def _recorded(self) -> tuple[Program, ...]:
-        """U_j as forces."""
-        laws: list[Program] = []
-        gains = [self.river.drag / self.river.tau, self.river.drag, self.river.epsilon**-2]
-        for weight, blob in zip(self.weights, self._blobs[1:], strict=True):
-            header = [*gains, weight, self.epsilon**-2, float(self.pace == "wait"), _HEADER]
-            laws.append(Program.law(RECORDED, np.concatenate([header, blob]), [np.nan] * 3, self.river.curve))
-        return tuple(laws)
+    def _program(self) -> Program:
+        laws = [
+            Performance(self.river, curve, weight, self.epsilon, self.pace)
+            for curve, weight in zip(self.performed, self.weights, strict=True)
+        ]
+        return reduce(Program.__add__, laws, self.river.program())
 
     def program(self) -> Program:
-        """Compiled form of the force of V + Σ α U."""
-        return sum(self._recorded, start=self.river.program())
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state, by the compiled laws; a recording that waits has just started."""
-        force = self.river.wrench(hand).force
-        for law in self._recorded:
-            force = force + wrench_of(recorded_wrench, law, hand).force
-        return Wrench(force, np.zeros(3))
+        """Compiled form of the force of V + Σ α U; a recording that waits begins with the run."""
+        return self._program
 
     def flow(self, t: float, p: Array) -> Array:
         """V + Σ α U at time t of the performance [m/s], shape (3,)."""

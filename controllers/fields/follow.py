@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -9,9 +10,10 @@ from numba import njit
 from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
-from controllers.fields.instructions import FOLLOW, Program, leave_trace, wrench_of
+from controllers.fields.instructions import leave_trace
+from controllers.fields.law import Law, Program
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
 
 @njit
@@ -20,31 +22,45 @@ def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float,
     return k_r * (p_curve - p) + b_d * (v_curve - v)
 
 
+class FollowGains(NamedTuple):
+    """Parameters of `follow_wrench`: k_r [N/m], b_d [N s/m] and 1/ε² [1/m²]."""
+
+    k_r: float
+    b_d: float
+    inverse_square: float
+
+
+@njit
+def follow_gains(params: Array, at: int) -> FollowGains:
+    """Those that begin at ``params[at]``."""
+    return FollowGains(params[at], params[at + 1], params[at + 2])
+
+
 @njit
 def follow_at(
-    params: Array, at: int, curve: int, guess: float, p: Array, v: Array, wrench: Array
+    gains: FollowGains, params: Array, curve: int, guess: float, p: Array, v: Array, wrench: Array
 ) -> tuple[float, float]:
     """Write the wrench at position p [m] and velocity v [m/s]; returns t* [s] and the distance [m]."""
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], guess)
     p_curve, v_curve = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
-    w = window(distance * distance * params[at + 2])
+    w = window(distance * distance * gains.inverse_square)
     for i in range(3):
-        wrench[i] = w * follow_force(p[i], v[i], p_curve[i], v_curve[i], params[at], params[at + 1])
+        wrench[i] = w * follow_force(p[i], v[i], p_curve[i], v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
     return phase, distance
 
 
 @njit
 def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction FOLLOW: parameters [k_r, b_d, 1/ε²], memory [t*]."""
+    """Kernel of `Follow`: parameters `FollowGains`, memory [t*]."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
-    phase, distance = follow_at(params, at, curve, memory[slot], p, v, wrench)
+    phase, distance = follow_at(follow_gains(params, at), params, curve, memory[slot], p, v, wrench)
     memory[slot] = phase
     leave_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
-class Follow:
+class Follow(Law):
     r"""River force that traces a curve by itself and yields to the hand.
 
     .. math:: F = w(d/\varepsilon)\,\bigl(k_r\,(\varphi(t^*) - p) + b_d\,(\dot\varphi(t^*) - \dot p)\bigr)
@@ -84,12 +100,8 @@ class Follow:
 
     @cached_property
     def _program(self) -> Program:
-        return Program.law(FOLLOW, [self.k_r, self.b_d, self.epsilon**-2], [np.nan], self.curve)
+        return Program.of(self, follow_wrench, FollowGains(self.k_r, self.b_d, self.epsilon**-2), [np.nan], self.curve)
 
     def program(self) -> Program:
         """Compiled form of the field."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """F at one hand state, by the compiled law; t* is found without a warm start."""
-        return wrench_of(follow_wrench, self._program, hand)

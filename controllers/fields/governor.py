@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +12,20 @@ from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
-from controllers.fields.instructions import GOVERNOR, Program, leave_trace, wrench_of
+from controllers.fields.instructions import leave_trace
+from controllers.fields.law import Law, Program
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
-_DRAG, _INVERSE_SQUARE, _ROWS, _SPEEDS = range(4)
+_SPEEDS = 3  # where they begin, behind `GovernorGains`
+
+
+class GovernorGains(NamedTuple):
+    """Parameters of `governor_wrench`: b [N s/m], 1/ε² [1/m²], and how many pairs of speeds follow."""
+
+    drag: float
+    inverse_square: float
+    rows: float
 
 
 @njit
@@ -26,7 +36,8 @@ def governor_force(speed: float, least: float, greatest: float, drag: float) -> 
 
 @njit
 def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction GOVERNOR: parameters [b, 1/ε², rows, speeds (2 rows)], memory [t*]."""
+    """Kernel of `Governor`: parameters `GovernorGains` and the speeds, memory [t*]."""
+    gains = GovernorGains(params[at], params[at + 1], params[at + 2])
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
     memory[slot] = phase
@@ -34,17 +45,17 @@ def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     # Where the curve rests it has no direction, and there is no force.
     pace = max(np.sqrt(x * x + y * y + z * z), 1e-12)
     share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
-    least, greatest = admissible_speeds(params, at + _SPEEDS, int(params[at + _ROWS]), share)
+    least, greatest = admissible_speeds(params, at + _SPEEDS, int(gains.rows), share)
     speed = (v[0] * x + v[1] * y + v[2] * z) / pace
-    force = governor_force(speed, least, greatest, params[at + _DRAG])
-    force *= window(distance * distance * params[at + _INVERSE_SQUARE]) / pace
+    force = governor_force(speed, least, greatest, gains.drag)
+    force *= window(distance * distance * gains.inverse_square) / pace
     wrench[0], wrench[1], wrench[2] = force * x, force * y, force * z
     wrench[3:] = 0.0
     leave_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
-class Governor:
+class Governor(Law):
     r"""Force that keeps a hand's pace along a curve within what the motion under it admits.
 
     .. math:: F = w(d/\varepsilon)\,b\,\bigl(\langle v_{min} - s\rangle - \langle s - v_{max}\rangle\bigr)\,
@@ -86,13 +97,9 @@ class Governor:
     @cached_property
     def _program(self) -> Program:
         speeds = np.asarray(self.speeds)
-        numbers = np.concatenate([[self.drag, self.epsilon**-2, len(speeds)], speeds.ravel()])
-        return Program.law(GOVERNOR, numbers, [np.nan], self.curve)
+        numbers = np.concatenate([GovernorGains(self.drag, self.epsilon**-2, len(speeds)), speeds.ravel()])
+        return Program.of(self, governor_wrench, numbers, [np.nan], self.curve)
 
     def program(self) -> Program:
         """Compiled form of the field."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """F at one hand state, by the compiled law; t* is found without a warm start."""
-        return wrench_of(governor_wrench, self._program, hand)

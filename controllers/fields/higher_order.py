@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,14 +15,41 @@ from controllers.curves.trajectory import END, PERIODIC, START, curve_point, cur
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
-from controllers.fields.instructions import HIGHER_ORDER, TRACE_RIVER, Program, leave_trace, wrench_of
+from controllers.fields.instructions import TRACE_RIVER, leave_trace
+from controllers.fields.law import Law, Program
 from controllers.fields.window import window
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 
-# Parameters: a header, offsets of the rivers' blocks, and the blocks; offsets count from the header.
-_DISCRETE, _SHARPNESS, _ADMISSION, _RELEASE, _RIVERS, _LOOK, _HEADER = range(7)
-# A block: gains, tube, number of admissible speeds, then the speeds and the packed curve.
-_K_R, _B_D, _INVERSE_SQUARE, _EPSILON, _TAU, _SPEEDS, _BLOCK = range(7)
+
+class Crossing(NamedTuple):
+    """Parameters of `higher_order_wrench`; offsets of the rivers' blocks follow, counted from here, then the blocks.
+
+    The form, 1/2σ² [s²/m²], r and r + h [m/s], the number of rivers, and the time constant of the look [s].
+    """
+
+    discrete: float
+    sharpness: float
+    admission: float
+    release: float
+    rivers: float
+    look: float
+
+
+class RiverGains(NamedTuple):
+    """Begin of a river's block; pairs of admissible speeds follow, so many of them, and the packed curve.
+
+    k_r [N/m], b_d [N s/m], 1/ε² [1/m²], ε [m] and τ [s].
+    """
+
+    k_r: float
+    b_d: float
+    inverse_square: float
+    epsilon: float
+    tau: float
+    speeds: float
+
+
+_HEADER, _BLOCK = len(Crossing._fields), len(RiverGains._fields)
 # What is known of a branch.
 _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 
@@ -30,6 +57,21 @@ _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 _WHEN, _SEEN, _MEMORY = 2, 3, 6
 
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
+
+
+@njit
+def _crossing(params: Array, at: int) -> Crossing:
+    return Crossing(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
+
+
+@njit
+def _river(params: Array, at: int, number: float) -> tuple[RiverGains, int, int]:
+    """Gains of a river, and where its speeds and its curve begin."""
+    block = at + int(params[at + _HEADER + int(number)])
+    gains = RiverGains(
+        params[block], params[block + 1], params[block + 2], params[block + 3], params[block + 4], params[block + 5]
+    )  # fmt: skip
+    return gains, block + _BLOCK, block + _BLOCK + 2 * int(gains.speeds)
 
 
 @njit
@@ -51,19 +93,21 @@ def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
 
 
 @njit
-def _branch_mismatch(params: Array, block: int, curve: int, phase: float, p: Array, v: Array) -> float:
+def _branch_mismatch(
+    params: Array, river: RiverGains, speeds: int, curve: int, phase: float, p: Array, v: Array
+) -> float:
     there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     pace = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
     speed = max(math.sqrt(pace), 1e-12)
     s = speed
-    rows = int(params[block + _SPEEDS])
+    rows = int(river.speeds)
     if rows > 0:
         share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
-        least, greatest = admissible_speeds(params, block + _BLOCK, rows, share)
+        least, greatest = admissible_speeds(params, speeds, rows, share)
         s = min(max((v[0] * along[0] + v[1] * along[1] + v[2] * along[2]) / speed, least), greatest)
     square = towards = draw = 0.0
     for i in range(3):
-        e, y = v[i] - s / speed * along[i], (there[i] - p[i]) / params[block + _TAU]
+        e, y = v[i] - s / speed * along[i], (there[i] - p[i]) / river.tau
         square += e * e
         towards += e * y
         draw += y * y
@@ -73,26 +117,25 @@ def _branch_mismatch(params: Array, block: int, curve: int, phase: float, p: Arr
 @njit
 def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int:
     """Branches of all rivers in whose tubes p is, as rows of the table; returns their number."""
-    count = 0
+    count, crossing = 0, _crossing(params, at)
     found = np.empty((BRANCHES, 2))
-    for river in range(int(params[at + _RIVERS])):
-        block = at + int(params[at + _HEADER + river])
-        curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
-        for k in range(branches(params, curve, p[0], p[1], p[2], params[block + _EPSILON], found)):
+    for number in range(int(crossing.rivers)):
+        river, speeds, curve = _river(params, at, number)
+        for k in range(branches(params, curve, p[0], p[1], p[2], river.epsilon, found)):
             row = table[count]
-            row[_RIVER], row[_PHASE], row[_DISTANCE] = river, found[k, 0], found[k, 1]
-            w = window(found[k, 1] * found[k, 1] * params[block + _INVERSE_SQUARE])
+            row[_RIVER], row[_PHASE], row[_DISTANCE] = number, found[k, 0], found[k, 1]
+            w = window(found[k, 1] * found[k, 1] * river.inverse_square)
             if w > 0.0:
-                m = _branch_mismatch(params, block, curve, found[k, 0], p, v)
-                row[_WINDOW], row[_SCORE] = w, m * m - math.log(w) / params[at + _SHARPNESS]
+                m = _branch_mismatch(params, river, speeds, curve, found[k, 0], p, v)
+                row[_WINDOW], row[_SCORE] = w, m * m - math.log(w) / crossing.sharpness
                 count += 1
     return count
 
 
 @njit
-def _look(params: Array, at: int, memory: Array, slot: int, t: float, v: Array) -> Array:
+def _look(look: float, memory: Array, slot: int, t: float, v: Array) -> Array:
     """The velocity by which rivers are told apart: smoothed, unless no time has passed."""
-    seen, look = memory[slot + _SEEN : slot + _MEMORY], params[at + _LOOK]
+    seen = memory[slot + _SEEN : slot + _MEMORY]
     passed = t - memory[slot + _WHEN]
     # False for NaN, the first time.
     share = 1.0 - math.exp(-passed / look) if look > 0.0 and passed > 0.0 else 1.0
@@ -104,18 +147,18 @@ def _look(params: Array, at: int, memory: Array, slot: int, t: float, v: Array) 
 
 @njit
 def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Array, wrench: Array) -> None:
-    block = at + int(params[at + _HEADER + int(row[_RIVER])])
-    curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+    river, _, curve = _river(params, at, row[_RIVER])
     p_curve, v_curve = curve_point(params, curve, row[_PHASE]), curve_velocity(params, curve, row[_PHASE])
     for i in range(3):
-        force = follow_force(p[i], v[i], p_curve[i], v_curve[i], params[block + _K_R], params[block + _B_D])
+        force = follow_force(p[i], v[i], p_curve[i], v_curve[i], river.k_r, river.b_d)
         wrench[i] += share * row[_WINDOW] * force
 
 
 @njit
 def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array, wrench: Array) -> int:
     """Add the weighted forces; returns the row with the greatest weight, −1 if that is the null weight."""
-    sharpness, null = params[at + _SHARPNESS], params[at + _ADMISSION] ** 2
+    crossing = _crossing(params, at)
+    sharpness, null = crossing.sharpness, crossing.admission**2
     least = null
     for k in range(count):
         least = min(least, table[k, _SCORE])
@@ -134,13 +177,13 @@ def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array
 @njit
 def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, slot: int) -> int:
     """Row of the river that has the hand, −1 for none; memory [river, phase] keeps it."""
-    admission, release = params[at + _ADMISSION], params[at + _RELEASE]
+    crossing = _crossing(params, at)
+    admission, release = crossing.admission, crossing.release
     current, nearest = -1, math.inf
     best = -1
     for k in range(count):
         if table[k, _RIVER] == memory[slot]:
-            block = at + int(params[at + _HEADER + int(table[k, _RIVER])])
-            curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+            _, _, curve = _river(params, at, table[k, _RIVER])
             lap = params[curve + END] - params[curve + START]
             away = abs(table[k, _PHASE] - memory[slot + 1])
             if params[curve + PERIODIC] > 0.0:
@@ -162,16 +205,16 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
 def higher_order_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
-    """Instruction HIGHER_ORDER: parameters see `HigherOrder`, memory see the module; `curve` is not used."""
+    """Kernel of `HigherOrder`: parameters see `Crossing`, memory see the module; `curve` is not used."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     if not np.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2]):
         wrench[:] = np.nan
         return
     wrench[:] = 0.0
-    rivers = int(params[at + _RIVERS])
-    table = np.empty((rivers * BRANCHES + 1, _CANDIDATE))
-    count = _candidates(params, at, p, _look(params, at, memory, slot, hand[HAND_TIME], v), table)
-    if params[at + _DISCRETE] > 0.0:
+    crossing = _crossing(params, at)
+    table = np.empty((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE))
+    count = _candidates(params, at, p, _look(crossing.look, memory, slot, hand[HAND_TIME], v), table)
+    if crossing.discrete > 0.0:
         winner = _discrete(params, at, table, count, memory, slot)
         if winner >= 0:
             _add_force(params, at, table[winner], 1.0, p, v, wrench)
@@ -189,13 +232,12 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
         for k in range(1, count):
             if table[k, _DISTANCE] < table[shown, _DISTANCE]:
                 shown = k
-    first, last = 0, int(params[at + _RIVERS])
+    first, last = 0, int(_crossing(params, at).rivers)
     if shown >= 0:
         first, last = int(table[shown, _RIVER]), int(table[shown, _RIVER]) + 1
     memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
     for river in range(first, last):
-        block = at + int(params[at + _HEADER + river])
-        curve = block + _BLOCK + 2 * int(params[block + _SPEEDS])
+        _, _, curve = _river(params, at, river)
         if shown >= 0:
             phase, distance = table[shown, _PHASE], table[shown, _DISTANCE]
         else:
@@ -204,7 +246,7 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
 
 
 @dataclass(frozen=True, eq=False)
-class HigherOrder:
+class HigherOrder(Law):
     r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
 
     With m_i the distance of the hand's velocity from the admissible ones of river i, s φ̇_i/|φ̇_i| at t*_i with s in
@@ -262,17 +304,17 @@ class HigherOrder:
         blocks: list[Array] = []
         for river in self.bundle.rivers:
             speeds = np.zeros(0) if river.speeds is None else np.ravel(river.speeds)
-            gains = [river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, river.tau, len(speeds) / 2]
+            gains = RiverGains(
+                river.drag / river.tau, river.drag, river.epsilon**-2, river.epsilon, river.tau, len(speeds) / 2
+            )  # fmt: skip
             blocks.append(np.concatenate([gains, speeds, river.curve.packed()]))
         release = self.admission + self.hysteresis
-        header = [float(self.form == "discrete"), 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look]
+        discrete = float(self.form == "discrete")
+        header = Crossing(discrete, 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look)
         offsets = np.cumsum([_HEADER + len(blocks), *(len(block) for block in blocks[:-1])])
-        return Program.law(HIGHER_ORDER, np.concatenate([header, offsets, *blocks]), [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0])
+        memory = [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0]
+        return Program.of(self, higher_order_wrench, np.concatenate([header, offsets, *blocks]), memory)
 
     def program(self) -> Program:
         """Compiled form of the field."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """F at one hand state, by the compiled law; in the discrete form no river has the hand yet."""
-        return wrench_of(higher_order_wrench, self._program, hand)

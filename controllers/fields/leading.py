@@ -1,58 +1,34 @@
 r"""LEADING: the stylus leads a walking figure, and feels how far it can be followed (Donald & Henle 2000, section 8).
 
-The figure walks on its own path A(s) (`controllers.walking.walked_path`): s is how far along it the figure is, and
-everything about the figure is a function of s. So going back is s growing less, and poses come back as they were.
+The figure is a `controllers.walking.walker.Walker`, which this law moves.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from controllers.checks import checked
 from controllers.errors import ParameterError
-from controllers.fields.instructions import (
-    LEADING,
-    TRACE_ATTRACTOR,
-    TRACE_DISTANCE,
-    TRACE_PHASE,
-    TRACE_POINT,
-    Program,
-    wrench_of,
-)
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
-from controllers.walking.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
-from controllers.walking.walked_path import (
-    GRAVITY,
-    PATH_BEND,
-    PATH_HEADING,
-    PATH_X,
-    PATH_Y,
-    ROW,
-    ROWS,
-    STEP,
-    lay_row,
-    lean_row,
-    path_back,
-    path_front,
-    path_value,
-    straight_path,
+from controllers.fields.instructions import TRACE_SIZE, leave_place
+from controllers.fields.law import Law, Program
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+from controllers.walking.gait import Gait
+from controllers.walking.walked_path import GRAVITY, STEP, path_front, straight_path
+from controllers.walking.walker import (
+    MARGIN,
+    Following,
+    Walker,
+    following_at,
+    fresh_walker,
+    lead,
+    packed_following,
+    path_place,
+    walker_at,
 )
 
-# Memory: the walker as the seven numbers that a haptic map takes [s, u, 0, 1, 0, 0, 0], its speed, the place on the
-# path that is nearest to the stylus, when the last tick was, the bend with which the path is laid, the sum of which
-# its lean is made, what is decided of the next flight, then the path.
-ARGUMENT, SPEED, GOAL, LAST_TIME, BEND, SWAY, FLIGHT, PATH = 0, 7, 8, 9, 10, 11, 12, 12 + DECISION
-HELD = ARGUMENT + 1  # u
-_K_L, _B, _K_Z, _SCALE, _RATE, _PULL, _FORWARD, _BACKWARD, _LEAD, _LEAD_BACK = range(10)
-_TURN, _LATERAL, _CURVATURE, _AHEAD, _DECAY, _STRIDE = range(10, 16)
-_TAKE_OFF, _LANDING, _HASTE, _STANCES, _PHASES, _SHARES = range(16, 22)
-
-_SEARCHES = 4  # steps of the search for the nearest place, warm-started
-_LONGEST_TICK = 0.05  # [s] a walker that was not asked for longer has not moved on
-_STEERING = 0.15  # [m] of path over which the bend follows the stylus
-_MARGIN = 4  # rows of the path that a figure may be ahead of itself, by the filter before its map
 _HEIGHT = 1.0  # of the pendulum by which it leans [m]
 _FORESIGHT = 1.5  # times the pendulum's length of way
 
@@ -84,142 +60,52 @@ def leading_force(
     return -k_l * (u_t * c - u_n * s) - b * v_x, -k_l * (u_t * s + u_n * c) - b * v_y
 
 
-@njit
-def walker_acceleration(lag: float, speed: float, rate: float) -> float:
-    """s̈ = ω² (g − D − s) − 2 ω ṡ [m/s²], of a figure that lags by g − D − s [m] and follows with ω [1/s]."""
-    return rate * rate * lag - 2.0 * rate * speed
+class LeadingGains(NamedTuple):
+    """Parameters of `leading_wrench`, before those of the walker.
 
+    k_l [N/m], b [N s/m], k_z [N/m], S, and how far the figure follows forwards and backwards [m].
+    """
 
-@njit
-def _place(memory: Array, path: int, s: float) -> tuple[float, float, float, float]:
-    """Place [m], heading [rad] and curvature [1/m] of the path at s, within what there is of it."""
-    heading, curvature = path_value(memory, path, s, PATH_HEADING)
-    return path_value(memory, path, s, PATH_X)[0], path_value(memory, path, s, PATH_Y)[0], heading, curvature
-
-
-@njit
-def _nearest(memory: Array, path: int, guess: float, x: float, y: float) -> float:
-    """Arc length of the place next to (x, y), near a guess, on the path and the straight line on from its front."""
-    front, back = path_front(memory, path), path_back(memory, path)
-    goal = guess
-    for _ in range(_SEARCHES):
-        at = min(goal, front)
-        a, b, heading, curvature = _place(memory, path, at)
-        c, s = np.cos(heading), np.sin(heading)
-        along, side = c * (x - a) + s * (y - b), c * (y - b) - s * (x - a)
-        # Newton's step, damped where the path bends round the stylus.
-        stretch = max(1.0 - curvature * side, 0.3) if goal < front else 1.0
-        goal = max(goal + (along - (goal - at)) / stretch, back)
-    return goal
-
-
-@njit
-def _lay_path(params: Array, at: int, memory: Array, slot: int, x: float, y: float) -> None:
-    """Lay the path as far ahead of the figure as its feet need it, bent towards the stylus's place (x, y)."""
-    path, speed = slot + PATH, max(memory[slot + SPEED], 0.1)
-    limit = min(params[at + _CURVATURE], params[at + _TURN] / speed, params[at + _LATERAL] / (speed * speed))
-    ahead, phases = params[at + _AHEAD], params[at + _PHASES]
-    while path_front(memory, path) < memory[slot + ARGUMENT] + ahead:
-        a, b, heading, _ = _place(memory, path, path_front(memory, path))
-        c, s = np.cos(heading), np.sin(heading)
-        forward, side = c * (x - a) + s * (y - b), c * (y - b) - s * (x - a)
-        # Pure pursuit: the arc that is tangent to the path and meets the stylus.
-        bend = 2.0 * side / max(forward * forward + side * side, ahead * ahead) if forward > 0.0 else 0.0
-        bend = memory[slot + BEND] + (min(max(bend, -limit), limit) - memory[slot + BEND]) * STEP / _STEERING
-        bend = min(max(bend, -limit), limit)
-        memory[slot + BEND] = bend
-        lap = (memory[path] + 0.5) * STEP / params[at + _STRIDE]
-        share = params[at + _SHARES + int(phases * (lap - np.floor(lap))) % int(phases)]
-        lay_row(memory, path, share * bend * STEP, abs(bend), share * bend * memory[slot + SPEED] ** 2)
-        back = int(ahead / STEP) - _MARGIN
-        memory[slot + SWAY] = lean_row(memory, path, back, params[at + _DECAY], memory[slot + SWAY])
-
-
-@njit
-def _bent_speed(params: Array, at: int, memory: Array, path: int, s: float, speed: float) -> float:
-    """Largest speed at s [m/s] from which the figure can brake for every bend that lies before it."""
-    pull, front = min(params[at + _PULL], params[at + _HASTE]), memory[path]
-    square = params[at + _FORWARD] ** 2
-    rows = int(0.5 * speed * speed / (pull * STEP)) + 6
-    first = np.floor(s / STEP) - 2.0 if speed > 0.0 else np.floor(s / STEP) - rows + 4.0
-    for k in range(rows):
-        row = min(max(first + k, front - ROWS + 1.0), front)
-        bend = max(memory[path + 1 + ROW * (int(row) % ROWS) + PATH_BEND], 1e-9)
-        # The turn to a row from the one before is made over three steps.
-        distance = max(abs(s / STEP - row + 0.5) - 1.5, 0.0) * STEP
-        most = min((params[at + _TURN] / bend) ** 2, params[at + _LATERAL] / bend)
-        square = min(square, most + 2.0 * pull * distance)
-    return np.sqrt(square)
-
-
-@njit
-def _walk(params: Array, at: int, memory: Array, slot: int, dt: float) -> None:
-    """The figure follows with inertia: s̈ = ω² (g − D − s) − 2 ω ṡ, bounded, and slower where the path bends."""
-    rate, path = params[at + _RATE], slot + PATH
-    on_ground = memory[slot + HELD] > 0.5 or params[at + _STANCES] == 0.0
-    pull = params[at + (_PULL if on_ground else _HASTE)]
-    s, speed = memory[slot + ARGUMENT], memory[slot + SPEED]
-    acceleration = walker_acceleration(memory[slot + GOAL] - params[at + _AHEAD] - s, speed, rate)
-    speed += dt * min(max(acceleration, -pull), pull)
-    most = _bent_speed(params, at, memory, path, s, speed)
-    speed = min(max(speed, -params[at + _BACKWARD], -most), most)
-    s += dt * speed
-    least = path_back(memory, path) + params[at + _AHEAD]
-    if s < least:
-        s, speed = least, 0.0
-    memory[slot + ARGUMENT], memory[slot + SPEED] = s, speed
-
-
-@njit
-def _decide_flight(params: Array, at: int, memory: Array, slot: int) -> None:
-    """How far the figure stays on the ground, by its place in the lap and its pace (see `controllers.walking.gait`)."""
-    first, lap = at + _SHARES + int(params[at + _PHASES]), memory[slot + ARGUMENT] / params[at + _STRIDE]
-    share = share_of_stance(params, first, int(params[at + _STANCES]), lap)
-    decide_flight(memory, slot + FLIGHT, share, memory[slot + SPEED], params[at + _TAKE_OFF], params[at + _LANDING])
-    memory[slot + HELD] = memory[slot + FLIGHT]
+    k_l: float
+    b: float
+    k_z: float
+    scale: float
+    lead: float
+    lead_back: float
 
 
 @njit
 def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction LEADING: parameters and memory as in the module."""
+    """Kernel of `Leading`: parameters `LeadingGains` and `Following`, memory a `Walker`."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
         # What is not finite must reach the limiter, and must not reach the path.
         wrench[:3] = np.nan
         return
-    path, scale = slot + PATH, params[at + _SCALE]
-    x, y = scale * p[0], scale * p[1]
-    goal = _nearest(memory, path, memory[slot + GOAL], x, y)
-    memory[slot + GOAL] = goal
-    dt = hand[HAND_TIME] - memory[slot + LAST_TIME]
-    memory[slot + LAST_TIME] = hand[HAND_TIME]
-    # False for NaN, the first tick.
-    if dt > 0.0:
-        _walk(params, at, memory, slot, min(dt, _LONGEST_TICK))
-        _decide_flight(params, at, memory, slot)
-        _lay_path(params, at, memory, slot, x, y)
-    front = path_front(memory, path)
+    gains = LeadingGains(
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
+    )  # fmt: skip
+    follow, walker, scale = following_at(params, at + 6), walker_at(memory, slot), gains.scale
+    lead(follow, walker, hand[HAND_TIME], scale * p[0], scale * p[1])
+    goal, front = walker.goal[0], path_front(walker.path)
     nearest, beyond = min(goal, front), max(goal - front, 0.0)
-    a, b, heading, _ = _place(memory, path, nearest)
+    a, b, heading, _ = path_place(walker.path, nearest)
     c, s = np.cos(heading), np.sin(heading)
     # Beyond the path any place can be reached that an arc leads to; on it there is no room to the sides.
-    room = 0.5 * params[at + _CURVATURE] * beyond * beyond
+    room = 0.5 * follow.curvature * beyond * beyond
     wrench[0], wrench[1] = leading_force(
-        p[0], p[1], v[0], v[1], a, b, c, s, nearest - memory[slot + ARGUMENT] - params[at + _AHEAD],
-        params[at + _LEAD_BACK], params[at + _LEAD], room, scale, params[at + _K_L], params[at + _B],
+        p[0], p[1], v[0], v[1], a, b, c, s, nearest - walker.argument[0] - follow.ahead,
+        gains.lead_back, gains.lead, room, scale, gains.k_l, gains.b,
     )  # fmt: skip
-    wrench[2] = -params[at + _K_Z] * p[2] - params[at + _B] * v[2]
+    wrench[2] = -gains.k_z * p[2] - gains.b * v[2]
     q_x, q_y = (a + beyond * c) / scale, (b + beyond * s) / scale
     distance = np.sqrt((p[0] - q_x) ** 2 + (p[1] - q_y) ** 2 + p[2] ** 2)
-    if distance < memory[TRACE_DISTANCE]:
-        memory[TRACE_PHASE], memory[TRACE_DISTANCE] = memory[slot + ARGUMENT], distance
-        memory[TRACE_ATTRACTOR] = goal
-        memory[TRACE_POINT], memory[TRACE_POINT + 1], memory[TRACE_POINT + 2] = q_x, q_y, 0.0
+    leave_place(memory, walker.argument[0], (q_x, q_y, 0.0), distance, goal)
 
 
 @dataclass(frozen=True, eq=False)
-class Leading:
+class Leading(Law):
     r"""Force of a figure that is led, on a stylus that moves over the floor like a carrot on a stick.
 
     .. math::
@@ -328,25 +214,25 @@ class Leading:
 
     @cached_property
     def _program(self) -> Program:
-        gait, path = self.gait, self.path()
-        numbers = [
-            self.k_l, self.b, self.k_z, self.scale, self.rate, self.pull, self.forward * gait.speed,
-            self.backward * gait.speed, 2.0 * gait.speed / self.rate, 2.0 * self.backward * gait.speed / self.rate,
-            self.turn_two, self.lateral, self.curvature, self.ahead, np.exp(-STEP / self._sway), gait.stride,
-            self.take_off * gait.speed, self.landing * gait.speed,
-            self.haste if gait.flies else np.inf, len(gait.stances), len(self.shares), *self.shares,
-            *gait.stances.ravel(),
-        ]  # fmt: skip
-        walker = np.zeros(PATH)
-        walker[ARGUMENT + 3], walker[GOAL], walker[LAST_TIME] = 1.0, self.ahead, np.nan
-        walker[HELD] = float(gait.flies)
-        walker[FLIGHT:PATH] = fresh_decision(gait.flies)
-        return Program.law(LEADING, numbers, np.concatenate([walker, path]).tolist())
+        gait = self.gait
+        follow = Following(
+            rate=self.rate, pull=self.pull, forward=self.forward * gait.speed, backward=self.backward * gait.speed,
+            turn=self.turn_two, lateral=self.lateral, curvature=self.curvature,
+            take_off=self.take_off * gait.speed, landing=self.landing * gait.speed,
+            haste=self.haste if gait.flies else np.inf, ahead=self.ahead, decay=float(np.exp(-STEP / self._sway)),
+            stride=gait.stride, shares=self.shares, stances=gait.stances,
+        )  # fmt: skip
+        gains = LeadingGains(
+            self.k_l, self.b, self.k_z, self.scale, 2.0 * gait.speed / self.rate,
+            2.0 * self.backward * gait.speed / self.rate,
+        )  # fmt: skip
+        numbers = np.concatenate([gains, packed_following(follow)])
+        return Program.of(self, leading_wrench, numbers, fresh_walker(gait, self.ahead, self.path()))
 
     @property
     def ahead(self) -> float:
         """D, how far ahead of the figure its path is laid [m]: a foot finds its place there, and a bend its lean."""
-        return max(self.gait.reach, _FORESIGHT * self._sway) + _MARGIN * STEP
+        return max(self.gait.reach, _FORESIGHT * self._sway) + MARGIN * STEP
 
     @property
     def _sway(self) -> float:
@@ -360,9 +246,17 @@ class Leading:
         return straight_path(self.scale * x - self.ahead * c, self.scale * y - self.ahead * s, self.heading, self.ahead)
 
     def program(self) -> Program:
-        """Compiled form of the field; figure and path lie in its memory."""
+        """Compiled form of the field; the walker lies in its memory."""
         return self._program
 
-    def wrench(self, hand: HandState) -> Wrench:
-        """F at one hand state, by the compiled law, with the figure where it begins."""
-        return wrench_of(leading_wrench, self._program, hand)
+    def walker(self, memory: Array, slot: int = TRACE_SIZE) -> Walker:
+        """The walker of a run, for whoever shows or measures it: views of the memory.
+
+        Parameters
+        ----------
+        memory : Array
+            Of the field's program, or of one that this field is a part of.
+        slot : int
+            Where the field's part begins (see `Program.slot_of`).
+        """
+        return walker_at.py_func(memory, slot)

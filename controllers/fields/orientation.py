@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -10,31 +11,41 @@ from controllers.checks import checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import ORIENTATION, Program, leave_trace, wrench_of
+from controllers.fields.instructions import leave_trace
+from controllers.fields.law import Law, Program
 from controllers.fields.window import window
 from controllers.rotations import logarithm, multiply
-from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array, HandState, Wrench
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array
+
+
+class OrientationGains(NamedTuple):
+    """Parameters of `orientation_wrench`: k_o [N m/rad], b_o [N m s/rad] and 1/ε² [1/m²]."""
+
+    k_o: float
+    b_o: float
+    inverse_square: float
 
 
 @njit
 def orientation_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
-    """Instruction ORIENTATION: parameters [k_o, b_o, 1/ε²], memory [t*]."""
+    """Kernel of `Orientation`: parameters `OrientationGains`, memory [t*]."""
+    gains = OrientationGains(params[at], params[at + 1], params[at + 2])
     p, q, w = hand[HAND_POSITION:], hand[HAND_QUATERNION:], hand[HAND_ANGULAR_VELOCITY:]
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
     memory[slot] = phase
     (a, b, c, d), spin = curve_orientation(params, curve, phase)
     error = logarithm(*multiply(a, b, c, d, q[0], -q[1], -q[2], -q[3]))
-    share = window(distance * distance * params[at + 2])
+    share = window(distance * distance * gains.inverse_square)
     for i in range(3):
         wrench[i] = 0.0
-        wrench[3 + i] = share * (params[at] * error[i] + params[at + 1] * (spin[i] - w[i]))
+        wrench[3 + i] = share * (gains.k_o * error[i] + gains.b_o * (spin[i] - w[i]))
     leave_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation:
+class Orientation(Law):
     r"""Moment that turns the stylus to the orientation of the curve where the hand is nearest to it; no force.
 
     .. math:: \tau = w(d/\varepsilon)\,\bigl(k_o \log(R_c R^T) + b_o\,(\omega_c - \omega)\bigr), \qquad R_c = R(t^*)
@@ -76,12 +87,9 @@ class Orientation:
 
     @cached_property
     def _program(self) -> Program:
-        return Program.law(ORIENTATION, [self.k_o, self.b_o, self.epsilon**-2], [np.nan], self.curve)
+        gains = OrientationGains(self.k_o, self.b_o, self.epsilon**-2)
+        return Program.of(self, orientation_wrench, gains, [np.nan], self.curve)
 
     def program(self) -> Program:
         """Compiled form of the field."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """τ at one hand state, by the compiled law; t* is found without a warm start."""
-        return wrench_of(orientation_wrench, self._program, hand)

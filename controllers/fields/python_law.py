@@ -1,33 +1,36 @@
 """A law of force in plain Python, wherever a compiled one can stand."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
-import numpy as np
+from numba import njit
 
-from controllers.fields.instructions import EXTERNAL, Program, PythonFunction
-from controllers.state import HandState, Wrench
+from controllers.fields.function_law import FunctionLaw
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.law import Program, PythonFeed
+from controllers.state import Array
 
 
-@dataclass(frozen=True, eq=False)
-class PythonLaw:
-    """Field F(hand) computed by a Python function at every tick of the servo.
+@njit
+def given_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Kernel of `PythonLaw`: memory [F (3), τ (3)], which Python has written there."""
+    for i in range(6):
+        wrench[i] = memory[slot + i]
 
-    It composes like any other (``Program`` and its algebra): the loop calls the function between sensing and the
-    compiled rest of the tick, and hands its force to the instruction EXTERNAL.
 
-    Parameters
-    ----------
-    function : callable
-        From the measured `HandState` to the force F_H [N], three numbers. What it keeps between ticks is its own
-        affair.
+@dataclass(frozen=True, eq=False, repr=False)
+class PythonLaw(FunctionLaw):
+    """Field computed by a Python function at every tick of the servo.
+
+    It composes like any other: the loop calls the function between sensing and the compiled rest of the tick. What the
+    function keeps between ticks is its own affair. Parameters are those of `FunctionLaw`.
     """
 
-    function: PythonFunction
+    @cached_property
+    def _program(self) -> Program:
+        feed = PythonFeed(TRACE_SIZE, self.six_numbers)
+        return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))
 
     def program(self) -> Program:
-        """Compiled form of the field: a slot for the function's force."""
-        return Program.law(EXTERNAL, [], [0.0] * 6, python_laws=(self.function,))
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state; calls the function."""
-        return Wrench(np.asarray(self.function(hand), dtype=float), np.zeros(3))
+        """Compiled form of the field: a place for the function's six numbers."""
+        return self._program

@@ -15,9 +15,9 @@ from controllers.curves.trajectory import Trajectory, curve_point, curve_velocit
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.admissible import checked_speeds
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.fields.window import window
-from controllers.state import Array, HandState, Wrench
+from controllers.state import Array
 
 __all__ = ["Course", "River", "integrate", "settling_time", "window"]
 
@@ -37,7 +37,7 @@ def river_flow(curve: Array, inverse_tau: float, inverse_square: float, p: Array
 
 
 @dataclass(frozen=True, eq=False)
-class River:
+class River(Law):
     r"""Tube of radius ε around a curve, with a current that runs along the curve and draws onto it.
 
     .. math:: V(p) = w(d/\varepsilon)\,\bigl(\dot\varphi(t^*) + (\varphi(t^*) - p)/\tau\bigr)
@@ -92,10 +92,6 @@ class River:
     def program(self) -> Program:
         """Compiled form of the force."""
         return self.force.program()
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force at one hand state, by the compiled law."""
-        return self.force.wrench(hand)
 
     def flow(self, t: float, p: Array) -> Array:
         """V(p) [m/s], shape (3,); it does not depend on the time t."""

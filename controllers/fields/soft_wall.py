@@ -9,27 +9,43 @@ with U'(e) = k e²/2m up to e = m, k (e − m/2) beyond, 0 below: a spring that 
 itself. The first part is −∇(P∘h): a potential, which gives back what it took. The second only takes: its power is
 −Σ d (|ω_j| − ω_max)_+ |ω_j|.
 
-Only where a map is at hand can a wall be evaluated: the servo calls `raise_walls` before `evaluate`, whose instruction
-SOFT_WALL takes the wrench from the memory. So the laws of force do not depend on the maps.
+h and h_* at the stylus are given to the law in its memory before it is evaluated (`controllers.fields.map_feed`).
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from controllers.checks import checked
 from controllers.errors import ParameterError
-from controllers.fields.instructions import SOFT_WALL, Program
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
-from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.law import Law, MapFeed, Program
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.rotations import logarithm, rotation_vector_rate
-from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_VELOCITY, Array, HandState, IntArray, Wrench
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array
 
-WRENCH = 6
-_KIND, _SIZE, _NQ, _NV, _JOINTS, _STIFFNESS, _MARGIN, _DAMPING, _SPEED, _HEADER = range(10)
 _COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9  # of a joint: three intervals follow; a hinge has one
+
+
+class WallGains(NamedTuple):
+    """Parameters of `soft_wall_wrench`; a row for each joint follows, and what its map is made of.
+
+    nq and nv, how many joints, k [N m/rad], m [rad], d [N m s/rad] and ω_max [rad/s].
+    """
+
+    nq: float
+    nv: float
+    joints: float
+    stiffness: float
+    margin: float
+    damping: float
+    speed: float
+
+
+_HEADER = len(WallGains._fields)
 
 
 @njit
@@ -43,9 +59,9 @@ def wall_slope(angle: float, low: float, high: float, stiffness: float, margin: 
 
 
 @njit
-def _torque(params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
+def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
     """∇P and the damper's torque of one joint, written to `torque` (3,); its rates (3,) are ω."""
-    k, m = params[_STIFFNESS], params[_MARGIN]
+    k, m = gains.stiffness, gains.margin
     column, limits = int(params[joint + _COLUMN]), joint + _LIMITS
     if params[joint + _BALL] == 0.0:
         torque[0] = wall_slope(pose[column], params[limits], params[limits + 1], k, m)
@@ -58,56 +74,40 @@ def _torque(params: Array, joint: int, pose: Array, rates: Array, torque: Array)
         # ṙ = D(r) ω for a local ω, and D(r)ᵀ = D(−r).
         torque[0], torque[1], torque[2] = rotation_vector_rate(-x, -y, -z, a, b, c)
     speed = np.sqrt(rates[0] * rates[0] + rates[1] * rates[1] + rates[2] * rates[2])
-    if speed > params[_SPEED]:
-        share = params[_DAMPING] * (speed - params[_SPEED]) / speed
+    if speed > gains.speed:
+        share = gains.damping * (speed - gains.speed) / speed
         for i in range(3):
             torque[i] += share * rates[i]
 
 
 @njit
-def soft_wall_wrench(wall: Array, pose: Array, jacobian: Array, hand: Array, wrench: Array) -> None:
-    """Wrench of a wall whose parameters (see `SoftWall`) begin an array, at h (nq,) and h_* (nv, 6)."""
+def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Kernel of `SoftWall`: parameters see `WallGains`, memory [h (nq), h_* (nv × 6), that of the map]."""
+    gains = WallGains(
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]
+    )  # fmt: skip
+    nq, nv = int(gains.nq), int(gains.nv)
+    pose, rest = memory[slot : slot + nq], slot + nq
+    jacobian = memory[rest : rest + nv * STYLUS_TANGENT].reshape((nv, STYLUS_TANGENT))
     rates, torque = np.zeros(3), np.empty(3)
     wrench[:] = 0.0
-    for n in range(int(wall[_JOINTS])):
-        joint = _HEADER + n * _JOINT
-        row, size = int(wall[joint + _ROW]), 1 if wall[joint + _BALL] == 0.0 else 3
+    for n in range(int(gains.joints)):
+        joint = at + _HEADER + n * _JOINT
+        row, size = int(params[joint + _ROW]), 1 if params[joint + _BALL] == 0.0 else 3
         for i in range(3):
             rates[i] = 0.0
             for j in range(3 if i < size else 0):
                 rates[i] += jacobian[row + i, j] * hand[HAND_VELOCITY + j]
                 rates[i] += jacobian[row + i, 3 + j] * hand[HAND_ANGULAR_VELOCITY + j]
-        _torque(wall, joint, pose, rates, torque)
+        _torque(gains, params, joint, pose, rates, torque)
         for i in range(size):
             if torque[i] != 0.0:
                 for j in range(STYLUS_TANGENT):
                     wrench[j] -= jacobian[row + i, j] * torque[i]
 
 
-@njit
-def raise_walls(units: IntArray, ops: IntArray, params: Array, memory: Array, hand: Array) -> None:
-    """Write the wrench of every wall of a field into its memory, where `evaluate` finds it.
-
-    Parameters
-    ----------
-    units : IntArray
-        Of the walls' maps (see `controllers.haptic_map.evaluate`).
-    ops, params, memory, hand
-        As `controllers.fields.program.evaluate` takes them; a wall's memory is its wrench (6), then that of its map.
-    """
-    stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
-    for row in range(ops.shape[0]):
-        if ops[row, 0] == SOFT_WALL:
-            wall, kept = params[ops[row, 1] :], memory[ops[row, 2] :]
-            first = _HEADER + int(wall[_JOINTS]) * _JOINT
-            haptic_map = wall[first : first + int(wall[_SIZE])]
-            pose, jacobian = np.empty(int(wall[_NQ])), np.empty((int(wall[_NV]), STYLUS_TANGENT))
-            evaluate_map_jacobian(units, int(wall[_KIND]), haptic_map, stylus, kept[WRENCH:], pose, jacobian)
-            soft_wall_wrench(wall, pose, jacobian, hand, kept[:WRENCH])
-
-
 @dataclass(frozen=True, eq=False)
-class SoftWall:
+class SoftWall(Law):
     r"""Limits of joint angles and joint speeds of a haptic map's target, felt in the control space.
 
     The force is continuous wherever h_* is, finite, and as large as h_* makes it: compose it with
@@ -171,25 +171,20 @@ class SoftWall:
 
     @cached_property
     def _program(self) -> Program:
-        kind, params, memory = self.haptic_map.compiled()
-        header = [kind, len(params), self.haptic_map.nq, self.haptic_map.nv, len(self.limits)]
-        gains = [self.stiffness, self.margin, self.damping, self.speed]
+        haptic_map = self.haptic_map
+        _, params, memory = haptic_map.compiled()
+        gains = WallGains(
+            haptic_map.nq, haptic_map.nv, len(self.limits), self.stiffness, self.margin, self.damping, self.speed
+        )  # fmt: skip
         table = np.zeros((len(self.limits), _JOINT))
         for joint, column, row, limit in zip(table, self.columns, self.rows, self.limits, strict=True):
             joint[:_LIMITS] = column, row, len(limit) == 3
             joint[_LIMITS : _LIMITS + limit.size] = np.ravel(limit)
-        return Program.law(
-            SOFT_WALL, np.concatenate([header, gains, table.ravel(), params]), [*[0.0] * WRENCH, *memory]
-        )
+        feed = MapFeed(TRACE_SIZE, _HEADER + table.size, haptic_map)
+        given = np.zeros(haptic_map.nq + haptic_map.nv * STYLUS_TANGENT)
+        numbers = np.concatenate([gains, table.ravel(), params])
+        return Program.of(self, soft_wall_wrench, numbers, np.concatenate([given, memory]), feeds=(feed,))
 
     def program(self) -> Program:
-        """Compiled form of the field."""
+        """Compiled form of the field; in a new run the map's lap has just begun."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Force and moment at one hand state, by the compiled law; the map's lap has just begun."""
-        state, wrench = hand.vector(), np.empty(WRENCH)
-        stylus = state[HAND_POSITION : HAND_POSITION + STYLUS]
-        pose, jacobian = self.haptic_map.pose(stylus), self.haptic_map.jacobian(stylus)
-        soft_wall_wrench(self._program.params, pose, jacobian, state, wrench)
-        return Wrench(wrench[:3], wrench[3:])

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,9 +26,10 @@ from controllers.curves.deformation import (
 from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.errors import ParameterError
-from controllers.fields.follow import Follow, follow_wrench
-from controllers.fields.instructions import STRETCHY, TRACE_SIZE, Program, leave_trace
-from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array, HandState, Wrench
+from controllers.fields.follow import Follow, FollowGains, follow_wrench
+from controllers.fields.instructions import TRACE_SIZE, leave_trace
+from controllers.fields.law import Law, Program
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
 
 CLICK_DISTANCE = 1e-3  # [m] a press that carries the stylus less far is a click and no edit
 CLICK_TIME = 0.4  # [s] a shorter click takes the last edit back, a longer one makes it again
@@ -36,7 +38,17 @@ NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6
 # Memory: phase t*, mode, when and where the switch was pressed, how far the stylus was carried since, the normal of a
 # push, FOLLOW's gains, how far off the stylus a held point ever was, then the record of the curve.
 _PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13, 14
-_SEEK, _STRETCH, _DAMPING, _RADIUS, _UNTIL, _EASE = range(6)
+
+
+class StretchyGains(NamedTuple):
+    """Parameters of `stretchy_wrench`: k_f and k_s [N/m], b [N s/m], ε [m], and the end and the ease [s]."""
+
+    seek: float
+    stretch: float
+    damping: float
+    radius: float
+    until: float
+    ease: float
 
 
 @njit
@@ -55,12 +67,12 @@ def eased_share(t: float, seconds: float) -> float:
 
 
 @njit
-def _press(params: Array, at: int, memory: Array, slot: int, hand: Array, distance: float) -> None:
+def _press(radius: float, memory: Array, slot: int, hand: Array, distance: float) -> None:
     """The switch goes down: hold the tube that the stylus is in, or become a probe that pushes tubes."""
     memory[slot + _SINCE], memory[slot + _CARRIED] = hand[HAND_TIME], 0.0
     for i in range(3):
         memory[slot + _PRESSED + i] = hand[HAND_POSITION + i]
-    if distance > params[at + _RADIUS]:
+    if distance > radius:
         memory[slot + _MODE] = PROBING
     elif take_hold(memory, slot + _RECORD, memory[slot + _PHASE]):
         memory[slot + _MODE] = HOLDING
@@ -85,20 +97,20 @@ def _release(memory: Array, slot: int, time: float) -> None:
 
 
 @njit
-def _touch(params: Array, at: int, memory: Array, slot: int, p: Array, distance: float) -> None:
+def _touch(radius: float, memory: Array, slot: int, p: Array, distance: float) -> None:
     """A probe that gets into a tube begins to push it, along the normal at which they met."""
     record = slot + _RECORD
-    if distance < params[at + _RADIUS] and take_hold(memory, record, memory[slot + _PHASE]):
+    if distance < radius and take_hold(memory, record, memory[slot + _PHASE]):
         memory[slot + _MODE] = PUSHING
         for i in range(3):
             memory[slot + _NORMAL + i] = (p[i] - memory[record + ANCHOR + i]) / max(distance, 1e-9)
 
 
 @njit
-def _push(params: Array, at: int, memory: Array, slot: int, p: Array) -> float:
+def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
     """Carry the curve ahead of a probe, such that it stays at the tube's surface: how far [m]; at 0 it lets go."""
     record = slot + _RECORD
-    depth = params[at + _RADIUS]
+    depth = radius
     for i in range(3):
         depth -= (p[i] - memory[record + ANCHOR + i]) * memory[slot + _NORMAL + i]
     if depth > 0.0:
@@ -116,7 +128,10 @@ def _push(params: Array, at: int, memory: Array, slot: int, p: Array) -> float:
 
 @njit
 def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Instruction STRETCHY: parameters [k_f, k_s, b, ε, until, ease]; the memory holds the curve, see the module."""
+    """Kernel of `StretchyTubes`: parameters `StretchyGains`; the memory holds the curve, see the module."""
+    gains = StretchyGains(
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
+    )  # fmt: skip
     p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
@@ -126,24 +141,24 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     if memory[slot + _MODE] == NEW:
         let_go(memory, record)
         memory[slot + _MODE] = SEEKING
-    curve, performing = work_curve(memory, record), hand[HAND_TIME] >= params[at + _UNTIL]
+    curve, performing = work_curve(memory, record), hand[HAND_TIME] >= gains.until
     pressed = hand[HAND_SWITCH] > 0.5 and not performing
     if not pressed and memory[slot + _MODE] != SEEKING:
         _release(memory, slot, hand[HAND_TIME])
     if performing:
         follow_wrench(memory, slot + _GAINS, curve, memory, slot + _PHASE, hand, wrench)
-        share = eased_share(hand[HAND_TIME] - params[at + _UNTIL], params[at + _EASE])
+        share = eased_share(hand[HAND_TIME] - gains.until, gains.ease)
         target = curve_point(memory, curve, memory[slot + _PHASE])
         for i in range(3):
-            seek = stretch_force(p[i], v[i], target[i], params[at + _SEEK], params[at + _DAMPING])
+            seek = stretch_force(p[i], v[i], target[i], gains.seek, gains.damping)
             wrench[i] = share * wrench[i] + (1.0 - share) * seek
         return
     phase, distance = closest_phase(memory, curve, p[0], p[1], p[2], memory[slot + _PHASE])
     memory[slot + _PHASE] = phase
     if pressed and memory[slot + _MODE] == SEEKING:
-        _press(params, at, memory, slot, hand, distance)
+        _press(gains.radius, memory, slot, hand, distance)
     elif memory[slot + _MODE] == PROBING:
-        _touch(params, at, memory, slot, p, distance)
+        _touch(gains.radius, memory, slot, p, distance)
     carried = 0.0
     for i in range(3):
         carried += (p[i] - memory[slot + _PRESSED + i]) ** 2
@@ -152,19 +167,19 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     target = (p[0], p[1], p[2])
     if mode == HOLDING:
         carry_to(memory, record, p[0], p[1], p[2])
-        stiffness = params[at + _STRETCH]
+        stiffness = gains.stretch
         target = (memory[record + ANCHOR], memory[record + ANCHOR + 1], memory[record + ANCHOR + 2])
         phase = memory[record + PHASE]
     elif mode == PUSHING:
-        depth, n = _push(params, at, memory, slot, p), slot + _NORMAL
-        stiffness = params[at + _STRETCH]
+        depth, n = _push(gains.radius, memory, slot, p), slot + _NORMAL
+        stiffness = gains.stretch
         target = (p[0] + depth * memory[n], p[1] + depth * memory[n + 1], p[2] + depth * memory[n + 2])
         phase = memory[record + PHASE]
     elif mode != PROBING:
-        stiffness = params[at + _SEEK]
+        stiffness = gains.seek
         target = curve_point(memory, curve, phase)
     for i in range(3):
-        wrench[i] = stretch_force(p[i], v[i], target[i], stiffness, params[at + _DAMPING])
+        wrench[i] = stretch_force(p[i], v[i], target[i], stiffness, gains.damping)
     if mode in (HOLDING, PUSHING):
         x, y, z = curve_point(memory, curve, phase)
         distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
@@ -174,7 +189,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
 
 
 @dataclass(frozen=True, eq=False)
-class StretchyTubes:
+class StretchyTubes(Law):
     r"""Field in which a curve is found, taken hold of, and bent: the tube about it yields and resists like rubber.
 
     .. math::
@@ -248,22 +263,18 @@ class StretchyTubes:
     @cached_property
     def _program(self) -> Program:
         follow = self.then
-        gains = [0.0, 0.0, 0.0] if follow is None else [follow.k_r, follow.b_d, follow.epsilon**-2]
+        then = FollowGains(0.0, 0.0, 0.0)
+        if follow is not None:
+            then = FollowGains(follow.k_r, follow.b_d, follow.epsilon**-2)
         state = np.zeros(_RECORD)
-        state[_PHASE], state[_GAINS:_OFF] = np.nan, gains
+        state[_PHASE], state[_GAINS:_OFF] = np.nan, then
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
-        params = [self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease]
-        return Program.law(STRETCHY, params, memory.tolist())
+        gains = StretchyGains(self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease)
+        return Program.of(self, stretchy_wrench, gains, memory)
 
     def program(self) -> Program:
         """Compiled form of the field; the curve lies in its memory, where it is bent."""
         return self._program
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """F at one hand state, by the compiled law, on the curve before all edits."""
-        wrench = np.zeros(6)
-        stretchy_wrench(self._program.params, 0, 0, self._program.fresh_memory(), TRACE_SIZE, hand.vector(), wrench)
-        return Wrench(wrench[:3], wrench[3:])
 
     def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:
         """The curve as it is bent in the memory of a run.

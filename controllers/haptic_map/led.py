@@ -41,7 +41,7 @@ from controllers.walking.walked_path import (
 )
 
 LED = 7
-_STRIDE, _PHASE, _PATH, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(9)
+_STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
 _LEAST_TRAVEL = 0.5  # [m] of a lap
 _LARGEST_TURN = np.deg2rad(30.0)  # of a lap
@@ -79,7 +79,7 @@ def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slo
 
 @njit
 def _carried(
-    memory: Array, path: int, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
+    path: Array, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
     slope: Array, by: int, p: Array, q: Array, spin: Array,
 ) -> None:  # fmt: skip
     """Carry what stands at a place in the frame A(s), leaning to the left about the path on the floor.
@@ -88,8 +88,8 @@ def _carried(
 
     Parameters
     ----------
-    memory, path, s
-        The path, and the arc length of the frame [m].
+    path, s
+        The packed path, and the arc length of the frame [m].
     pace, rate : float
         Derivatives of s by x, and of what x changes `value` by: the lap, or u itself.
     lean, leaning : float
@@ -101,8 +101,8 @@ def _carried(
     p, q, spin : Array, shapes (3, 3), (4,), (3, 2)
         Written: place and its derivative by x, unit quaternion, local angular velocity by x.
     """
-    (x, d_x), (y, d_y) = path_value(memory, path, s, PATH_X), path_value(memory, path, s, PATH_Y)
-    heading, turn = path_value(memory, path, s, PATH_HEADING)
+    (x, d_x), (y, d_y) = path_value(path, s, PATH_X), path_value(path, s, PATH_Y)
+    heading, turn = path_value(path, s, PATH_HEADING)
     c, sine = np.cos(heading), np.sin(heading)
     upright, over = np.cos(lean), np.sin(lean)
     side, high = upright * value[1] + over * value[2], upright * value[2] - over * value[1]
@@ -148,9 +148,9 @@ def _unit(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Arra
 
 
 @njit
-def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Kernel of `Led`: h(s, u) with (s, u) = x[:2], and h_* unless `jacobian` has no rows; the memory is only read."""
-    stride, path = params[_STRIDE], int(params[_PATH])
+def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of `Led`: h(s, u) with (s, u) = x[:2], and h_* unless `jacobian` has no rows; the memory is the path."""
+    stride = params[_STRIDE]
     samples, rotations, limbs = int(params[_SAMPLES]), int(params[_ROTATIONS]), int(params[_LIMBS])
     n, s, rate = 3 + 4 * rotations + END * limbs, x[0], 1.0 / stride
     value, slope, change = np.empty(n), np.empty(n), np.zeros(n)
@@ -161,9 +161,9 @@ def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
         _channels(rows, samples, lap, value, slope)
     q, spins, root, end = np.empty((rotations, 4)), np.empty((rotations, 3, 2)), np.empty((3, 3)), np.empty((3, 3))
     tangents = 2 if jacobian.shape[0] > 0 else 0
-    lean, leaning = path_value(memory, path, s, PATH_LEAN)
-    _carried(memory, path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
-    _carried(memory, path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
+    lean, leaning = path_value(path, s, PATH_LEAN)
+    _carried(path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
+    _carried(path, s, 1.0, rate, lean, leaning, value, slope, 0, root, q[0], spins[0])
     lower, lowering = _stooped(lean, leaning, params[_WIDTH])
     root[0, 2] -= lower
     root[1, 2] -= lowering
@@ -178,10 +178,8 @@ def led_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
         there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
-        _carried(
-            memory, path, there, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last]
-        )
-        _carried(memory, path, there, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
+        _carried(path, there, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
+        _carried(path, there, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
         place_limb(limb, q, spins, root, end, tangents)
     pose[:3] = root[0]
     for joint in range(rotations):
@@ -198,8 +196,8 @@ class Led(HapticMap):
     r"""A clip that travels, on the path of a figure that is led (see `controllers.fields.leading`).
 
     The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, s the arc length [m] and u from 0,
-    the clip, to 1, the clip without its flights. The memory is the field's, in which the path lies; `compiled` gives
-    one of its own, with a path straight on from the origin.
+    the clip, to 1, the clip without its flights. The memory is the walker's path (`controllers.walking.walker`);
+    `compiled` gives one of its own, straight on from the origin.
 
     Parameters
     ----------
@@ -209,8 +207,6 @@ class Led(HapticMap):
         Legs whose feet stand.
     phase : float
         Share of the lap at which the figure is at s = 0.
-    at : int
-        Where the packed path begins in the memory.
     standing : array of bool, shape (m, limbs), optional
         Which limbs stand, at m equal steps of the lap: between its flights. Without it u changes nothing.
     capture : Capture, optional
@@ -242,12 +238,11 @@ class Led(HapticMap):
         clip: tuple[Array, float],
         limbs: Sequence[Limb],
         phase: float = 0.0,
-        at: int = 0,
         standing: Mask | None = None,
         capture: Capture | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._made_of = (clip, tuple(limbs), phase, at, standing, capture)
+        self._made_of = (clip, tuple(limbs), phase, standing, capture)
         poses, fps = clip
         loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
         self.phase = phase
@@ -301,7 +296,7 @@ class Led(HapticMap):
         lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _STOOP * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
-        header = [self.stride, phase, at, samples, self._rotations, len(limbs), len(forms), width]
+        header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]
         packed = (control_points(form, signs).ravel() for form in forms)
         self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
 
@@ -321,8 +316,7 @@ class Led(HapticMap):
 
     def compiled(self) -> CompiledMap:
         """The map as its kernel takes it, with a straight path through the origin along x, 30 m to both sides."""
-        at, half = int(self._params[_PATH]), 0.5 * ROWS * STEP
-        return CompiledMap(LED, self._params, np.concatenate([np.zeros(at), straight_path(0.0, 0.0, 0.0, half)]))
+        return CompiledMap(LED, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration at x = [s, u, …], shape (nq,), on the memory's path, or on a straight one."""

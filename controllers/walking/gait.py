@@ -20,7 +20,7 @@ from controllers.checks import checked
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-# The decision in a field's memory: u, u at the entry of the stance, what it becomes, and the share of the stance at
+# A decision: u, u at the entry of the stance, what it becomes, and the share of the stance at
 # which it was entered, 0 or 1; −1 in flight.
 _HELD, _BEFORE, _AIM, _ENTRY, DECISION = range(5)
 
@@ -35,10 +35,10 @@ def fresh_decision(flies: bool) -> Array:
 
 
 @njit
-def share_of_stance(stances: Array, first: int, count: int, lap: float) -> float:
-    """How much of the stance at a place in the lap is over, −1 in flight; ``stances[first:]`` is `Gait.stances`."""
-    for k in range(count):
-        begin, length = stances[first + 2 * k], stances[first + 2 * k + 1]
+def share_of_stance(stances: Array, lap: float) -> float:
+    """How much of the stance at a place in the lap is over, −1 in flight; `stances` as `Gait.stances`, flat."""
+    for k in range(len(stances) // 2):
+        begin, length = stances[2 * k], stances[2 * k + 1]
         gone = lap - begin - np.floor(lap - begin)
         if gone < length:
             return gone / length
@@ -46,29 +46,30 @@ def share_of_stance(stances: Array, first: int, count: int, lap: float) -> float
 
 
 @njit
-def decide_flight(memory: Array, at: int, share: float, speed: float, take_off: float, landing: float) -> None:
-    """Update the decision at ``memory[at:]``.
+def decide_flight(decision: Array, share: float, speed: float, take_off: float, landing: float) -> float:
+    """Update what is decided of the next flight; returns u.
 
     Parameters
     ----------
-    memory, at
-        Four numbers.
+    decision : Array, shape (4,)
+        See `fresh_decision`; written.
     share : float
         Of the stance that is over, −1 in flight.
     speed, take_off, landing : float
         Of the figure, and from which on it begins to fly, and goes on to fly [m/s].
     """
     if share < 0.0:
-        memory[at + _ENTRY] = -1.0
-        return
-    if memory[at + _ENTRY] < 0.0:
-        flew = memory[at + _HELD] < 0.5
-        memory[at + _ENTRY], memory[at + _BEFORE] = np.floor(share + 0.5), memory[at + _HELD]
-        memory[at + _AIM] = 0.0 if speed >= (landing if flew else take_off) else 1.0
-    x = abs(share - memory[at + _ENTRY])
-    x = min(x / WITHIN, 1.0) if memory[at + _AIM] < memory[at + _BEFORE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
+        decision[_ENTRY] = -1.0
+        return decision[_HELD]
+    if decision[_ENTRY] < 0.0:
+        flew = decision[_HELD] < 0.5
+        decision[_ENTRY], decision[_BEFORE] = np.floor(share + 0.5), decision[_HELD]
+        decision[_AIM] = 0.0 if speed >= (landing if flew else take_off) else 1.0
+    x = abs(share - decision[_ENTRY])
+    x = min(x / WITHIN, 1.0) if decision[_AIM] < decision[_BEFORE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
     x = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
-    memory[at + _HELD] = memory[at + _BEFORE] + x * (memory[at + _AIM] - memory[at + _BEFORE])
+    decision[_HELD] = decision[_BEFORE] + x * (decision[_AIM] - decision[_BEFORE])
+    return decision[_HELD]
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,26 +38,26 @@ def straight_path(x: float, y: float, heading: float, ahead: float) -> Array:
 
 
 @njit
-def path_front(memory: Array, path: int) -> float:
-    """Largest s [m] at which the path at ``memory[path:]`` is laid."""
-    return (memory[path] - 1.0) * STEP
+def path_front(path: Array) -> float:
+    """Largest s [m] at which the path is laid."""
+    return (path[0] - 1.0) * STEP
 
 
 @njit
-def path_back(memory: Array, path: int) -> float:
+def path_back(path: Array) -> float:
     """Least s [m] that is remembered."""
-    return (memory[path] - ROWS + 3.0) * STEP
+    return (path[0] - ROWS + 3.0) * STEP
 
 
 @njit
-def path_value(memory: Array, path: int, s: float, channel: int) -> tuple[float, float]:
+def path_value(path: Array, s: float, channel: int) -> tuple[float, float]:
     """A channel of A(s) and its derivative by s; behind the back and beyond the front, those there."""
-    place = min(max(s, path_back(memory, path)), path_front(memory, path)) / STEP
-    row = min(np.floor(place), memory[path] - 2.0)
+    place = min(max(s, path_back(path)), path_front(path)) / STEP
+    row = min(np.floor(place), path[0] - 2.0)
     u = place - row
-    j, at = int(row), path + 1 + channel
-    p0, p1 = memory[at + ROW * ((j - 1) % ROWS)], memory[at + ROW * (j % ROWS)]
-    p2, p3 = memory[at + ROW * ((j + 1) % ROWS)], memory[at + ROW * ((j + 2) % ROWS)]
+    j, at = int(row), 1 + channel
+    p0, p1 = path[at + ROW * ((j - 1) % ROWS)], path[at + ROW * (j % ROWS)]
+    p2, p3 = path[at + ROW * ((j + 1) % ROWS)], path[at + ROW * ((j + 2) % ROWS)]
     b0, b1, _, b3 = basis(u)
     # By differences, so that a straight path has the same heading everywhere, to the last bit.
     a, b, c = p1 - p0, p2 - p1, p3 - p2
@@ -67,20 +67,20 @@ def path_value(memory: Array, path: int, s: float, channel: int) -> tuple[float,
 
 
 @njit
-def lay_row(memory: Array, path: int, turn: float, bend: float, sidewards: float) -> None:
+def lay_row(path: Array, turn: float, bend: float, sidewards: float) -> None:
     """One more row in front, its heading turned by `turn` [rad] from the last; the oldest row is forgotten."""
-    front = int(memory[path])
-    last, new = path + 1 + ROW * (front % ROWS), path + 1 + ROW * ((front + 1) % ROWS)
-    middle = memory[last + PATH_HEADING] + 0.5 * turn
-    memory[new + PATH_X] = memory[last + PATH_X] + STEP * np.cos(middle)
-    memory[new + PATH_Y] = memory[last + PATH_Y] + STEP * np.sin(middle)
-    memory[new + PATH_HEADING] = memory[last + PATH_HEADING] + turn
-    memory[new + PATH_LEAN], memory[new + PATH_BEND], memory[new + PATH_SIDEWARDS] = 0.0, bend, sidewards
-    memory[path] = front + 1.0
+    front = int(path[0])
+    last, new = 1 + ROW * (front % ROWS), 1 + ROW * ((front + 1) % ROWS)
+    middle = path[last + PATH_HEADING] + 0.5 * turn
+    path[new + PATH_X] = path[last + PATH_X] + STEP * np.cos(middle)
+    path[new + PATH_Y] = path[last + PATH_Y] + STEP * np.sin(middle)
+    path[new + PATH_HEADING] = path[last + PATH_HEADING] + turn
+    path[new + PATH_LEAN], path[new + PATH_BEND], path[new + PATH_SIDEWARDS] = 0.0, bend, sidewards
+    path[0] = front + 1.0
 
 
 @njit
-def lean_row(memory: Array, path: int, back: int, decay: float, past: float) -> float:
+def lean_row(path: Array, back: int, decay: float, past: float) -> float:
     r"""Lean of the row that lies `back` rows behind the front, from the accelerations before and after it.
 
     .. math:: \tan\varphi_m = \frac{1}{g N}\sum_j r^{|j - m|}\,a_j
@@ -89,8 +89,8 @@ def lean_row(memory: Array, path: int, back: int, decay: float, past: float) -> 
 
     Parameters
     ----------
-    memory, path
-        Written: the lean of that row.
+    path : Array
+        Packed; the lean of that row is written.
     back : int
         Rows in front of it that count.
     decay : float
@@ -103,13 +103,13 @@ def lean_row(memory: Array, path: int, back: int, decay: float, past: float) -> 
     float
         The same sum for the next row.
     """
-    front = int(memory[path])
+    front = int(path[0])
     row = front - back
-    past = decay * past + memory[path + 1 + ROW * (row % ROWS) + PATH_SIDEWARDS]
+    past = decay * past + path[1 + ROW * (row % ROWS) + PATH_SIDEWARDS]
     total, share, norm = past, 1.0, 1.0 / (1.0 - decay)
     for j in range(row + 1, front + 1):
         share *= decay
-        total += share * memory[path + 1 + ROW * (j % ROWS) + PATH_SIDEWARDS]
+        total += share * path[1 + ROW * (j % ROWS) + PATH_SIDEWARDS]
         norm += share
-    memory[path + 1 + ROW * (row % ROWS) + PATH_LEAN] = np.arctan(total / (norm * GRAVITY))
+    path[1 + ROW * (row % ROWS) + PATH_LEAN] = np.arctan(total / (norm * GRAVITY))
     return past

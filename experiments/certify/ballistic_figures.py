@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from controllers.certificates.flight.ballistic import FlightJudgement
 from controllers.certificates.flight.flight_fit import best_fall
 from controllers.certificates.flight.tolerance import GRAVITY
-from experiments.certify.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
+from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 
 _COLORS = {"certified": "#2a7f4f", "refuted": "#c2473b", "unknown": "#b98a1d"}

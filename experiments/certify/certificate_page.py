@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
-from experiments.certify.ballistics import ClipBallistics
+from experiments.flights.ballistics import ClipBallistics
 
 Array = npt.NDArray[np.float64]
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.report import Verdict
-from experiments.certify.ballistics import clip_ballistics
-from experiments.config.run_config import MAP_SUFFIX, RunConfig
+from experiments.config.maps import MapFile
+from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
-from experiments.run import RECORDING, clips_of, config_of
+from experiments.flights.ballistics import clip_ballistics
+from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.setups.clips import load_clips
 from models.mocap.clip import Clip
 from sim.recording.recording import Recording
@@ -28,9 +29,9 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     if folder is not None:
         with Recording(folder / RECORDING) as recording:
             return config_of(recording), clips_of(recording)
-    if config.map.endswith(MAP_SUFFIX):
-        return config, load_figure_map(Path(config.map))[1]
-    return config, load_clips(config.clips)[0]
+    if isinstance(config.map, MapFile):
+        return config, load_figure_map(Path(config.map.file))[1]
+    return config, load_clips(config.map.clips)[0]
 
 
 def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:

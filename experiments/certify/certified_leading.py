@@ -16,9 +16,10 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.leading import Leading
 from controllers.safety.limiter import ForceLimiter
+from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
-from experiments.setups.figure_maps import figure_legs
-from experiments.setups.lead import law, led_map
+from experiments.setups.figure_legs import figure_legs
+from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 
@@ -30,7 +31,7 @@ _ASSUMPTIONS = (
 )
 
 
-def leading_field(config: RunConfig, clip: Clip) -> Leading:
+def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
     """The field of a run in the mode "lead".
 
     Raises
@@ -39,7 +40,7 @@ def leading_field(config: RunConfig, clip: Clip) -> Leading:
         If a number is out of its interval, or the clip cannot be led.
     """
     figure = figure_model(config.scene.stature, config.scene.mass)
-    return law(config, led_map(clip, figure_legs(figure), 0)[1])
+    return leading(mode, led_map(clip, figure_legs(figure))[1])
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:

@@ -23,8 +23,10 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.crossing_simulation import simulated_course
+from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.setups.modes import default_rivers, law
+from experiments.setups.lifted_runs import lifted_river, side_by_side
+from experiments.setups.rivers import default_choice, law_of
 
 Array = npt.NDArray[np.float64]
 
@@ -83,13 +85,13 @@ def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, cross
 
 
 def certify_rivers(
-    config: RunConfig, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
+    config: RunConfig, mode: Rivers, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
 ) -> dict[str, Verdict]:
     """Stability of the rivers of a run besides the first, and the switching between all of them.
 
     Parameters
     ----------
-    config : RunConfig
+    config, mode : RunConfig, Rivers
         Of the run, in the mode of rivers.
     main : River
         The one that the run begins on.
@@ -101,14 +103,19 @@ def certify_rivers(
         Of the rivers, the first one's first; one alone stands for the default rivers about it.
     """
     sampling, ceiling = main.sampling, ForceLimiter(main.sampling.period).peak
-    own = _lifted_bundle(config, curves) if len(curves) > 1 else None
-    bundle = own or default_rivers(config, main.curve)
+    if len(curves) > 1:
+        # The one that the run begins on comes first.
+        names = tuple(name.removeprefix("_") or "first" for name in curves)
+        choice = side_by_side(RiverBundle(tuple(lifted_river(curve, mode) for curve in curves.values()), names))
+    else:
+        choice = default_choice(mode, main.curve, getattr(config.map, "reach", 0.0))
+    bundle = choice.bundle
     rivers = certified_bundle(bundle, main.device, sampling)
     names = tuple(zip(bundle.names, rivers, strict=True))[1:]
     verdicts = {f"stability_{name}": stability(river, hands.hands()) for name, river in names}
     places = meetings(rivers)
-    common = held_common(rivers, places[0], hands, config.crossing) if places else None
-    field = law(config, main.curve, rivers=own)
+    common = held_common(rivers, places[0], hands, mode.crossing) if places else None
+    field = law_of(mode, choice)
     if isinstance(field, HigherOrder):
         found = _search(field, rivers, places, push)
         sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form)
@@ -116,14 +123,6 @@ def certify_rivers(
         keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
         return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
     return verdicts | {"switching": _summed(common)}
-
-
-def _lifted_bundle(config: RunConfig, curves: Mapping[str, Trajectory]) -> RiverBundle:
-    """The rivers of a lifted map, as `lifted_runs.lifted_rivers` has them, the one that the run begins on first."""
-    from experiments.setups.lifted_runs import lifted_river
-
-    rivers = tuple(lifted_river(curve, config) for curve in curves.values())
-    return RiverBundle(rivers, tuple(name.removeprefix("_") or "first" for name in curves))
 
 
 def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float) -> dict[str, object]:

@@ -16,22 +16,18 @@ from controllers.certificates.region.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
-from experiments.certify.ballistics import clip_ballistics
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
 from experiments.certify.certified_clips import certify_clips
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.certified_field import (
-    certificate_inputs,
-    certified_curves,
-    certified_laws,
-    certified_sampling,
-    clip_inputs,
-    read_certificate,
-)
+from experiments.certify.certified_field import certificate_inputs, certified_curves, certified_sampling
 from experiments.certify.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certify.certified_rivers import certify_rivers
+from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
+from experiments.files.certificate_files import clip_inputs, read_certificate
+from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips
+from experiments.setups.setups import certified_laws, resolved
 from models.mocap.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
@@ -101,7 +97,7 @@ def certify_into(
     ControllerError, SimError
         If a number is out of its interval, or the curve is out of the workspace.
     """
-    hands = hands or HandRange()
+    config, hands = resolved(config), hands or HandRange()
     inputs = certificate_inputs(config, delay, hands, push, clips, judging)
     held = _held(out, inputs)
     if held is not None:
@@ -170,17 +166,17 @@ def _field_verdicts(
     config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip]
 ) -> tuple[River, dict[str, Verdict]]:
     """The river that is drawn, and all verdicts on the field."""
-    if config.mode == "lead":
+    if isinstance(config.mode, Lead):
         if not clips:
             raise ParameterError("a certificate of leading is of a clip that is led; give one")
-        field, curve = leading_field(config, clips[0]), certified_curves(config)[""]
+        field, curve = leading_field(config, config.mode, clips[0]), certified_curves(config)[""]
         device, sampling = phantom_device(), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
         return main, certify_leading(field, curve, device, sampling, hands)
     rivers = certified_rivers(config, delay)
     verdicts, main = certify(rivers, hands, push), rivers[""]
-    if config.mode == "rivers":
-        return main, verdicts | certify_rivers(config, main, hands, push, certified_curves(config))
+    if isinstance(config.mode, Rivers):
+        return main, verdicts | certify_rivers(config, config.mode, main, hands, push, certified_curves(config))
     for name, curve in certified_curves(config).items():
         if name:
             verdicts["stability" + name] = stability(main._replace(curve=curve), hands.hands())

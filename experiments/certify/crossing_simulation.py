@@ -7,8 +7,9 @@ import numpy.typing as npt
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.switching.switching_search import Course, Push
-from controllers.fields.higher_order import HigherOrder, higher_order_wrench
+from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
+from controllers.fields.program import evaluate
 from experiments.studies.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
 from models.scene import PHANTOM
@@ -41,13 +42,12 @@ def simulated_course(
     port.memory[:3], port.memory[6:9], port.memory[12], port.hand[4] = theta, rate, 1.0, 1.0
     program = field.program()
     memory, wrench = program.fresh_memory(), np.zeros(6)
-    at, slot = int(program.ops[0, 1]), int(program.ops[0, 2])
     n = round(seconds / sampling.period)
     p, river = np.zeros((n, 3)), np.zeros(n)
     for k in range(n):
         t = k * sampling.period
         sense(port, t, 0.0)
-        higher_order_wrench(program.params, at, 0, memory, slot, port.hand, wrench)
+        evaluate(*program.compiled(), memory, port.hand, wrench)
         p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
         force = wrench[:3].copy()
         if push is not None and push.start <= t < push.start + push.duration:

@@ -20,7 +20,7 @@ from experiments.files.map_files import save_map
 from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip

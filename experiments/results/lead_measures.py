@@ -7,8 +7,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import PATH, Leading
+from controllers.fields.leading import Leading
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_POSE, figure_model
 from models.scene import SceneConfig
@@ -117,8 +116,8 @@ def support_at(field: Leading, s: Array) -> IntArray:
 
 def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
     """Largest turn rates [rad/s] of the path at places s [m] passed at speeds [m/s]: on no foot, one, two."""
-    path = TRACE_SIZE + PATH
-    rates = np.abs(speed * [path_value(memory, path, float(place), PATH_HEADING)[1] for place in s])
+    path = field.walker(memory).path
+    rates = np.abs(speed * [path_value(path, float(place), PATH_HEADING)[1] for place in s])
     feet = support_at(field, s)
     return np.array([rates[feet == count].max(initial=0.0) for count in range(3)])
 

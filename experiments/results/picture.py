@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from experiments.run import RECORDING, config_of
+from experiments.results.folder import RECORDING, config_of
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import PlanarDisplacement
 from models.scene import FIGURE, P_WH, PHANTOM, world_model

@@ -112,6 +112,6 @@ def _curves(recording: Recording, tube: str) -> str:
     if drawn[0].name:
         rivers = ", ".join(f'<b style="color:{course.line}">{html.escape(course.name)}</b>' for course in drawn)
         return f"The rivers, each in its {name}{tube}: {rivers}."
-    bent = str(recording.config.get("mode", "")).startswith("stretch")
+    bent = recording.texts.get("hand_does", "").startswith("grabs")
     about = f"Light blue: the {name} around the curve{tube}." if recording.array("tube_radius") > 0.0 else ""
     return about + " The curve is drawn as it was before it was bent." * bent

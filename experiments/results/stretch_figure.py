@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.results.figures import STYLE
-from experiments.setups.stretch import CURVE_FILE, load_curve
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 

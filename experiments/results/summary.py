@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from experiments.results.changes import RiverChange
 from experiments.results.lead_measures import LeadSummary
 from experiments.results.phases import EditingSummary, PerformanceSummary
+from experiments.results.stretch_summary import StretchSummary
 from experiments.results.summary_parts import (
     AnimationSummary,
     FigureSummary,
@@ -13,7 +14,6 @@ from experiments.results.summary_parts import (
     TankSummary,
     TraceSummary,
 )
-from experiments.setups.stretch import StretchSummary
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,11 @@ class PathSummary:
     lap_seconds: float | None
     pushes: tuple[PushSummary, ...]
 
+    @property
+    def deviation_rms(self) -> float | None:
+        """`deviation_rms_mm` in metres."""
+        return None if self.deviation_rms_mm is None else 1e-3 * self.deviation_rms_mm
+
 
 @dataclass(frozen=True)
 class AnimationSummary:

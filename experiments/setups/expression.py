@@ -1,14 +1,9 @@
-"""What turning the stylus does: the figure looks where it points and leans as it leans; the moment of the field."""
+"""What turning the stylus does: the figure looks where it points and leans as it leans."""
 
 import numpy as np
 
-from controllers.curves.trajectory import Trajectory
-from controllers.errors import ParameterError
-from controllers.fields.instructions import Program
-from controllers.fields.orientation import Orientation
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.expressive import Expressive, ExpressiveJoint
-from experiments.config.run_config import STRETCHING, RunConfig
 from models.humanoid.skeleton import BODIES, JOINTS, joint_range
 from sim.users.intent import Turn
 
@@ -41,19 +36,3 @@ def lap_turns(start: float, lap: float, way: int, angle: float = LAP_ANGLE) -> t
     """
     axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))[way % 3]
     return Turn(start, 0.5 * lap, angle, axis), Turn(start + 0.5 * lap, 0.5 * lap, -angle, axis)
-
-
-def oriented(program: Program, config: RunConfig, curve: Trajectory) -> Program:
-    """A field, and the moment to the curve's orientation if the run is to have one.
-
-    Raises
-    ------
-    ParameterError
-        If a gain of the moment is negative or not finite, or the curve is one that is bent during the run.
-    """
-    if config.orientation_stiffness == 0.0 and config.orientation_damping == 0.0:
-        return program
-    if config.mode in STRETCHING:
-        raise ParameterError(f"a moment to the curve's orientation needs a curve that stays; {config.mode} bends it")
-    moment = Orientation(curve, config.orientation_stiffness, config.orientation_damping, config.tube)
-    return program + moment.program()

@@ -1,4 +1,9 @@
-"""Haptic maps of the figure that a run makes from its clips, by name."""
+"""Haptic maps of the figure that a run makes from its clips, by kind."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -8,89 +13,183 @@ from controllers.blending.clip_arrays import clip_arrays
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.composite import Composite
-from controllers.haptic_map.cylindrical import Cylindrical, correction_shape
-from controllers.haptic_map.river_clips import RiverClips
-from controllers.legs.footsteps import packed_steppers
-from controllers.legs.joint_limits import MARGIN
+from controllers.haptic_map.composite import Composite as CompositeMap
+from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
+from controllers.haptic_map.cylindrical import correction_shape
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
+from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
+from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
-from experiments.setups.modes import default_rivers
-from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
+from experiments.files.map_files import load_figure_map, map_digest
+from experiments.setups.balance import balanced
+from experiments.setups.figure_legs import figure_legs
+from experiments.setups.hands import river_pushes
+from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
+from experiments.setups.pace import course_of
+from experiments.setups.parts import ClipMapParts
+from experiments.setups.rests import with_rests
+from experiments.setups.rivers import default_choice
+from models.humanoid.skeleton import BODIES
 from models.mocap.clip import Clip
 from sim.compilation.compiled import CACHE_FOLDER
+from sim.world.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
+AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
-_MOST_CLIPS = {"cylindrical": 4, "composite": 3, "rivers": 3}
+LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other
 
 
-def clip_map(
-    config: RunConfig,
-    clips: tuple[Clip, ...],
-    curve: Trajectory,
-    figure: mujoco.MjModel,
-) -> ClipMap:
-    """Haptic map that a configuration names, of these clips about a curve.
+class Place(NamedTuple):
+    """Where a map of clips lies about its curve.
+
+    Attributes
+    ----------
+    curve : Trajectory
+        A lap about the z axis, timed as the hand is to move.
+    radius : float
+        Of the middle of the map's domain [m].
+    reach : float
+        Half width of the domain in radius and in height [m].
+    expressive : bool
+        Whether the stylus's orientation turns the figure.
+    """
+
+    curve: Trajectory
+    radius: float
+    reach: float
+    expressive: bool
+
+
+def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+    """Four clips at the corners of a cylinder; fewer are repeated.
 
     Raises
     ------
-    ParameterError
-        If there is no such map, it takes another number of clips, or does not fit the mode.
+    ControllerError
+        If there are none, or more than four, or they do not fit together.
     """
-    if config.map not in _MOST_CLIPS:
-        raise ParameterError(f"no map {config.map!r}; there are {', '.join(_MOST_CLIPS)}, or give a file (.npz)")
-    most = _MOST_CLIPS[config.map]
-    if not 1 <= len(clips) <= most:
-        raise ParameterError(f"the {config.map} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
-    motions = [(clip.poses, clip.fps) for clip in clips]
-    radii = (config.radius - config.reach, config.radius + config.reach)
-    legs = figure_legs(figure)
-    if config.map == "cylindrical":
-        corners = [motions[i % len(motions)] for i in range(4)]
-        return _cylindrical(corners, radii, (-config.reach, config.reach), legs)
-    if config.map == "rivers":
-        if config.mode != "rivers" or config.crossing == "sum":
-            raise ParameterError(
-                "the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river"
-            )
-        curves = [river.curve for river in default_rivers(config, curve).rivers]
-        motions = [motions[i % len(motions)] for i in range(len(curves))]
-        return RiverClips(curves, motions, config.river_tube, legs)
-    lower, red, blue = (motions[i % len(motions)] for i in range(3))
+    motions, reach = _motions(clips, 4, "cylindrical"), place.reach
+    made = _cylinder(motions, (place.radius - reach, place.radius + reach), (-reach, reach), figure_legs(figure))
+    return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
+
+
+def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
+    """The lower body of the first clip, the upper body blended between two more; fewer are repeated.
+
+    Raises
+    ------
+    ControllerError
+        If there are none, or more than three, or they do not fit together.
+    """
+    lower, red, blue = _motions(clips, 3, "composite")
+    legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
     upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    return Composite(lower, red, blue, sorted(upper), radii, legs)
+    return _about_circle(place, CompositeMap(lower, red, blue, sorted(upper), radii, legs), clips)
 
 
-def _cylindrical(
+def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    return cylindrical_parts(clips, _place(part), figure)
+
+
+def _composite(config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    return composite_parts(clips, _place(part), figure)
+
+
+def _river_clips_parts(
+    config: RunConfig, part: RiverClips, clips: tuple[Clip, ...], figure: mujoco.MjModel
+) -> ClipMapParts:
+    mode = config.mode
+    if not isinstance(mode, Rivers) or mode.crossing == "sum":
+        raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
+    motions, place = _motions(clips, 3, part.kind), _place(part)
+    curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
+    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure))
+    parts = _about_circle(place, made, clips)
+    return replace(parts, moves=True, plays_rivers=True, refined=lambda: with_rests(made, figure))
+
+
+def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
+    path = Path(part.file)
+    made, clips = load_figure_map(path)
+    if isinstance(made, Lifted):
+        parts = _on_lifted(part, made, clips)
+    elif part.curve:
+        raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
+    else:
+        parts = _about_circle(_place(part), made, clips)
+    remark = f"the clips are those of the map: {', '.join(made.names)}"
+    return replace(parts.said((remark,)), static={"map_sha256": map_digest(path)})
+
+
+MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
+    "cylindrical": _cylindrical,
+    "composite": _composite,
+    "rivers": _river_clips_parts,
+    "file": _file_parts,
+}
+"""What each kind of map gives a run."""
+
+
+def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipMapParts:
+    curve, reach = place.curve, place.reach
+    return ClipMapParts(
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
+        rivers=lambda mode: default_choice(mode, curve, reach),
+        river_pushes=lambda mode, seconds: river_pushes(curve, seconds), course=lambda damping: curve,
+        expressive=place.expressive, held_seconds=made.lap_seconds,
+    )  # fmt: skip
+
+
+def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapParts:
+    curve = lifted_curve(made, part.curve)
+    return ClipMapParts(
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
+        rivers=lambda mode: lifted_choice(made, mode),
+        river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
+        course=lambda damping: course_of(curve, damping),
+        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
+    )  # fmt: skip
+
+
+def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:
+    """As many motions as a map takes, of clips that may be fewer."""
+    if not 1 <= len(clips) <= most:
+        raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
+    return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
+
+
+def _place(part: AnyMap) -> Place:
+    around = part.around
+    curve = reached(Trajectory.circle(around.radius, around.lap))
+    return Place(curve, around.radius, part.reach, part.expressive)
+
+
+def reached(curve: Trajectory) -> Trajectory:
+    """The curve, if the Phantom reaches it.
+
+    Raises
+    ------
+    SimError
+        If it does not.
+    """
+    for phase in np.linspace(curve.start, curve.end, 64):
+        phantom_angles(curve.point(phase))
+    return curve
+
+
+def _cylinder(
     clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...]
-) -> Cylindrical:
+) -> CylindricalMap:
     """The map of four clips; its corrections, once found, are kept beside the compiled code."""
 
     def find() -> Array:
-        return Cylindrical(clips, radii, heights, legs).corrections
+        return CylindricalMap(clips, radii, heights, legs).corrections
 
     # Where the clips blend is not among what they depend on.
     made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
     corrections = kept_array(CACHE_FOLDER, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
-    return Cylindrical(clips, radii, heights, legs, corrections)
-
-
-def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
-    """The figure's legs as limbs of a blend: soles are placed where they are in the clips on average."""
-    legs: list[Limb] = []
-    for side in ("left", "right"):
-        bodies = [f"{side}_{part}" for part in ("thigh", "shank", "foot")]
-        first, second, third = (BODIES.index(body) for body in bodies)
-        offsets = np.array([figure.body(body).pos for body in bodies])
-        sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
-        # Where a joint that is held comes to rest is its limit.
-        limits = joint_range()[[first - 1, second - 1, third - 1]] + 0.5 * MARGIN * np.array([1.0, -1.0])
-        legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole, limits))
-    return tuple(legs)
-
-
-def packed_legs(figure: mujoco.MjModel) -> Array:
-    """`figure_legs` as those that step (`packed_steppers`), shape (2, 48)."""
-    return packed_steppers(figure_legs(figure))
+    return CylindricalMap(clips, radii, heights, legs, corrections)

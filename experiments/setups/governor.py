@@ -6,14 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
-from controllers.state import HandState, Wrench
-from experiments.config.run_config import RunConfig
-from experiments.setups.modes import Field, law
+from experiments.config.modes import SpeedGovernor
+from experiments.setups.parts import ClipMapParts
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 
@@ -64,7 +62,7 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
     ModelError
         If the map's poses are not the figure's.
     """
-    from experiments.certify.ballistics import (
+    from experiments.flights.ballistics import (
         clip_ballistics,  # statistics take long to import, for a run without a governor
     )
 
@@ -78,41 +76,28 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 
-def governed_law(
-    config: RunConfig, curve: Trajectory, haptic_map: ClipMap, rivers: RiverBundle | None = None
-) -> tuple[Field, float]:
-    """Field of a mode over a curve, or over rivers of a map's own, governed if the run says so.
-
-    Returned with the speed [m/s] to which it urges a hand.
-
-    Rivers of higher order are gated: `River.speeds` of each are those of its own curve, and a hand that misses them by
-    more than `modes.GATE` of the curve's pace is not taken. To any other field the governor is added.
+def governed(governor: SpeedGovernor | None, law: Law, curve: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
+    """A field over a curve with the governor of the animation under it, and the speed [m/s] to which that urges a hand.
 
     Raises
     ------
     ModelError, ControllerError
-        If there is no such field, or the map's poses are not the figure's.
+        If the map's poses are not the figure's, or a number is out of its interval.
     """
-    if not config.governor:
-        return law(config, curve, rivers=rivers), 0.0
-    if config.mode == "rivers" and config.crossing != "sum":
-        return law(config, curve, lambda i, river: speeds_along(haptic_map, river, i), rivers), 0.0
-    speeds = speeds_along(haptic_map, curve)
-    governor = Governor(curve, speeds, config.governor_drag, config.reach)
-    return Governed(law(config, curve, rivers=rivers), governor), float(speeds[:, 0].max())
+    if governor is None:
+        return law, 0.0
+    speeds = speeds_along(maps.haptic_map, curve)
+    made = Governor(curve, speeds, governor.governor_drag, maps.reach)
+    return Governed(law, made), float(speeds[:, 0].max())
 
 
 @dataclass(frozen=True, eq=False)
-class Governed:
+class Governed(Law):
     """A field over a curve together with the governor of the animation under it."""
 
-    field: Field
+    field: Law
     governor: Governor
 
     def program(self) -> Program:
         """Compiled form of the sum."""
-        return self.field.program() + self.governor.program()
-
-    def wrench(self, hand: HandState) -> Wrench:
-        """Sum of both at one hand state."""
-        return Wrench(self.field.wrench(hand).force + self.governor.wrench(hand).force, np.zeros(3))
+        return self.field + self.governor

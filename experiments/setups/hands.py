@@ -7,9 +7,8 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.config.run_config import STRETCHING, RunConfig
+from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
-from experiments.setups.stretch import edited_until
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
 
@@ -17,18 +16,13 @@ Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
 RIVER_PUSH = 1.0  # over into another river: in the middle of what takes a hand there and does not throw it out [N]
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # orientation of the stylus along the default curve
+PAUSE = 0.5  # [s] between two doings of the default hand, and before a bent curve is performed
 
 _CROSSING = 0.5  # of the lap, where the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before it, when a push across begins, and [s] that it lasts
 _PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
 _AWAY = 1e-3  # [m] by which beginnings differ
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
-
-
-def stylus_path(points: Array) -> Array:
-    """Stylus poses at points of H with the stylus upright, shape (n, 3) → (n, 7)."""
-    return np.hstack((points, np.tile(UPRIGHT, (len(points), 1))))
 
 
 class Beginning(NamedTuple):
@@ -66,30 +60,51 @@ def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Begin
     return Beginning(curve.point(phase), curve.velocity(phase), curve.acceleration(phase))
 
 
-def user_arm(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...]) -> Arm:
-    """Arm and intent of the user that a configuration names.
+def resolved_user(
+    user: User, curve: Trajectory, seconds: float, grabs: tuple[Grab, ...] = (), pushes: tuple[Push, ...] | None = None
+) -> User:
+    """A user with all that it does by default written out.
+
+    Parameters
+    ----------
+    user : User
+        As it was asked for.
+    curve : Trajectory
+        Timed as the hand is to move.
+    seconds : float
+        Of the run [s].
+    grabs : tuple of Grab
+        What it takes hold of by default.
+    pushes : tuple of Push, optional
+        What one that pushes does by default, where that is not outwards and inwards once a lap.
 
     Raises
     ------
     ParameterError
         If a hand that traces should grab.
     """
-    pushes, turns, lap = config.pushes, config.turns, curve.duration
-    laps = range(1, max(2, int(config.seconds / lap)))
-    if config.user == "turn" and not turns:
-        turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
-    if config.user == "push" and not pushes and config.mode == "rivers":
-        pushes = river_pushes(curve, config.seconds)
-    elif config.user == "push" and not pushes:
-        begin = first_pushed_lap(curve, grabs)
-        laps = range(max(1, int((config.seconds - begin) / lap)))
-        pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
-    if config.user == "trace" and grabs:
+    grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
+    if user.does == "trace" and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
-    if config.user == "trace":
-        times = np.arange(0.0, config.seconds, 0.01)
-        return Arm(path=curve.point(times), period=0.01, pushes=pushes, turns=turns)
-    return Arm(pushes=pushes, grabs=grabs, turns=turns)
+    if user.does == "turn" and not turns:
+        laps = range(1, max(2, int(seconds / lap)))
+        turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
+    done = user.pushes
+    if user.does == "push" and not done and pushes is not None:
+        done = pushes
+    elif user.does == "push" and not done:
+        begin = first_pushed_lap(curve, grabs)
+        laps = range(max(1, int((seconds - begin) / lap)))
+        done = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
+    return User(does=user.does, pushes=done, turns=turns, grabs=grabs)
+
+
+def user_arm(user: User, curve: Trajectory, seconds: float) -> Arm:
+    """Arm and intent of a user whose doings are written out."""
+    if user.does == "trace":
+        times = np.arange(0.0, seconds, 0.01)
+        return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
+    return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
@@ -97,26 +112,23 @@ def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
     return curve.duration + (edited_until(grabs) if grabs else 0.0)
 
 
-def handled(config: RunConfig) -> tuple[tuple[float, float], ...]:
-    """From and until when [s] the hand does something else than push: it grabs, traces or leads."""
-    if config.user == "trace" or config.mode == "lead":
+def handled(user: User) -> tuple[tuple[float, float], ...]:
+    """From and until when [s] a hand does something else than push: it grabs or traces."""
+    if user.does == "trace":
         return ((0.0, np.inf),)
-    return tuple((grab.start, grab.end) for grab in config.grabs)
+    return tuple((grab.at, grab.end) for grab in user.grabs)
 
 
-def hand_remarks(config: RunConfig, curve: Trajectory) -> tuple[str, ...]:
-    """What is said of a hand whose doings come too late, or are of no effect."""
-    remarks: list[str] = []
-    performed, pushed = edited_until(config.grabs), first_pushed_lap(curve, config.grabs)
-    if config.mode == "stretch-then-follow" and config.seconds <= performed:
-        remarks.append(f"the curve is bent until {performed:.1f} s and performed then; give --seconds more than that")
-    elif config.mode in STRETCHING and config.user == "push" and not config.pushes and config.seconds <= pushed:
-        remarks.append(
-            f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that"
-        )
-    if config.user == "turn" and not config.expressive:
-        remarks.append("the hand turns the stylus, and this map does not look at that; --expressive does")
-    return tuple(remarks)
+def turning_remark(user: User, expressive: bool) -> tuple[str, ...]:
+    """What is said of a hand that turns a stylus whose orientation does nothing."""
+    if user.does == "turn" and not expressive:
+        return ("the hand turns the stylus, and this map does not look at that; --expressive does",)
+    return ()
+
+
+def edited_until(grabs: tuple[Grab, ...]) -> float:
+    """When a hand has done all its grabs, and a pause after them [s]."""
+    return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:

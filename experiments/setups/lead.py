@@ -1,5 +1,8 @@
 """LEADING as a run: gait, field, and the hand that leads forward along an S and then straight back."""
 
+from dataclasses import dataclass, replace
+
+import mujoco
 import numpy as np
 import numpy.typing as npt
 
@@ -10,7 +13,17 @@ from controllers.haptic_map.led import Led
 from controllers.legs.grounded import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
+from controllers.safety.limiter import ForceLimiter
+from experiments.config.maps import Led as LedMap
+from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
+from experiments.results.lead_measures import lead_summary
+from experiments.results.summary import RunSummary
+from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.certified_law import CertifiedLaw
+from experiments.setups.figure_legs import figure_legs
+from experiments.setups.led_balance import balanced_on_ground, led_gains
+from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import Contacts, contacts
@@ -22,6 +35,7 @@ IntArray = npt.NDArray[np.int64]
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
 PAUSE, BACK_PACE = 0.8, 0.5
+_START = 0.025  # [m] from where it should be, within which a hand begins
 STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
@@ -35,7 +49,7 @@ _FLYING_LATERAL = 1.2
 _RUNNING_FORWARD = 1.0
 
 
-def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
+def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
 
     Raises
@@ -53,7 +67,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...], at: int) -> tuple[Led, Gait]:
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], at, standing, None if made else Capture(CONTACT_RADIUS))
+    led = Led((clip.poses, clip.fps), legs, phases[first], standing, None if made else Capture(CONTACT_RADIUS))
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
@@ -138,32 +152,70 @@ def s_curve() -> Trajectory:
     return Trajectory(steps * np.arange(len(points)), points)
 
 
-def law(config: RunConfig, gait: Gait) -> Leading:
+@dataclass(frozen=True, kw_only=True)
+class LedParts(MapParts[Led]):
+    """What the clip of a led figure gives a run: its map, and its gait."""
+
+    gait: Gait
+
+
+def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
+    """What the clip of a led figure gives a run.
+
+    Raises
+    ------
+    ParameterError
+        If there is not one clip, or it does not travel on foot.
+    """
+    if len(clips) != 1:
+        raise ParameterError(f"one clip is led, got {len(clips)}; name one with --clips, such as walk or run")
+    made, gait = led_map(clips[0], figure_legs(figure))
+    return LedParts(
+        haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
+        refined=lambda: balanced_on_ground(made, gait, figure),
+        remarks=lap_remark(clips[0]) + gait_remark(clips[0].name, made),
+    )  # fmt: skip
+
+
+def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
+    """Parts of a run in the mode "lead"."""
+    field, course = leading(mode, maps.gait), s_curve()
+    limiter = ForceLimiter(config.clock.servo_period)
+    tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
+    gait = field.gait
+    static = {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
+    notes = Notes(0.0, "", "the figure's path", "leads", static)
+
+    def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
+        lead = lead_summary(of.recording, field, of.memory, config.scene, summary.figure.fell_at)
+        return replace(summary, lead=lead)
+
+    return Parts(
+        config=config, maps=maps, field=field, program=field.program(), course=course, user=leading_hand(field),
+        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=field.walker,
+        argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
+    )  # fmt: skip
+
+
+def lead_laws(mode: Lead) -> dict[str, CertifiedLaw]:
+    """What is certified of it."""
+    return {"": CertifiedLaw("leading", mode.leash, mode.damping, float("inf"))}
+
+
+def leading(mode: Lead, gait: Gait) -> Leading:
     """Field of the mode "lead".
 
     Raises
     ------
     ParameterError
-        If a number is out of its interval, or an option has no meaning here.
+        If a number is out of its interval.
     """
-    given = {
-        f"--map {config.map}": config.map != "cylindrical",
-        f"--user {config.user}": config.user != "relaxed",
-        "--walls": config.walls,
-        "--governor": config.governor,
-        "--expressive": config.expressive,
-    }
-    if any(given.values()):
-        raise ParameterError(
-            "in the mode lead the map is the led figure's and the hand leads; leave out "
-            + ", ".join(option for option, is_given in given.items() if is_given)
-        )
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
-    scale = FORTH * gait.speed / curve.length if config.floor_scale is None else config.floor_scale
+    scale = FORTH * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
     flying = {"lateral": _FLYING_LATERAL} if gait.flies else {}
     running = {"forward": _RUNNING_FORWARD} if gait.flies or gait.grounded else {}
-    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=config.leash, b=config.damping, **flying, **running)
+    return Leading(gait, (float(x), float(y)), -_BEND, scale, k_l=mode.leash, b=mode.damping, **flying, **running)
 
 
 def leading_hand(field: Leading, period: float = 0.01) -> Arm:
@@ -194,9 +246,3 @@ def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
     pace = pace * pace * (3.0 - 2.0 * pace)
     total = np.cumsum(pace)
     return total / total[-1]
-
-
-def lead_static(field: Leading) -> dict[str, npt.ArrayLike]:
-    """What a recording keeps of a field that leads: its scale, and the feet that bear over a lap of its gait."""
-    gait = field.gait
-    return {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}

@@ -8,9 +8,11 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
-from experiments.config.run_config import RunConfig
-from experiments.setups.modes import river_time
+from experiments.config.modes import Rivers
+from experiments.setups.budget import fastest
 from experiments.setups.pace import paced
+from experiments.setups.parts import RiverChoice
+from experiments.setups.rivers import BESIDE, gains, river_time
 from sim.body.figure import FigureGains
 from sim.users.intent import Push
 from sim.world.world import phantom_angles
@@ -23,7 +25,8 @@ _NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
 _STAY = 3  # laps on the other curve
 
 # A foot that gives way by 2 mm in mid-stance still bears: a runner was taken to fly, and fell.
-LIFTED_GAINS = FigureGains(contact_reach=0.004)
+HELD_GAINS = FigureGains(contact_reach=0.004)
+"""Of a figure on a lifted map, or on a curve that is bent."""
 
 
 def curve_number(haptic_map: Lifted, curve: str) -> int:
@@ -61,46 +64,31 @@ def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
     return found
 
 
-def lifted_rivers(haptic_map: Lifted, config: RunConfig) -> RiverBundle:
+def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
     """A river for every clip, by its name, that leads the Phantom at the clip's pace (`paced`).
 
     Raises
     ------
-    ParameterError
-        If a gain is out of its interval.
     SimError
         If the Phantom does not reach a curve.
     """
-    curves = [paced(haptic_map.curve(i), config.gains[1]) for i in range(len(haptic_map.names))]
-    return RiverBundle(tuple(lifted_river(curve, config) for curve in curves), haptic_map.names)
+    damping = gains(mode)[1]
+    curves = [paced(haptic_map.curve(i), damping) for i in range(len(haptic_map.names))]
+    return side_by_side(RiverBundle(tuple(lifted_river(curve, mode) for curve in curves), haptic_map.names))
 
 
-def lifted_river(course: Trajectory, config: RunConfig) -> River:
-    """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at.
+def side_by_side(bundle: RiverBundle) -> RiverChoice:
+    """Rivers that lie side by side, told apart by the greatest speed: a hand is taken at that, too."""
+    return RiverChoice(bundle, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
 
-    Raises
-    ------
-    ParameterError
-        If a gain is out of its interval.
-    """
+
+def lifted_river(course: Trajectory, mode: Rivers) -> River:
+    """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at."""
     speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
-    return River(course, config.river_tube, river_time(config), config.gains[1], np.outer(speeds, _SPEEDS))
+    return River(course, mode.river_tube, river_time(mode), gains(mode)[1], np.outer(speeds, _SPEEDS))
 
 
-def lifted_course(curve: Trajectory, config: RunConfig) -> Trajectory:
-    """The curve along which the field of a run leads, so timed that friction leaves the hand the pace of `curve`.
-
-    Raises
-    ------
-    SimError
-        If the Phantom does not reach the curve.
-    """
-    damping = config.gains[1]
-    leads = config.mode in ("follow", "rivers", "stretch-then-follow")
-    return paced(curve, damping) if leads and damping > 0.0 else curve
-
-
-def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
+def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:
     """What a hand on rivers does that pushes: over at its curve's best transition in the second lap, and back.
 
     Raises
@@ -108,7 +96,7 @@ def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
     ParameterError
         If the curve has no transition.
     """
-    first = curve_number(haptic_map, config.curve)
+    first, damping = curve_number(haptic_map, curve), gains(mode)[1]
     rows = [row for row in haptic_map.transitions if first in (row[0], row[1])]
     if not rows:
         pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]
@@ -120,8 +108,8 @@ def default_pushes(haptic_map: Lifted, config: RunConfig) -> tuple[Push, ...]:
     laps = [haptic_map.curve(i).duration for i in (first, second)]
     begin = laps[0]
     return (
-        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, config.gains[1]),
-        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], config.gains[1]),
+        pushed_over(haptic_map, first, second, float(rows[0][2]), begin, damping),
+        pushed_over(haptic_map, second, first, float(rows[0][2]), begin + _STAY * laps[1], damping),
     )
 
 

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from controllers.fields.instructions import Program
+from controllers.fields.law import Law
 from controllers.safety.energy_tank import EnergyTank
 from experiments.config.run_config import RunConfig
-from experiments.setups.clips import load_clips
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop, Observer
@@ -13,7 +12,7 @@ from sim.loop.loop import Loop, Observer
 
 def loop_with(
     config: RunConfig,
-    program: Program,
+    law: Law,
     observe: Observer = lambda ticks, frames, n: None,
     tank: EnergyTank | None = None,
 ) -> tuple[Session, Loop]:
@@ -23,7 +22,7 @@ def loop_with(
     ----------
     config : RunConfig
         Everything but the field: clips, hand, figure, device.
-    program : Program
+    law : Law
         The field; its laws in Python are called at every tick.
     observe : Observer
         What is done with each block of ticks.
@@ -35,8 +34,7 @@ def loop_with(
     ModelError, ControllerError, SimError
         As `experiments.setups.wiring.wire`.
     """
-    clips, remarks = load_clips(config.clips)
-    session = wire(config, clips, remarks)
+    session, program = wire(config), law.program()
     field = session.servo.field.of(program)
     if tank is not None:
         field = field._replace(budget=tank.params(), tank=tank.fresh_memory())

@@ -60,3 +60,14 @@ def paced(curve: Trajectory, drag: float) -> Trajectory:
     # Where a curve rests it keeps its time.
     steps = own * np.divide(drag * speed, pulled, out=np.ones_like(own), where=pulled > 0.0)
     return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)
+
+
+def course_of(curve: Trajectory, drag: float) -> Trajectory:
+    """The curve along which a field leads that is to keep the pace of `curve`: paced, if its drag can be made up for.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach the curve.
+    """
+    return paced(curve, drag) if drag > 0.0 else curve

@@ -6,7 +6,7 @@ import numpy.typing as npt
 
 from controllers.haptic_map.river_clips import RIVER, RiverClips
 from experiments.setups.balance import nearest_supported
-from experiments.setups.hands import stylus_path
+from experiments.setups.stylus import stylus_path
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import poses_along
 

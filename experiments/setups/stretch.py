@@ -1,55 +1,142 @@
-"""STRETCHY TUBES as a run: the field, what a hand does in it by default, and what is kept of the bent curve."""
+"""STRETCHY TUBES as a run: the field, and what a hand does in it by default.
 
-import json
-from dataclasses import dataclass
-from pathlib import Path
+On a map from a file the search is as soft as rivers there are: what the hand does, the figure has to do, and curves
+that are near each other hold different motions.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
-from controllers.errors import CurveError
+from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.config.run_config import RunConfig
+from controllers.safety.energy_tank import river_power, spring_store
+from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array
+from experiments.config.modes import Stretch, StretchThenFollow
+from experiments.config.run_config import RunConfig, User
+from experiments.results.stretch_measures import editing_summary, performance_summary
+from experiments.results.stretch_summary import stretch_summary
+from experiments.results.summary import RunSummary
+from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.certified_law import CertifiedLaw
+from experiments.setups.fixed_curve import with_walls
+from experiments.setups.hands import (
+    PAUSE,
+    edited_until,
+    first_pushed_lap,
+    handled,
+    resolved_user,
+    turning_remark,
+    user_arm,
+)
+from experiments.setups.lifted_runs import HELD_GAINS
+from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
+from experiments.setups.stylus import stylus_path
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
-from sim.errors import SimError
 from sim.users.intent import Grab
 
-Array = npt.NDArray[np.float64]
-
-CURVE_FILE = "curve.json"
+SEEK, SOFT_SEEK, SOFT_DAMPING = 150.0, 50.0, 20.0
+"""k_f [N/m] about a circle; and on a map from a file, as soft as rivers there are, with its damping [N s/m]."""
 DAMPING = 14.0  # [N s/m] an edit that is undone takes the hand along in a tenth of a second, not in a fortieth
 REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap at about the curve's own pace
-OUTSIDE = (
-    2.2  # radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third
-)
+# Radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third.
+OUTSIDE = 2.2
 EASE = 1.0  # [s] in which the performance of the bent curve comes to its pace
-LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other
 _BLINK = 0.05  # [s] a flight lasts longer
-PAUSE = 0.5  # [s] between two doings of the default hand, and before the bent curve is performed
+_BEND = 2.0  # steepest slope of a bump of height and half width 1, and a little more
 
 
-def law(config: RunConfig, curve: Trajectory, grabs: tuple[Grab, ...], lifted: bool = False) -> StretchyTubes:
-    """Field of the modes "stretch", and "stretch-then-follow", which performs once the last grab is over.
+def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "stretch"."""
+    return _parts(config, mode, maps, maps.curve, _Performance(None, np.inf), ())
 
-    On a lifted map the search is as soft as rivers there are: what the hand does, the figure has to do, and curves
-    that are near each other hold different motions.
 
-    Raises
-    ------
-    ControllerError
-        If a number is out of its interval.
-    """
-    then = until = None
-    if config.mode == "stretch-then-follow":
-        then = Follow(curve, config.stiffness, config.damping, config.tube)
-        until = edited_until(grabs)
-    seek, damping = (config.lifted_stiffness, config.lifted_damping) if lifted else (config.seek, DAMPING)
-    return StretchyTubes(
-        curve, seek, config.rubber, damping, epsilon=config.rubber_tube, width=config.bump,
-        until=np.inf if until is None else until, then=then, ease=EASE,
+def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "stretch-then-follow", which performs once the last grab is over."""
+    course = maps.course(mode.damping)
+    user = _user(config, mode, maps)
+    until = edited_until(user.grabs)
+    carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)
+    power = river_power(mode.damping, fastest(course) + _BEND * carried / mode.bump)
+    late = f"the curve is bent until {until:.1f} s and performed then; give --seconds more than that"
+    remarks = (late,) if config.seconds <= until else ()
+    performance = _Performance(
+        Follow(course, mode.stiffness, mode.damping, mode.tube), until, ((mode.stiffness, mode.tube),), power
+    )
+    return _parts(config, mode, maps, course, performance, remarks)
+
+
+def stretch_laws(mode: Stretch | StretchThenFollow) -> dict[str, CertifiedLaw]:
+    """What is certified: tubes seek with the switch open, and hold with it closed."""
+    damping = DAMPING if mode.tube_damping is None else mode.tube_damping
+    seek = SEEK if mode.seek is None else mode.seek
+    return {
+        "": CertifiedLaw("seek", seek, damping, float("inf")),
+        "_held": CertifiedLaw("hold", mode.rubber, damping, float("inf")),
+    }
+
+
+def stretch_then_follow_laws(mode: StretchThenFollow) -> dict[str, CertifiedLaw]:
+    """Likewise, and the performance of the curve as it was before it was bent."""
+    return stretch_laws(mode) | {"_then": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}
+
+
+class _Performance(NamedTuple):
+    """What performs the bent curve, from when on [s], its springs, and what its damper injects [W]."""
+
+    law: Follow | None
+    until: float
+    springs: tuple[tuple[float, float], ...] = ()
+    power: float = 0.0
+
+
+def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
+    grabs = config.user.grabs or stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
+    return resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
+
+
+def _parts(
+    config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts, course: Trajectory,
+    performance: _Performance, remarks: tuple[str, ...],
+) -> Parts:  # fmt: skip
+    if mode.bump > 0.5 * maps.curve.duration:
+        raise ParameterError(f"bump is {mode.bump} s; expected at most half a lap, {0.5 * maps.curve.duration:g} s")
+    user = _user(config, mode, maps)
+    seek = SEEK if mode.seek is None else mode.seek
+    tubes = StretchyTubes(
+        course, seek, mode.rubber, DAMPING if mode.tube_damping is None else mode.tube_damping,
+        epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE,
+    )  # fmt: skip
+    pushed = first_pushed_lap(maps.curve, user.grabs)
+    if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:
+        remarks = (f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that",)
+    # A press of the switch leaves the search for the rubber: its energy once a second.
+    springs = ((max(seek, mode.rubber), SPAN), *performance.springs)
+    power = spring_store(mode.rubber, mode.rubber_tube) + performance.power
+    notes = Notes(mode.rubber_tube, "tube", hand_does="traces" if user.does == "trace" else "grabs or pushes")
+
+    def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
+        of.save_curve(tubes.edited(of.memory))
+        return replace(
+            summary, stretch=stretch_summary(tubes, of.memory),
+            editing=editing_summary(of.recording, tubes, of.default_poses(), of.handled),
+            performance=performance_summary(of.recording, tubes, of.default_poses(), of.handled),
+        )  # fmt: skip
+
+    return Parts(
+        config=replace(config, user=user), maps=maps, field=tubes,
+        program=with_walls(tubes.program(), mode.walls, maps), course=course,
+        user=user_arm(user, maps.curve, config.seconds),
+        tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
+        gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
+        # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.
+        argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
+        remarks=flight_remarks(maps.clips) + remarks + turning_remark(user, maps.expressive),
     )  # fmt: skip
 
 
@@ -75,11 +162,6 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
     if over:
         remarks.append(f"who turns over in the air ({', '.join(over)}) and is held there falls")
     return tuple(remarks)
-
-
-def edited_until(grabs: tuple[Grab, ...]) -> float:
-    """When a hand has done all its grabs, and a pause after them [s]."""
-    return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tuple[Grab, ...]:
@@ -120,83 +202,3 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
 def _vector(values: Array) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z
-
-
-@dataclass(frozen=True)
-class StretchSummary:
-    """How a curve was bent.
-
-    Attributes
-    ----------
-    edits : int
-        In force at the end.
-    largest_mm : float
-        Largest distance of a point of the bent curve from where it was.
-    changed : float
-        Share of the curve's phases at which it is not where it was.
-    held_off_m : float
-        Largest distance of a held point from the stylus.
-    length_before_mm, length_after_mm : float
-    reach_mm : float
-        Radius up to which the bent curve's nearest point is unique (an estimate; see `Trajectory.reach`).
-    """
-
-    edits: int
-    largest_mm: float
-    changed: float
-    held_off_m: float
-    length_before_mm: float
-    length_after_mm: float
-    reach_mm: float
-
-    def line(self) -> str:
-        """What happened, in a sentence."""
-        if self.edits == 0:
-            return "The curve was not bent."
-        times = "once" if self.edits == 1 else f"{self.edits} times"
-        return (
-            f"The curve was bent {times}, by up to {self.largest_mm:.1f} mm over {100 * self.changed:.0f} % of it; "
-            f"the held point was at the stylus within {self.held_off_m:.0e} m."
-        )
-
-
-def stretch_summary(tubes: StretchyTubes, memory: Array) -> StretchSummary:
-    """Measure the bent curve in the memory of a run against the one before."""
-    bent, phases = tubes.edited(memory), np.linspace(tubes.curve.start, tubes.curve.end, 2001)
-    moved = np.linalg.norm(bent.point(phases) - tubes.curve.point(phases), axis=1)
-    return StretchSummary(
-        edits=len(tubes.edits(memory)),
-        largest_mm=1e3 * float(moved.max()),
-        changed=float(np.mean(moved > 1e-9)),
-        held_off_m=tubes.held_off(memory),
-        length_before_mm=1e3 * tubes.curve.length,
-        length_after_mm=1e3 * bent.length,
-        reach_mm=1e3 * bent.reach,
-    )
-
-
-def save_curve(curve: Trajectory, path: Path) -> None:
-    """Write a curve as JSON: times [s], positions in H [m], quaternions wxyz, periodic, ends."""
-    samples = {name: np.asarray(getattr(curve, name)).tolist() for name in ("times", "positions", "quaternions")}
-    path.write_text(json.dumps(samples | {"periodic": curve.periodic, "ends": curve.ends}) + "\n", encoding="utf-8")
-
-
-def load_curve(path: Path) -> Trajectory:
-    """Curve that `save_curve` wrote.
-
-    Raises
-    ------
-    SimError
-        If the file is not one.
-    CurveError
-        If its numbers make no curve.
-    """
-    keys = ("times", "positions", "quaternions", "periodic", "ends")
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        times, positions, quaternions, periodic, ends = (values[key] for key in keys)
-        return Trajectory(times, positions, quaternions, bool(periodic), ends)
-    except CurveError as error:
-        raise CurveError(f"{path}: {error}") from None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise SimError(f"{path}: no curve ({error}); expected JSON with {', '.join(keys)}") from None

@@ -16,21 +16,22 @@ from numba import njit
 
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.program import evaluate
-from controllers.fields.soft_wall import raise_walls
+from controllers.fields.map_feed import feed_maps, feed_rows
+from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import HandState
 from experiments.certify.certify import CERTIFICATE
+from experiments.config.modes import JointWalls
 from experiments.config.run_config import RunConfig
-from experiments.run import SUMMARY
+from experiments.results.folder import SUMMARY
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs
-from experiments.setups.hands import stylus_path
-from experiments.setups.modes import heaviest_field, tick_microseconds
+from experiments.setups.figure_legs import figure_legs
 from experiments.setups.session import Session
+from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
+from experiments.studies.field_cost import heaviest_field, tick_microseconds
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
@@ -51,7 +52,7 @@ ROUNDS = 7
 def bench() -> None:
     """Print every figure with what it has to reach."""
     config = RunConfig(seconds=SECONDS)
-    clips, _ = load_clips(config.clips)
+    clips, _ = load_clips(config.map.clips)
     ratio, factor, same = closed_loop_over_replay(lambda: wire(config, clips))
     print(f"closed loop / replay of its controls, one thread: {ratio:.3f} (≤ 1.05); same states bit for bit: {same}")
     print(f"real-time factor of one thread: {factor:.2f}")
@@ -193,7 +194,7 @@ def map_microseconds(session: Session) -> float:
     """Mean time of h with h_* along the default curve [µs]."""
     kind, params, memory = session.haptic_map.compiled()
     pose, jacobian = np.empty(session.haptic_map.nq), np.empty((session.haptic_map.nv, 6))
-    points = stylus_path(session.curve.point(np.linspace(0.0, session.config.lap, 2000)))
+    points = stylus_path(session.curve.point(np.linspace(0.0, session.curve.duration, 2000)))
     units = map_units([(kind, params)])
     _map_many(units, kind, params, points[:2], memory, pose, jacobian)
     return _microseconds(lambda: _map_many(units, kind, params, points, memory, pose, jacobian), len(points))
@@ -218,22 +219,23 @@ def lifted_microseconds(m: int) -> float:
 
 
 @njit
-def _wall_many(units: IntArray, ops: IntArray, params: Array, memory: Array, hands: Array, wrench: Array) -> None:
+def _wall_many(units: IntArray, feeds: IntArray, field: Compiled, memory: Array, hands: Array, wrench: Array) -> None:
     for i in range(hands.shape[0]):
-        raise_walls(units, ops, params, memory, hands[i])
-        evaluate(ops, params, memory, hands[i], wrench)
+        feed_maps(units, feeds, field.params, memory, hands[i])
+        evaluate(field.units, field.ops, field.params, memory, hands[i], wrench)
 
 
 def walls_microseconds(session: Session) -> float:
     """Mean time of a tick of the figure's soft walls for a hand on the default curve [µs]."""
-    curve, config = session.curve, session.config
-    times = np.linspace(0.0, config.lap, 4000)
+    curve, numbers = session.curve, JointWalls()
+    times = np.linspace(0.0, curve.duration, 4000)
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
-    walls = figure_walls(session.haptic_map, config.wall_stiffness, config.wall_margin, config.joint_speed)
+    walls = figure_walls(session.haptic_map, numbers.wall_stiffness, numbers.wall_margin, numbers.joint_speed)
     program, wrench = walls.program(), np.empty(6)
     memory, units = program.fresh_memory(), session.servo.reference.units
-    _wall_many(units, program.ops, program.params, memory, hands[:2], wrench)
-    return _microseconds(lambda: _wall_many(units, program.ops, program.params, memory, hands, wrench), len(hands))
+    feeds, field = feed_rows(program.map_feeds), program.compiled()
+    _wall_many(units, feeds, field, memory, hands[:2], wrench)
+    return _microseconds(lambda: _wall_many(units, feeds, field, memory, hands, wrench), len(hands))
 
 
 def _microseconds(call: Callable[[], object], calls: int) -> float:

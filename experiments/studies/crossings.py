@@ -15,12 +15,14 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_RIVER, Program
-from controllers.fields.program import evaluate
+from controllers.fields.instructions import TRACE_RIVER
+from controllers.fields.law import Program
+from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from experiments.config.run_config import RunConfig
-from experiments.setups.modes import ADMISSION, HYSTERESIS, LOOK, SIGMA, law, river_time
+from experiments.config.maps import Circle, Cylindrical
+from experiments.config.modes import Rivers
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, gains, law_of, river_time
 from experiments.studies.field_figures import SPEED, straight_river
 from experiments.studies.trial_simulation import trial_model
 from models.scene import PHANTOM, SceneConfig
@@ -66,14 +68,14 @@ class Passage(NamedTuple):
 
 @njit
 def _pass(
-    plant: Plant, port: PhantomPort, hand: Hand, ops: IntArray, params: Array, memory: Array, limits: Array,
+    plant: Plant, port: PhantomPort, hand: Hand, field: Compiled, memory: Array, limits: Array,
     limiter: Array, p: Array, force: Array, river: Array,
 ) -> None:  # fmt: skip
     wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
     for k in range(p.shape[0]):
         t = k * plant.period
         sense(port, t, 0.0)
-        evaluate(ops, params, memory, port.hand, wrench)
+        evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
         limit_force(limits, limiter, wrench, force[k])
         actuate(port, force[k])
         p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
@@ -112,7 +114,7 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     n = round(seconds / scene.servo_period)
     p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
     _pass(
-        plant, port, make_hand(Arm(pushes=pushes)), program.ops, program.params, program.fresh_memory(),
+        plant, port, make_hand(Arm(pushes=pushes)), program.compiled(), program.fresh_memory(),
         limiter.limits(), limiter.fresh_memory(), p, force, river,
     )  # fmt: skip
     return Passage(p, force, river)
@@ -120,9 +122,9 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
 
 def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
     """Field of the river along x and of a second one, or of the first alone, with the gains of the mode of rivers."""
-    gains = RunConfig(mode="rivers")
+    mode = Rivers()
     rivers = tuple(
-        replace(river, epsilon=gains.river_tube, tau=river_time(gains), drag=gains.river_damping)
+        replace(river, epsilon=mode.river_tube, tau=river_time(mode), drag=gains(mode)[1])
         for river in (straight_river(0.0), second)
     )
     bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
@@ -156,13 +158,13 @@ def crossing_passages() -> str:
     return "\n".join(lines)
 
 
-def changed_over(config: RunConfig, newtons: float) -> tuple[int, int, int]:
+def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
     """How many hands on the level river go over into another one, and are thrown out, and how many there are.
 
     They are pushed up where the wave rises through it, or down where it falls.
     """
-    curve = Trajectory.circle(config.radius, config.lap)
-    program, changed, out = law(config, curve).program(), 0, 0
+    curve = Trajectory.circle(Circle().radius, Circle().lap)
+    program, changed, out = law_of(mode, default_choice(mode, curve, Cylindrical().reach)).program(), 0, 0
     pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in BEFORE for lasts in LASTING]
     for up, lead, lasts in pushes:
         at = curve.start + (0.5 if up > 0.0 else 0.75) * curve.duration - lead
@@ -178,8 +180,8 @@ def pushed_rivers() -> str:
     """The table as Markdown: by gains and push, how many hands change over, and how many are thrown out."""
     lines = ["| k_r, b_d | " + " | ".join(f"{f:g} N" for f in HARDER) + " |", "|---|" + "--:|" * len(HARDER)]
     for stiffness, damping in GAINS:
-        config = RunConfig(mode="rivers", river_stiffness=stiffness, river_damping=damping)
-        cells = [changed_over(config, f) for f in HARDER]
+        mode = Rivers(stiffness=stiffness, damping=damping)
+        cells = [changed_over(mode, f) for f in HARDER]
         told = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
         lines.append(f"| {stiffness:g}, {damping:g} | {told} |")
     return "\n".join(lines)

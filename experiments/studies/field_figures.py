@@ -18,10 +18,11 @@ from controllers.fields.bunny import Bunny
 from controllers.fields.edited import Edited, performance
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
+from controllers.fields.law import Law
 from controllers.fields.program import evaluate
 from controllers.fields.river import River, integrate
 from controllers.state import HandState
-from experiments.setups.modes import ADMISSION, HYSTERESIS, SIGMA, Field
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 Array = npt.NDArray[np.float64]
@@ -86,14 +87,14 @@ def crossing(degrees: float) -> Crossing:
     return Crossing(degrees, a[at], b[at], c[at], alone[0], a.max(), b.max(), c.max())
 
 
-def _felt(field: Field, way: Array) -> Array:
+def _felt(field: Law, way: Array) -> Array:
     """Force [N] on a hand that moves along x with the river's speed, at places x [m], one after the other."""
     program = field.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
     forces: list[float] = []
     for x in way:
         hand = HandState.at([x, 0.0, 0.0], [SPEED, 0.0, 0.0])
-        evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
         forces.append(float(np.linalg.norm(wrench[:3])))
     return np.array(forces)
 
@@ -153,7 +154,7 @@ def _plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Array, A
     return x, y
 
 
-def force_figure(field: Field, curves: list[Trajectory], epsilon: float, t: float) -> Figure:
+def force_figure(field: Law, curves: list[Trajectory], epsilon: float, t: float) -> Figure:
     """Force of a field on a hand at rest in the plane z = 0, at time t [s]."""
     figure, ax = _axes((4.6, 4.4))
     x, y = _plane(ax, curves, epsilon)

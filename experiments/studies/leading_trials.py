@@ -19,7 +19,7 @@ from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import Program
+from controllers.fields.law import Program
 from controllers.fields.leading import Gait, Leading
 from controllers.state import HandState
 from controllers.walking.walked_path import STEP

@@ -12,7 +12,7 @@ from controllers.haptic_map.lifting.room import Room
 from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.lift import LiftedClips, lift_clips
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, measure_map
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -14,10 +14,11 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.rotations import logarithm, multiply, rotate
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.results.figures import AXES, STYLE
-from experiments.run import RECORDING, clips_of, config_of, run
-from experiments.setups.hands import stylus_path
+from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.run import run
+from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, N_POSE
 from models.scene import FIGURE, world_model
@@ -26,7 +27,7 @@ from sim.reference.reference import poses_along
 
 Array = npt.NDArray[np.float64]
 
-CONFIG = RunConfig(
+CONFIG = run_config(
     clips=("cheer",), expressive=True, user="turn", seconds=16.0, orientation_stiffness=0.05, orientation_damping=5e-4
 )
 BASE_COLOUR, PHYSICAL_COLOUR = "#a8adb8", "#23272f"
@@ -91,7 +92,7 @@ def turning_figure(recording: Recording) -> Figure:
 def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
     """The physical figure as the stylus is upright, and at the end of each of its turns, one beside the other."""
     config = config_of(recording)
-    lap = config.lap
+    lap = recording.array("curve_span")[1]
     moments = [0.95 * lap, *(lap * (1.25 + 0.5 * k) for k in range(6))]
     model = world_model(config.scene)
     data, root = mujoco.MjData(model), int(model.joint(FIGURE + "root").qposadr[0])
@@ -119,7 +120,7 @@ def _base_poses(recording: Recording) -> Array:
     """The animation at the same places of the stylus, held upright."""
     config = config_of(recording)
     kind, params, memory = wire(config, clips_of(recording)).haptic_map.compiled()
-    points = recording.channel("ticks", "p")[:: config.figure_ticks]
+    points = recording.channel("ticks", "p")[:: config.figure.figure_ticks]
     poses = np.empty((len(points), N_POSE))
     poses_along(kind, params, memory, stylus_path(points), poses)
     return poses

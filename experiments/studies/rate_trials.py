@@ -16,18 +16,19 @@ from controllers.easing import smooth_step
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
-from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER, Program
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
+from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.results.figures import STYLE
-from experiments.setups.clips import load_clips
 from experiments.setups.governor import speeds_along
-from experiments.setups.modes import GATE, HYSTERESIS, SIGMA
+from experiments.setups.rivers import GATE, HYSTERESIS, SIGMA
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.scene import FIGURE
+from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.users.arm import Arm
@@ -78,18 +79,18 @@ class Bench:
     """
 
     def __init__(self) -> None:
-        self._config = RunConfig(clips=("backflip",), lap=2.7, tube=TUBE)
-        self._clips, _ = load_clips(self._config.clips)
+        self._config = run_config(clips=("backflip",), lap=2.7, tube=TUBE)
         session = self._session()
         self.curve = session.curve
-        assert isinstance(session.clip_map, ClipMap)
-        self.speeds = speeds_along(session.clip_map, self.curve)
+        clip_map = session.parts.maps.haptic_map
+        assert isinstance(clip_map, ClipMap)
+        self.speeds = speeds_along(clip_map, self.curve)
         phases = np.linspace(self.curve.start, self.curve.end, len(self.speeds))
         flying = phases[self.speeds[:, 0] > 0.0]
         self.flight = (float(flying[0]), float(flying[-1]))
 
     def _session(self) -> Session:
-        return wire(self._config, self._clips)
+        return wire(self._config)
 
     def governor(self) -> Program:
         """The governor alone."""
@@ -126,7 +127,9 @@ class Bench:
         root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
         session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
         field = session.servo.field.of(program)
-        device = session.servo.device.held_by(Arm(400.0, 10.0, way, STEP))
+        phantom = session.servo.device
+        assert isinstance(phantom, SimulatedPhantom)
+        device = phantom.held_by(Arm(400.0, 10.0, way, STEP))
         servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
 

@@ -24,7 +24,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.results.figures import STYLE
-from experiments.setups.modes import ADMISSION, SIGMA
+from experiments.setups.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
 
 Array = npt.NDArray[np.float64]

@@ -20,8 +20,8 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import Program
-from controllers.fields.program import evaluate
+from controllers.fields.law import Program
+from controllers.fields.program import Compiled, evaluate
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
 from models.scene import PHANTOM, R_WP
@@ -55,8 +55,7 @@ def run_late(
     plant: Plant,
     port: PhantomPort,
     hand: Hand,
-    ops: IntArray,
-    params: Array,
+    field: Compiled,
     memory: Array,
     late: Array,
     rounded: bool,
@@ -66,7 +65,7 @@ def run_late(
 
     Parameters
     ----------
-    plant, port, hand, ops, params, memory
+    plant, port, hand, field, memory
         As in the servo.
     late : Array
         Torques on their way, the next to act first, shape (m, 3); m is the delay in periods.
@@ -83,7 +82,7 @@ def run_late(
             sense(port, t, 0.0)
         else:
             _sense_exactly(port, t, 0.0)
-        evaluate(ops, params, memory, port.hand, wrench)
+        evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
         actuate(port, wrench[:3])
         for i in range(3):
             if late.shape[0] > 0:
@@ -280,5 +279,5 @@ def hand_path(
     )  # fmt: skip
     hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
-    run_late(plant, port, hand, program.ops, program.params, program.fresh_memory(), late, conditions.rounded, path)
+    run_late(plant, port, hand, program.compiled(), program.fresh_memory(), late, conditions.rounded, path)
     return path[np.isfinite(path[:, 0])]

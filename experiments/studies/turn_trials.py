@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.certificates.flight.ballistic import BodyMotion
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING
-from experiments.certify.ballistics import clip_ballistics
+from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.clip import Clip

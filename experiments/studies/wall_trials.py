@@ -1,7 +1,6 @@
 """Hands with and without a soft wall, in a picture: ``python -m experiments.studies.wall_trials docs``."""
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.rotations import exponential, logarithm, multiply
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import JOINTS, N_POSE, joint_range
 from models.mocap.clip import Clip
@@ -59,7 +58,7 @@ class Meeting(NamedTuple):
 def meet(walls: bool, seconds: float = 6.0) -> Meeting:
     """Let a hand push outwards, where the clip of the broken elbow is, for the second half of a lap."""
     inside = embedded("squat_dance")
-    config = replace(RunConfig(), seconds=seconds, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
+    config = run_config(seconds=seconds, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
     session = wire(config, (inside, impossible(inside)))
     frames: list[tuple[Array, Array, Array]] = []
 

@@ -37,7 +37,7 @@ class PlanarDisplacement:
         return moved
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Clip:
     """A motion of the figure; frame k is at time k / fps.
 
@@ -83,6 +83,9 @@ class Clip:
     def n_frames(self) -> int:
         """Number of frames n."""
         return len(self.poses)
+
+    def __repr__(self) -> str:
+        return f"<clip {self.name!r}, {self.duration:.2f} s at {self.fps:g} frames per second>"
 
     @property
     def duration(self) -> float:

@@ -37,7 +37,7 @@ from models.humanoid.skeleton import (
 from sim.body.contact_forces import N_EDGES
 from sim.body.figure_state import Array, FigureGains, FigureState
 from sim.body.whole_body import figure_torque
-from sim.compilation.compiled import entry_point
+from sim.compilation.units import unit_function
 from sim.errors import SimError
 
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
@@ -47,9 +47,7 @@ _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
 
 
-@entry_point
-def _update(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    figure_torque(s, q_r, v_r, a_r)
+_update = unit_function(figure_torque.__module__, figure_torque.__qualname__)  # the same unit as in the servo's loop
 
 
 @dataclass(frozen=True)

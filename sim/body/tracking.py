@@ -1,19 +1,24 @@
 """A clip through the physical figure alone: what torques and ground can do of it, and how much help it took."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from numba import typeof, types
 
+from controllers.kernel_call import call_as_given
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec
 from models.mocap.clip import Clip, pose_difference
 from sim.body.clip_motion import ClipMotion, clip_motion
-from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState, figure_torque
+from sim.body.drive import drive_unit
+from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
 from sim.compilation.compiled import entry_point
 from sim.compilation.native import mj_step
+from sim.compilation.units import Unit
 from sim.errors import SimError
 
 Array = npt.NDArray[np.float64]
@@ -145,12 +150,12 @@ class TrackingReport:
 
 @entry_point
 def _simulate(
-    s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
+    drive: int, s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
     poses: Array, reports: Array, flying: Array, contacts: Array, ground: Array, contact_force: Array,
 ) -> None:  # fmt: skip
     for k in range(q.shape[0]):
         poses[k] = s.qpos
-        figure_torque(s, q[k], v[k], a[k])
+        call_as_given(drive, (s, q[k], v[k], a[k]))
         lowest = np.inf
         for c in range(s.points.shape[0]):
             lowest = min(lowest, s.twin_contact_pos[s.twin_contact[c], 2] - s.radius)
@@ -173,8 +178,12 @@ def floor_world(config: TrackingConfig) -> mujoco.MjModel:
     return spec.compile()
 
 
-def tracked_motion(clip: Clip, seconds: float, config: TrackingConfig) -> TrackedMotion:
+def tracked_motion(
+    clip: Clip, seconds: float, config: TrackingConfig, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
+) -> TrackedMotion:
     """Run a clip through the physical figure, which starts in the clip's first pose and with its velocity.
+
+    `ready` is called before compiled code is needed, with its units.
 
     Raises
     ------
@@ -193,19 +202,28 @@ def tracked_motion(clip: Clip, seconds: float, config: TrackingConfig) -> Tracke
     mujoco.mj_forward(model, data)
     poses, reports, flying = np.empty((n, model.nq)), np.empty((n, 8)), np.empty(n)
     contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
-    _simulate(
-        figure.state, config.control_steps, reference.poses, reference.velocities, reference.accelerations,
-        poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
+    # Rows of what is not contiguous are of another type, and nothing checks that.
+    motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
+    numbers: tuple[Any, ...] = (
+        figure.state, config.control_steps, *motion, poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
     )  # fmt: skip
+    drive = drive_unit(figure.state)
+    ready((drive, Unit.of(_simulate, types.int64, *(typeof(number) for number in numbers))))
+    _simulate(drive.address(), *numbers)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
         reference, poses, reports, flying, contacts, ground, figure.state.weight, config.stature, warnings
     )
 
 
-def track(clip: Clip, seconds: float, config: TrackingConfig | None = None) -> TrackingReport:
+def track(
+    clip: Clip,
+    seconds: float,
+    config: TrackingConfig | None = None,
+    ready: Callable[[tuple[Unit, ...]], None] = lambda units: None,
+) -> TrackingReport:
     """Run a clip through the physical figure and report how it went; see `tracked_motion`."""
-    return report(tracked_motion(clip, seconds, config or TrackingConfig()))
+    return report(tracked_motion(clip, seconds, config or TrackingConfig(), ready))
 
 
 def report(motion: TrackedMotion) -> TrackingReport:

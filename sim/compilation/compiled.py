@@ -1,29 +1,31 @@
-"""Where compiled code is kept between processes, so that no stale kernel is ever run.
+"""How the functions of ``sim`` that Python calls are compiled, and where what they need is kept between processes.
 
-numba notices a change only in the file of the function it cached, not in the files of the functions that one calls.
-So the kernels of ``models`` and ``controllers`` are not cached by themselves; the entry points of ``sim`` are, with
-everything they call linked in, in a folder named by a hash of every source file that can hold a kernel. Any change
-there is another folder; copies of the same sources share one. What else takes long and depends on nothing but these
-sources and its input may be kept there.
+Kernels of ``models`` and ``controllers`` are compiled as parts of units: the entry points here, and the kernels that
+are called by their address (see `sim.compilation.kernel_units`). A unit is kept under a key of what it is made of
+(`sim.compilation.unit_key`, `sim.compilation.unit_cache`), so no stale one is ever run, and none is made again for a
+change that it does not depend on. What else takes long may be kept in a folder named by a hash of all sources.
 """
 
 import hashlib
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import llvmlite
 import llvmlite.binding
 import mujoco
 import numba
-from numba import config, njit
-from numba.core.caching import UserProvidedCacheLocator
+from numba import njit
+
+from sim.compilation import unit_cache
+from sim.compilation.deferred_codegen import install
 
 _ROOT = Path(__file__).resolve().parents[2]
 _KERNEL_PACKAGES = ("models", "controllers", "sim")
 _Function = TypeVar("_Function", bound=Callable[..., object])
+
+install()
 
 
 def source_hash() -> str:
@@ -40,36 +42,15 @@ def source_hash() -> str:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled code of these sources: under ``HVF_CACHE_DIR``, or the user's cache folder."""
-    base = os.environ.get("HVF_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "hvf" / source_hash()
-
-
-class SourceLocator(UserProvidedCacheLocator):
-    """Where numba keeps the code of a function: by the place of its file within these sources.
-
-    By numba's own choice, the absolute path, another copy of these sources would find this folder, and nothing in it.
-    """
-
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """The file's folder, from the root of these sources on if it is one of those in the hash."""
-        folder = Path(py_file).resolve().parent
-        if not any(folder.is_relative_to(_ROOT / package) for package in _KERNEL_PACKAGES):
-            return super().get_suitable_cache_subpath(py_file)
-        return ".".join(folder.relative_to(_ROOT).parts)
+    """Folder of what is found with these sources: under ``HVF_CACHE_DIR``, or the user's cache folder."""
+    return unit_cache.cache_folder() / source_hash()
 
 
 CACHE_FOLDER = cache_folder()
-config.CACHE_DIR = str(CACHE_FOLDER)  # pyright: ignore[reportAttributeAccessIssue]
-config.CACHE_LOCATOR_CLASSES = f"{__name__}.{SourceLocator.__name__}"  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def entry_point(function: _Function) -> _Function:
-    """Compile without the GIL and cache on disk: for the few functions of ``sim`` that are called from Python."""
-    return cast(_Function, njit(nogil=True, cache=True)(function))
-
-
-def is_cached() -> bool:
-    """Whether these sources have been compiled on this machine before."""
-    return any(CACHE_FOLDER.rglob("*.nbc"))
+    """Compile without the GIL and keep on disk: for the few functions of ``sim`` that are called from Python."""
+    compiled: Any = njit(nogil=True)(function)
+    compiled._cache = unit_cache.UnitCache(function, compiled.targetoptions)
+    return cast(_Function, compiled)

@@ -6,16 +6,15 @@ very function that Python calls.
 """
 
 from collections.abc import Callable, Iterable
-from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
 
-from controllers.fields.program import LAW_ARGUMENTS, LAW_KERNELS
+from controllers.fields.instructions import LAW_ARGUMENTS
+from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
-from sim.compilation.compiled import entry_point
+from controllers.kernel_call import address_of
+from sim.compilation.units import Unit
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -32,25 +31,37 @@ def map_units(maps: Iterable[tuple[int, Array]]) -> IntArray:
     units = np.zeros(max(MAP_KERNELS) + 1, dtype=np.int64)
     for kind, params in maps:
         for needed in kinds_of(kind, params):
-            units[needed] = _address(MAP_KERNELS[needed], MAP_ARGUMENTS)
+            units[needed] = _map_unit(needed).address()
     return units
 
 
-def law_units(ops: IntArray) -> IntArray:
-    """Addresses of the kernels that the instructions (n, 4) of a field need, by opcode; likewise."""
-    units = np.zeros(max(LAW_KERNELS) + 1, dtype=np.int64)
-    for opcode in ops[:, 0].tolist():
-        if opcode in LAW_KERNELS:
-            units[opcode] = _address(LAW_KERNELS[opcode], LAW_ARGUMENTS)
-    return units
+def law_units(program: Program) -> IntArray:
+    """Addresses of the kernels of a field's laws, in their order; likewise."""
+    addresses = [
+        _law_unit(kernel).address() if is_kept(kernel) else address_of(kernel, LAW_ARGUMENTS)
+        for kernel in program.kernels
+    ]
+    return np.array(addresses, dtype=np.int64)
 
 
-_alive: list[Any] = []  # compiled units: their code must outlive every address
+def is_kept(kernel: Callable[..., None]) -> bool:
+    """Whether a law's kernel is a unit of its own, kept on disk: not one about a function of the user's."""
+    return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
 
 
-@cache
-def _address(kernel: Callable[..., None], arguments: tuple[Any, ...]) -> int:
-    unit: Any = entry_point(getattr(kernel, "py_func"))  # noqa: B009 - a dispatcher, which pyright takes for a function
-    _alive.append(unit)
-    compiled = unit.get_compile_result(types.void(*arguments))
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+def units_of_map(kind: int, params: Array) -> tuple[Unit, ...]:
+    """Units that a map needs."""
+    return tuple(_map_unit(needed) for needed in kinds_of(kind, params))
+
+
+def units_of_laws(program: Program) -> tuple[Unit, ...]:
+    """Units that the laws of a field need, each once."""
+    return tuple(_law_unit(kernel) for kernel in program.kernels if is_kept(kernel))
+
+
+def _map_unit(kind: int) -> Unit:
+    return Unit.of(MAP_KERNELS[kind], *MAP_ARGUMENTS)
+
+
+def _law_unit(kernel: Callable[..., None]) -> Unit:
+    return Unit.of(kernel, *LAW_ARGUMENTS)

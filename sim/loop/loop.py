@@ -7,15 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.fields.instructions import (
-    EXTERNAL,
-    TRACE_DISTANCE,
-    TRACE_PHASE,
-    TRACE_POINT,
-    TRACE_RIVER,
-    TRACE_SIZE,
-    PythonFunction,
-)
+from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
 from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
@@ -122,9 +114,9 @@ class Loop:
         What is done with each block, such as `record_into`.
     block_seconds : float
         Simulated time of a block [s], rounded to whole figure updates.
-    python_laws : sequence of PythonFunction
-        `Program.python_laws` of the servo's field. With any, blocks go tick by tick: the hand is sensed, the laws
-        are called, and the compiled loop does the rest of the tick.
+    python_laws : sequence of callable
+        `Program.python_laws` of the servo's field: from the measured hand to six numbers. With any, blocks go tick by
+        tick: the hand is sensed, the laws are called, and the compiled loop does the rest of the tick.
 
     before_tick : callable, optional
         Called with the number of each tick before it, as a driver in Python is that writes the readings of an
@@ -142,15 +134,15 @@ class Loop:
         world: World | RobotWorld,
         observe: Observer = lambda ticks, frames, n: None,
         block_seconds: float = BLOCK_SECONDS,
-        python_laws: Sequence[PythonFunction] = (),
+        python_laws: Sequence[Callable[[HandState], Array]] = (),
         before_tick: Callable[[int], None] | None = None,
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
         self._block = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
-        field = servo.field
-        self._slots = [int(slot) for slot in field.ops[field.ops[:, 0] == EXTERNAL, 2]]
+        self._one: tuple[TickLog, FrameLog] | None = None
+        self._slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
         self._before_tick = before_tick
         if len(self._laws) != len(self._slots):
@@ -201,6 +193,18 @@ class Loop:
             progress(self.time)
         return RunTimes(wanted * plant.period, time.perf_counter() - begin)
 
+    def step(self) -> tuple[TickLog, FrameLog]:
+        """Run one tick; the logs have its one row, and one of the figure's last update."""
+        if self._one is None:
+            self._one = make_logs(self.servo, 1)
+        ticks, frames = self._one
+        if self._laws or self._before_tick is not None:
+            self._run_with_laws(1, ticks, frames)
+        else:
+            run_block(self.servo, self._tick, 1, False, ticks, frames)
+        self._tick += 1
+        return ticks, frames
+
     def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
         servo, every = self.servo, self.servo.figure_ticks
         for k in range(n):
@@ -210,7 +214,7 @@ class Loop:
             read_device(servo.device, tick * servo.plant.period)
             hand = HandState.of(servo.device.hand)
             for slot, law in zip(self._slots, self._laws, strict=True):
-                servo.field.memory[slot : slot + 3] = law(hand)
+                servo.field.memory[slot : slot + 6] = law(hand)
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
             run_block(servo, tick, 1, False, tick_rows, frame_rows)

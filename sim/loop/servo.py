@@ -21,17 +21,20 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.fields.instructions import TRACE_SIZE, Program
-from controllers.fields.program import evaluate_units
-from controllers.fields.soft_wall import raise_walls
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.law import Program
+from controllers.fields.map_feed import feed_maps, feed_rows
+from controllers.fields.program import evaluate
 from controllers.safety.command import command_force
-from controllers.safety.energy_tank import TANK_ENERGY, renew_tank
+from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
-from controllers.safety.limiter import renew_limiter
-from sim.body.drive import BodyState, ReferenceState, follow
+from controllers.safety.limiter import ForceLimiter, renew_limiter
+from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import law_units
+from sim.compilation.kernel_units import law_units, map_units
 from sim.devices.device import DeviceState, actuate, advance, sense
+from sim.reference.reference import NO_MAP
+from sim.reference.reference_state import CompiledReference
 from sim.world.plant import Plant
 
 Array = npt.NDArray[np.float64]
@@ -41,13 +44,17 @@ IntArray = npt.NDArray[np.int64]
 class Field(NamedTuple):
     """A compiled field, its limiter and its energy tank: programs, parameters, memory, and the last wrench.
 
-    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`).
+    `units` are the addresses of its laws' kernels (see `sim.compilation.kernel_units`), none before they are linked;
+    `slots` the places in the memory of what laws in Python give, `maps` what its laws are told of the haptic map (see
+    `controllers.fields.map_feed`).
     """
 
     units: IntArray
     ops: IntArray
     params: Array
     memory: Array
+    slots: IntArray
+    maps: IntArray
     limits: Array
     limiter: Array
     budget: Array
@@ -56,26 +63,51 @@ class Field(NamedTuple):
     force: Array
 
     def of(self, program: Program) -> "Field":
-        """The same limits and budget about another program, with a fresh memory."""
-        return self._replace(
-            units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory()
-        )
+        """The same limits and budget about another program, with a fresh memory; its laws are compiled if needed."""
+        return Field(*_program_parts(program), *self[6:])._replace(units=law_units(program))
+
+
+def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) -> Field:
+    """A field for a new run, without the addresses of its laws: nothing has to be compiled for it."""
+    return Field(
+        *_program_parts(program), limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(),
+        tank=tank.fresh_memory(), wrench=np.zeros(6), force=np.zeros(3),
+    )  # fmt: skip
+
+
+def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, IntArray]:
+    """The first of the attributes of a `Field`."""
+    slots, nothing = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
+    memory, maps = program.fresh_memory(), feed_rows(program.map_feeds)
+    return nothing, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps
 
 
 class Servo(NamedTuple):
     """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
-    `argument` (7,) is what the haptic map is evaluated at: a view of the device's hand, where the stylus is, or of the
-    field's memory, where a walker is that the field moves.
+    `argument` (7,) is what the haptic map is evaluated at: a view of the device's hand, where the stylus is, or that of
+    a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the
+    reference and of what drives the body: a change in one of them is not one of the loop.
     """
 
     plant: Plant
     device: DeviceState
     field: Field
-    reference: ReferenceState
+    reference: CompiledReference
     figure: BodyState
     figure_ticks: int
     argument: Array
+    units: IntArray = np.zeros(2, dtype=np.int64)
+
+    def linked(self, program: Program) -> "Servo":
+        """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
+        reference = self.reference
+        if reference.kind != NO_MAP:
+            reference = reference._replace(units=map_units([(reference.kind, reference.params)]))
+        return self._replace(
+            units=follow_addresses(self.figure, reference), field=self.field._replace(units=law_units(program)),
+            reference=reference,
+        )  # fmt: skip
 
 
 class TickLog(NamedTuple):
@@ -144,8 +176,8 @@ class FrameLog(NamedTuple):
 def field_force(servo: Servo) -> None:
     """Evaluate the field at the measured hand, and command what of it is safe."""
     field, device = servo.field, servo.device
-    raise_walls(servo.reference.units, field.ops, field.params, field.memory, device.hand)
-    evaluate_units(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
+    feed_maps(servo.reference.units, field.maps, field.params, field.memory, device.hand)
+    evaluate(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
     command_force(
         field.limits, field.limiter, field.budget, field.tank, device.faults, device.hand, field.wrench, field.force
     )
@@ -179,7 +211,8 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             sense(device, t)
             field_force(servo)
             if update_figure:
-                follow(servo.figure, servo.reference, servo.argument, servo.field.memory[:TRACE_SIZE])
+                trace = servo.field.memory[:TRACE_SIZE]
+                follow(servo.units, servo.figure, servo.reference, servo.argument, trace)
             ticks.hand[k] = device.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force

@@ -2,11 +2,14 @@
 
 import numpy as np
 import numpy.typing as npt
+from numba import types
 
+from controllers.fields.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
+from sim.compilation.units import Unit
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -17,6 +20,12 @@ def _derivative(
     units: IntArray, kind: int, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
 ) -> None:
     evaluate_map_jacobian(units, kind, params, x, memory, pose, jacobian)
+
+
+def derivative_unit() -> Unit:
+    """The unit of `map_derivative`, but for the map's kernels."""
+    matrix, units = types.Array(types.float64, 2, "C"), types.Array(types.int64, 1, "C")
+    return Unit.of(_derivative, units, types.int64, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
 
 
 def map_derivative(haptic_map: HapticMap, x: Array) -> Array:

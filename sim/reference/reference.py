@@ -8,19 +8,21 @@ import math
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+from numba import njit, typeof, types
 
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, VECTOR
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS, lets_go, phase_rate, takes_over
+from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.native import mj_differentiate_pos
+from sim.compilation.units import Unit
 from sim.errors import SimError
-from sim.reference.reference_state import CompiledReference, NoReference, carry, follow_trail, look_around
+from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
 from sim.reference.river_changes import change_river, may_change, stop
 from sim.reference.settling import approach, let_down, slowness
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
@@ -28,6 +30,9 @@ from sim.reference.transition import dwells, make_transition
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+_MATRIX = types.Array(types.float64, 2, "C")
 
 
 @njit
@@ -113,7 +118,23 @@ def poses_along(kind: int, params: Array, memory: Array, points: Array, poses: A
     _poses_along(map_units([(kind, params)]), kind, params, memory, points, poses)
 
 
+def poses_unit() -> Unit:
+    """The unit of `poses_along`, but for the map's kernels."""
+    return Unit.of(_poses_along, types.Array(types.int64, 1, "C"), types.int64, VECTOR, VECTOR, _MATRIX, _MATRIX)
+
+
+def update_unit(reference: CompiledReference) -> Unit:
+    """The unit of `update_reference`, which is called by its address."""
+    return Unit.of(update_reference, typeof(reference), VECTOR, VECTOR)
+
+
 @entry_point
+def _reference_along(update: int, reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
+    for i in range(points.shape[0]):
+        call_as_given(update, (reference, points[i], traces[i]))
+        poses[i] = reference.pose
+
+
 def reference_along(reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
     """Let a reference go along a path of the stylus, period by period.
 
@@ -126,9 +147,14 @@ def reference_along(reference: CompiledReference, points: Array, traces: Array, 
     poses : Array
         Set, shape (n, 75).
     """
-    for i in range(points.shape[0]):
-        update_reference(reference, points[i], traces[i])
-        poses[i] = reference.pose
+    # Rows of what is not contiguous are of another type, and nothing checks that.
+    points, traces = np.ascontiguousarray(points), np.ascontiguousarray(traces)
+    _reference_along(update_unit(reference).address(), reference, points, traces, poses)
+
+
+def along_unit(reference: CompiledReference) -> Unit:
+    """The unit of `reference_along`, but for what that calls."""
+    return Unit.of(_reference_along, types.int64, typeof(reference), _MATRIX, _MATRIX, _MATRIX)
 
 
 def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
@@ -158,12 +184,6 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
         )
     if not 0.0 <= blend < math.inf:
         raise SimError(f"the blend time of a transition is {blend} s; expected a finite number ≥ 0")
-
-
-def no_reference(compiled: CompiledMap | None = None) -> NoReference:
-    """The reference of a run without a figure; `compiled` is the map that soft walls of its field ask."""
-    maps = [] if compiled is None else [(compiled.kind, compiled.params)]
-    return NoReference(map_units(maps), np.zeros(0))
 
 
 def make_reference(
@@ -199,16 +219,47 @@ def make_reference(
     SimError
         As `check_reference`.
     """
+    reference = unlinked_reference(figure_model, compiled, period, bandwidth, blend, limbs, clip_seconds)
+    return reference._replace(units=map_units([(compiled.kind, compiled.params)]))
+
+
+def unlinked_reference(
+    figure_model: mujoco.MjModel,
+    compiled: CompiledMap,
+    period: float,
+    bandwidth: float,
+    blend: float = 0.0,
+    limbs: Array | None = None,
+    clip_seconds: float = 0.0,
+) -> CompiledReference:
+    """`make_reference` without the addresses of the map's kernels: nothing is compiled for it."""
     check_reference(period, bandwidth, blend)
     kind, params, memory = compiled
     legs = np.zeros((0, LIMB)) if limbs is None else limbs
     nq, nv = figure_model.nq, figure_model.nv
     return CompiledReference(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
-        units=map_units([(kind, params)]), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
+        units=np.zeros(0, dtype=np.int64), kind=kind, params=params, memory=memory, hand=np.zeros((3, 3)),
         trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=make_transition(nq, nv, blend, legs),
         clip_seconds=clip_seconds, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
         before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+    )  # fmt: skip
+
+
+NO_MAP = -1
+"""Kind of the map of a reference that has none."""
+
+
+def no_reference(compiled: CompiledMap | None = None) -> CompiledReference:
+    """What a servo without a figure has for a reference, empty; `compiled` is a map that its field is told of."""
+    kind, params, memory = compiled or CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
+    return CompiledReference(
+        figure_model=0, smoothing=0.0, period=1.0, units=np.zeros(0, dtype=np.int64), kind=kind, params=params,
+        memory=memory, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
+        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(0),
+        velocity=np.zeros(0), acceleration=np.zeros(0), transition=make_transition(0, 0, 0.0, np.zeros((0, LIMB))),
+        clip_seconds=0.0, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
+        before=np.zeros(0), after=np.zeros(0), to_before=np.zeros(0), to_after=np.zeros(0),
     )  # fmt: skip

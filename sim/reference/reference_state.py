@@ -77,21 +77,6 @@ class CompiledReference(NamedTuple):
     to_after: Array
 
 
-class NoReference(NamedTuple):
-    """What a servo holds where there is no figure: no map is evaluated.
-
-    Attributes
-    ----------
-    units : IntArray
-        Addresses of a map's kernels, for a field with soft walls, which feels the figure's joints; else zeros.
-    pose : Array
-        Nothing, shape (0,).
-    """
-
-    units: IntArray
-    pose: Array
-
-
 @njit
 def look_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, a period before and a period after; the memory is now's."""

@@ -16,13 +16,14 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+from numba import njit, types
 
 from controllers.legs.footsteps import limb_end
 from controllers.legs.limbs import LIMB
 from controllers.rotations import rotate
 from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
+from sim.compilation.units import Unit
 
 Array = npt.NDArray[np.float64]
 
@@ -94,3 +95,8 @@ def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
 def stood(limbs: Array, pose: Array) -> None:
     """Let a pose (75,) down to the floor, where a run begins with it; see `let_down`."""
     let_down(limbs, np.empty((limbs.shape[0], 7)), 1.0, pose)
+
+
+def stood_unit() -> Unit:
+    """The unit of `stood`."""
+    return Unit.of(stood, types.Array(types.float64, 2, "C"), types.Array(types.float64, 1, "C"))

@@ -33,17 +33,17 @@ class Push:
 
     Parameters
     ----------
-    start : float
+    at : float
         Earliest time [s].
-    duration : float
+    seconds : float
         T [s].
-    peak : float
+    force : float
         Largest force [N]; negative pushes the other way.
     direction : tuple of float, optional
         Fixed direction d in the hand frame, any length but zero. By default away from the vertical axis of the hand
         frame, wherever the hand is.
     place : tuple of float, optional
-        Where in the hand frame [m]: the push begins when the hand first comes within `radius` of it after `start`.
+        Where in the hand frame [m]: the push begins when the hand first comes within `radius` of it after `at`.
     radius : float
         [m]
 
@@ -53,19 +53,19 @@ class Push:
         If a number is out of its interval or the direction has no length.
     """
 
-    start: float
-    duration: float
-    peak: float
+    at: float
+    seconds: float
+    force: float
     direction: tuple[float, float, float] | None = None
     place: tuple[float, float, float] | None = None
     radius: float = 0.01
 
     def __post_init__(self) -> None:
-        numbers = [self.start, self.duration, self.peak, self.radius, *(self.direction or ()), *(self.place or ())]
+        numbers = [self.at, self.seconds, self.force, self.radius, *(self.direction or ()), *(self.place or ())]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a push has a number that is not finite: {self}")
-        if self.duration <= 0.0 or self.start < 0.0 or self.radius <= 0.0:
-            raise SimError(f"a push needs start ≥ 0 s, duration > 0 s and radius > 0 m, got {self}")
+        if self.seconds <= 0.0 or self.at < 0.0 or self.radius <= 0.0:
+            raise SimError(f"a push needs at ≥ 0 s, seconds > 0 and radius > 0 m, got {self}")
         if self.direction is not None and np.linalg.norm(self.direction) < 1e-12:
             raise SimError(f"the direction of a push has no length: {self.direction}")
 
@@ -74,7 +74,7 @@ class Push:
         direction = np.zeros(3) if self.direction is None else np.array(self.direction) / np.linalg.norm(self.direction)
         place, radius = (np.zeros(3), 0.0) if self.place is None else (np.array(self.place), self.radius)
         outward = float(self.direction is None)
-        return np.array([self.start, self.duration, self.peak, *direction, outward, *place, radius])
+        return np.array([self.at, self.seconds, self.force, *direction, outward, *place, radius])
 
 
 def push_table(pushes: Sequence[Push]) -> Array:
@@ -89,16 +89,16 @@ class Grab:
     .. math:: p_d(t) = a + \sigma(t)\,(b - a), \qquad \sigma(s) = 10 s^3 - 15 s^4 + 6 s^5
 
     The hand means to be at p_d, which moves with least jerk from where the hand is when the grab begins to the place
-    within `reach` seconds, and from there along `carry` within `duration` seconds, with the switch pressed, and stays
+    within `reach` seconds, and from there along `carry` within `seconds`, with the switch pressed, and stays
     for `hold` seconds. An arm's impedance pulls the stylus along (see `sim.users.arm`), so what resists keeps it back.
 
     Parameters
     ----------
-    start : float
+    at : float
         [s]
     carry : tuple of float
         In the hand frame [m]. A grab that carries nowhere is a click.
-    duration : float
+    seconds : float
         Of the carrying [s].
     hold : float
         [s]
@@ -115,30 +115,30 @@ class Grab:
         If a number is out of its interval.
     """
 
-    start: float
+    at: float
     carry: tuple[float, float, float]
-    duration: float = 1.0
+    seconds: float = 1.0
     hold: float = 0.3
     place: tuple[float, float, float] | None = None
     reach: float = 1.0
     steady: bool = False
 
     def __post_init__(self) -> None:
-        numbers = [self.start, self.duration, self.hold, self.reach, *self.carry, *(self.place or ())]
+        numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *(self.place or ())]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a grab has a number that is not finite: {self}")
-        if self.duration <= 0.0 or self.reach <= 0.0 or self.start < 0.0 or self.hold < 0.0:
-            raise SimError(f"a grab needs duration and reach > 0 s, start and hold ≥ 0 s, got {self}")
+        if self.seconds <= 0.0 or self.reach <= 0.0 or self.at < 0.0 or self.hold < 0.0:
+            raise SimError(f"a grab needs seconds and reach > 0, at and hold ≥ 0 s, got {self}")
 
     @property
     def end(self) -> float:
         """When the switch is let go of [s]."""
-        return self.start + (self.reach if self.place else 0.0) + self.duration + self.hold
+        return self.at + (self.reach if self.place else 0.0) + self.seconds + self.hold
 
     def row(self) -> Array:
         """The grab as numbers for the compiled hand, shape (11,)."""
         place, reach = (np.full(3, np.nan), 0.0) if self.place is None else (np.array(self.place), self.reach)
-        return np.array([self.start, reach, *place, *self.carry, self.duration, self.hold, float(self.steady)])
+        return np.array([self.at, reach, *place, *self.carry, self.seconds, self.hold, float(self.steady)])
 
 
 def grab_table(grabs: Sequence[Grab]) -> Array:
@@ -149,10 +149,10 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
     SimError
         If one begins before another is over; a hand has one stylus.
     """
-    ordered = sorted(grabs, key=lambda grab: grab.start)
+    ordered = sorted(grabs, key=lambda grab: grab.at)
     for before, after in itertools.pairwise(ordered):
-        if after.start < before.end:
-            raise SimError(f"a grab begins at {after.start:g} s, before another has ended at {before.end:g} s")
+        if after.at < before.end:
+            raise SimError(f"a grab begins at {after.at:g} s, before another has ended at {before.end:g} s")
     return np.array([grab.row() for grab in ordered]).reshape(len(ordered), GRAB_COLUMNS)
 
 
@@ -164,9 +164,9 @@ class Turn:
 
     Parameters
     ----------
-    start : float
+    at : float
         t_i [s].
-    duration : float
+    seconds : float
         T_i, of turning there and back [s].
     angle : float
         α_i, the farthest [rad]; at most half a turn either way.
@@ -179,22 +179,22 @@ class Turn:
         If a number is out of its interval or the axis has no length.
     """
 
-    start: float
-    duration: float
+    at: float
+    seconds: float
     angle: float
     axis: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not np.all(np.isfinite([self.start, self.duration, self.angle, *self.axis])):
+        if not np.all(np.isfinite([self.at, self.seconds, self.angle, *self.axis])):
             raise SimError(f"a turn has a number that is not finite: {self}")
-        if self.duration <= 0.0 or self.start < 0.0 or abs(self.angle) > np.pi:
-            raise SimError(f"a turn needs start ≥ 0 s, duration > 0 s and an angle within ±π, got {self}")
+        if self.seconds <= 0.0 or self.at < 0.0 or abs(self.angle) > np.pi:
+            raise SimError(f"a turn needs at ≥ 0 s, seconds > 0 and an angle within ±π, got {self}")
         if np.linalg.norm(self.axis) < 1e-12:
             raise SimError(f"the axis of a turn has no length: {self.axis}")
 
     def row(self) -> Array:
         """The turn as numbers for the compiled hand, shape (5,)."""
-        return np.array([self.start, self.duration, *(self.angle * np.array(self.axis) / np.linalg.norm(self.axis))])
+        return np.array([self.at, self.seconds, *(self.angle * np.array(self.axis) / np.linalg.norm(self.axis))])
 
 
 def turn_table(turns: Sequence[Turn]) -> Array:

@@ -6,7 +6,7 @@ from figure_soles import slide, soles
 
 from controllers.haptic_map.led import Led
 from controllers.legs.grounded import runs
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
@@ -25,7 +25,7 @@ def figure():
 
 @pytest.fixture(scope="module")
 def run(figure):
-    return led_map(embedded("run"), figure_legs(figure), 0)
+    return led_map(embedded("run"), figure_legs(figure))
 
 
 def test_runs_of_a_mask_go_round():
@@ -84,7 +84,7 @@ def test_the_derivatives_by_place_and_form_are_those_of_the_pose(run, held):
 
 
 def test_a_walk_has_one_form_only(figure):
-    led, gait = led_map(embedded("walk"), figure_legs(figure), 0)
+    led, gait = led_map(embedded("walk"), figure_legs(figure))
     assert not led.grounds
     assert not gait.flies
     np.testing.assert_array_equal(led.pose(walker(0.7, 1.0)), led.pose(walker(0.7, 0.0)))

@@ -8,7 +8,7 @@ from figure_soles import slide, soles
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from controllers.walking.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from experiments.setups.lead import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
@@ -23,12 +23,12 @@ def walker(s):
 def winding(gait, bend, length=9.0):
     """A path that turns left and right, as far as the gait's support allows, and the lean that goes with it."""
     path, past = straight_path(0.3, -0.2, 0.5, gait.reach), 0.0
-    while path_front(path, 0) < length:
+    while path_front(path) < length:
         lap = (path[0] + 0.5) * STEP / gait.stride
         feet = gait.support[int(len(gait.support) * (lap - np.floor(lap))) % len(gait.support)]
         turn = np.array([0.0, 0.75, 1.0])[feet] * bend * np.sin(1.1 * path[0] * STEP)
-        lay_row(path, 0, turn * STEP, bend, turn * gait.speed**2)
-        past = lean_row(path, 0, 20, np.exp(-STEP / (gait.speed * 0.32)), past)
+        lay_row(path, turn * STEP, bend, turn * gait.speed**2)
+        past = lean_row(path, 20, np.exp(-STEP / (gait.speed * 0.32)), past)
     return path
 
 
@@ -51,9 +51,9 @@ def test_straight_on_the_figure_does_what_the_clip_does(figure, name):
 @pytest.mark.parametrize(("name", "bend"), [("walk", 0.7), ("run", 0.2)])
 def test_feet_that_stand_stay_where_they_stand(figure, name, bend):
     clip = embedded(name)
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     path = winding(gait, bend)
-    places = np.arange(gait.reach, path_front(path, 0) - gait.reach - 0.2, 0.01)
+    places = np.arange(gait.reach, path_front(path) - gait.reach - 0.2, 0.01)
     shown = soles(figure, [led.pose(walker(s), path) for s in places])
     touching = (shown[..., 2] < 0.003).any(axis=1).mean()
     assert touching > 0.5
@@ -68,11 +68,11 @@ def test_feet_that_stand_stay_where_they_stand(figure, name, bend):
 def test_a_knee_that_straightens_in_a_bend_is_not_stopped(figure):
     # The run's legs reach out to 3° of flexion before they land; leaning raises the outer hip.
     clip = embedded("run")
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     knees = [figure.joint(f"{side}_knee").dofadr[0] + 1 for side in ("left", "right")]
 
     def jerk(path):
-        places = np.arange(gait.reach, path_front(path, 0) - gait.reach - 0.2, 0.006)
+        places = np.arange(gait.reach, path_front(path) - gait.reach - 0.2, 0.006)
         shown = np.array([led.pose(walker(s), path) for s in places])
         rates = pose_difference(shown[1:], shown[:-1])[:, knees] / (places[1] - places[0])
         return np.abs(np.diff(rates, axis=0)).max() / (places[1] - places[0])
@@ -82,19 +82,19 @@ def test_a_knee_that_straightens_in_a_bend_is_not_stopped(figure):
 
 def test_the_pelvis_turns_only_while_a_foot_bears(figure):
     clip = embedded("run")
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     from controllers.fields.leading import Leading
 
     shares = Leading(gait).shares
     path = straight_path(0.0, 0.0, 0.0, gait.reach)
-    while path_front(path, 0) < 8.0:
+    while path_front(path) < 8.0:
         lap = (path[0] + 0.5) * STEP / gait.stride
-        lay_row(path, 0, shares[int(len(shares) * (lap - np.floor(lap))) % len(shares)] * 0.3 * STEP, 0.3, 0.0)
+        lay_row(path, shares[int(len(shares) * (lap - np.floor(lap))) % len(shares)] * 0.3 * STEP, 0.3, 0.0)
     places = np.arange(0.5, 7.0, 0.01)
     lap = places / gait.stride
     flying = gait.support[(len(gait.support) * (lap - np.floor(lap))).astype(int)] == 0
     straight = led.compiled().memory
-    turned = [path_value(path, 0, s, PATH_HEADING)[0] for s in places]
+    turned = [path_value(path, s, PATH_HEADING)[0] for s in places]
     yaw = np.unwrap([_yaw(led.pose(walker(s), path)) - _yaw(led.pose(walker(s), straight)) for s in places])
     np.testing.assert_allclose(yaw, turned, atol=1e-9)
     steps = np.abs(np.diff(yaw))
@@ -110,7 +110,7 @@ def _yaw(pose):
 
 
 def test_the_derivative_is_that_of_the_pose(figure):
-    led, gait = led_map(embedded("walk"), figure_legs(figure), 0)
+    led, gait = led_map(embedded("walk"), figure_legs(figure))
     path, h = winding(gait, 0.7), 1e-6
     for s in np.random.default_rng(2).uniform(0.5, 7.5, 100):
         jacobian = led.jacobian(walker(s), path)

@@ -12,9 +12,9 @@ from controllers.haptic_map.led import Led
 from controllers.legs.planted import levels, planted_ends, window
 from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
-from experiments.config.run_config import RunConfig
-from experiments.setups.figure_maps import figure_legs
-from experiments.setups.lead import law, led_map
+from experiments.config.modes import Lead
+from experiments.setups.figure_legs import figure_legs
+from experiments.setups.lead import leading, led_map
 from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, load_clip
@@ -35,11 +35,11 @@ def walker(s: float, held: float = 0.0) -> np.ndarray:
 def bent_path(gait, bend: float, length: float) -> np.ndarray:
     """A path that turns left and right while a foot stands."""
     path = straight_path(0.0, 0.0, 0.2, gait.reach)
-    while path_front(path, 0) < length:
+    while path_front(path) < length:
         lap = (path[0] + 0.5) * STEP / gait.stride
         feet = gait.support[int(len(gait.support) * (lap - np.floor(lap))) % len(gait.support)]
         turn = min(feet, 1) * bend * np.sin(1.5 * path[0] * STEP)
-        lay_row(path, 0, turn * STEP, bend, 0.0)
+        lay_row(path, turn * STEP, bend, 0.0)
     return path
 
 
@@ -78,9 +78,9 @@ def test_windows_are_one_within_the_runs_of_a_mask() -> None:
 @pytest.mark.parametrize("name", ["walk", "run"])
 def test_a_clip_that_skates_stands_on_a_bent_path(figure, name: str) -> None:
     clip = skating(name)
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     path = bent_path(gait, 0.5, 7.0)
-    places = np.arange(gait.reach, path_front(path, 0) - gait.reach - 0.2, 0.01)
+    places = np.arange(gait.reach, path_front(path) - gait.reach - 0.2, 0.01)
     shown = soles(figure, [led.pose(walker(s), path) for s in places])
     # Standing feet touch, and none goes through the floor.
     assert (shown[..., 2].min(axis=1) < 0.003).mean() > (0.95 if name == "walk" else 0.6)
@@ -92,7 +92,7 @@ def test_a_clip_that_skates_stands_on_a_bent_path(figure, name: str) -> None:
 
 def test_a_foot_that_stands_lies_level(figure) -> None:
     clip = skating("walk")
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     shown = soles(figure, [led.pose(walker(s)) for s in np.arange(0.0, gait.stride, 0.01)])
     toes, heels = shown[:, 2:4], shown[:, 0:2]
     flat = (toes[..., 2].min(axis=1) < 0.003) & (heels[..., 2].min(axis=1) < 0.003)
@@ -123,10 +123,10 @@ def test_a_sole_that_rolls_from_heel_to_toes_lies_flat_in_between(figure) -> Non
 
 def test_a_capture_that_flies_steps_instead(figure) -> None:
     clip = skating("run")
-    led, gait = led_map(clip, figure_legs(figure), 0)
+    led, gait = led_map(clip, figure_legs(figure))
     assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
     # Its limbs swing as fast already as they do in the run.
-    assert law(RunConfig(mode="lead"), gait).forward == 1.0
+    assert leading(Lead(), gait).forward == 1.0
     # Of its six steps the lap that repeats itself best has two.
     assert led.stride == pytest.approx(2 * Capture.step)
     assert 0.4 < led.pace < 0.8
@@ -141,7 +141,7 @@ def test_a_capture_that_flies_steps_instead(figure) -> None:
 @pytest.mark.parametrize("name", ["walk", "run"])
 def test_a_clip_that_closes_is_led_as_it_is(figure, name: str) -> None:
     clip = embedded(name)
-    led, _ = led_map(clip, figure_legs(figure), 0)
+    led, _ = led_map(clip, figure_legs(figure))
     plain = Led((clip.poses, clip.fps), figure_legs(figure), led.phase)
     for s in np.linspace(0.0, led.stride, 30):
         np.testing.assert_array_equal(led.pose(walker(s)), plain.pose(walker(s)))
@@ -151,7 +151,7 @@ def test_a_clip_that_closes_is_led_as_it_is(figure, name: str) -> None:
 def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
-    led, gait = led_map(load_clip(MOCAP / file), figure_legs(figure), 0)
+    led, gait = led_map(load_clip(MOCAP / file), figure_legs(figure))
     path = bent_path(gait, 0.35, gait.reach + 2.0 * led.stride + 1.0)
     places = np.arange(gait.reach, gait.reach + 2.0 * led.stride, 0.01)
     for held in (0.0, 1.0):
@@ -161,7 +161,7 @@ def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
 
 
 def test_the_derivative_of_a_planted_capture_is_that_of_the_pose(figure) -> None:
-    led, gait = led_map(skating("walk"), figure_legs(figure), 0)
+    led, gait = led_map(skating("walk"), figure_legs(figure))
     path, h = bent_path(gait, 0.5, 7.0), 1e-6
     for s in np.random.default_rng(4).uniform(1.0, 5.0, 60):
         jacobian = led.jacobian(walker(s), path)

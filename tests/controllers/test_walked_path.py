@@ -22,19 +22,19 @@ from controllers.walking.walked_path import (
 
 
 def _values(path, places, channel):
-    return np.array([path_value(path, 0, float(s), channel) for s in places]).T
+    return np.array([path_value(path, float(s), channel) for s in places]).T
 
 
 def _winding(rows=400):
     path = straight_path(1.0, -2.0, 0.4, 0.5)
     for k in range(rows):
-        lay_row(path, 0, 0.8 * STEP * np.sin(0.05 * k), 0.8, 0.0)
+        lay_row(path, 0.8 * STEP * np.sin(0.05 * k), 0.8, 0.0)
     return path
 
 
 def test_the_path_is_run_at_its_arc_length_along_its_heading():
     path = _winding()
-    places = np.linspace(0.0, path_front(path, 0), 3000)
+    places = np.linspace(0.0, path_front(path), 3000)
     (_, d_x), (_, d_y), (heading, _) = (_values(path, places, k) for k in (PATH_X, PATH_Y, PATH_HEADING))
     # Of second order in κΔ = 0.024.
     np.testing.assert_allclose(np.hypot(d_x, d_y), 1.0, atol=2e-4)
@@ -54,27 +54,27 @@ def test_the_derivative_is_that_of_the_value_and_continuous(channel):
 def test_a_row_turns_the_path_over_three_steps_and_nowhere_else():
     path = straight_path(0.0, 0.0, 0.7, 0.1)
     row = int(path[0])
-    lay_row(path, 0, 0.1, 0.0, 0.0)
+    lay_row(path, 0.1, 0.0, 0.0)
     for _ in range(10):
-        lay_row(path, 0, 0.0, 0.0, 0.0)
+        lay_row(path, 0.0, 0.0, 0.0)
     heading = _values(path, np.array([0.0, (row - 1) * STEP, (row + 2) * STEP, (row + 6) * STEP]), PATH_HEADING)
     np.testing.assert_array_equal(heading[1], 0.0)
     np.testing.assert_allclose(heading[0], [0.7, 0.7, 0.8, 0.8], atol=1e-15)
-    assert path_value(path, 0, (row + 0.5) * STEP, PATH_HEADING)[1] > 1.0
+    assert path_value(path, (row + 0.5) * STEP, PATH_HEADING)[1] > 1.0
 
 
 def test_the_oldest_is_forgotten_and_the_rest_is_as_it_was():
     path = _winding(500)
     place = 14.0
-    before = [path_value(path, 0, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)]
-    while path_back(path, 0) < place - STEP:
-        lay_row(path, 0, 0.0, 0.0, 0.0)
-    assert [path_value(path, 0, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)] == before
+    before = [path_value(path, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)]
+    while path_back(path) < place - STEP:
+        lay_row(path, 0.0, 0.0, 0.0)
+    assert [path_value(path, place, k) for k in (PATH_X, PATH_Y, PATH_HEADING)] == before
     assert len(path) == PACKED_PATH
-    assert path_front(path, 0) - path_back(path, 0) == pytest.approx((ROWS - 4) * STEP)
+    assert path_front(path) - path_back(path) == pytest.approx((ROWS - 4) * STEP)
     # Beyond both ends the path stays where it ends.
-    for end, beyond in ((path_front(path, 0), 1.0), (path_back(path, 0), -1.0)):
-        assert path_value(path, 0, end + beyond, PATH_X)[0] == path_value(path, 0, end, PATH_X)[0]
+    for end, beyond in ((path_front(path), 1.0), (path_back(path), -1.0)):
+        assert path_value(path, end + beyond, PATH_X)[0] == path_value(path, end, PATH_X)[0]
 
 
 def test_one_leans_as_the_pendulum_that_moves_its_weight_before_a_bend():
@@ -84,8 +84,8 @@ def test_one_leans_as_the_pendulum_that_moves_its_weight_before_a_bend():
     pulls = np.where((np.arange(400) > 150) & (np.arange(400) < 250), 0.4, 0.0)
     first = int(path[0]) + 1
     for pull in pulls:
-        lay_row(path, 0, 0.0, 0.0, pull)
-        past = lean_row(path, 0, back, decay, past)
+        lay_row(path, 0.0, 0.0, pull)
+        past = lean_row(path, back, decay, past)
     lean = _values(path, (first + np.arange(20, 300)) * STEP, PATH_LEAN)[0]
     # y'' = ω² (y − h a/g) with y = h tan φ and h = 1 m: the weight on a pendulum whose foot is accelerated by a.
     y, dt = np.tan(lean), STEP / speed

@@ -12,7 +12,7 @@ from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
 from experiments.certify import certified_field, certified_rivers
-from experiments.certify.certified_field import certificate_inputs, read_certificate, verify_certificate
+from experiments.certify.certified_field import certificate_inputs
 from experiments.certify.certify import (
     CERTIFICATE,
     FLIGHTS_PLOT,
@@ -21,7 +21,8 @@ from experiments.certify.certify import (
     certify_into,
 )
 from experiments.cli import main
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.files.certificate_files import read_certificate, verify_certificate
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 
@@ -29,7 +30,7 @@ HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("certificate")
-    certify_into(RunConfig(), out, hands=HANDS)
+    certify_into(run_config(), out, hands=HANDS)
     return out
 
 
@@ -46,13 +47,13 @@ def test_the_demos_river_is_certified_and_told(folder):
 
 def test_a_certificate_of_the_same_inputs_is_not_made_again(folder):
     before, begin = (folder / CERTIFICATE).stat().st_mtime_ns, time.perf_counter()
-    again = certify_into(RunConfig(seconds=3.0, seed=9), folder, hands=HANDS)
+    again = certify_into(run_config(seconds=3.0, seed=9), folder, hands=HANDS)
     assert time.perf_counter() - begin < 1.0
     assert (folder / CERTIFICATE).stat().st_mtime_ns == before
     assert again.verdicts["stability"].verdict == "certified"
 
 
-FINE_FILTER = replace(RunConfig().scene, servo_period=5e-4)
+FINE_FILTER = replace(run_config().scene, servo_period=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -70,17 +71,17 @@ FINE_FILTER = replace(RunConfig().scene, servo_period=5e-4)
 )
 def test_a_certificate_is_of_one_field_only(folder, change, said):
     file = folder / CERTIFICATE
-    verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
+    verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
     with pytest.raises(CertificateError, match=f"changed: {said}; certify again"):
-        verify_certificate(file, certificate_inputs(replace(RunConfig(), **change), 0.0, HANDS, 1.0))
+        verify_certificate(file, certificate_inputs(replace(run_config(), **change), 0.0, HANDS, 1.0))
 
 
 def test_a_certificate_is_of_its_delay_its_hands_and_their_push(folder):
     file = folder / CERTIFICATE
     with pytest.raises(CertificateError, match="changed: delay;"):
-        verify_certificate(file, certificate_inputs(RunConfig(), 1e-4, HANDS, 1.0))
+        verify_certificate(file, certificate_inputs(run_config(), 1e-4, HANDS, 1.0))
     with pytest.raises(CertificateError, match="changed: hand, push;"):
-        verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HandRange(), 2.0))
+        verify_certificate(file, certificate_inputs(run_config(), 0.0, HandRange(), 2.0))
 
 
 def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
@@ -89,10 +90,10 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(certified_field, "PREMIUM_1_5", heavier)
         with pytest.raises(CertificateError, match="changed: device;"):
-            verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
+            verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
     monkeypatch.setattr(certified_field, "source_hash", lambda: "0")
     with pytest.raises(CertificateError, match="changed: code;"):
-        verify_certificate(file, certificate_inputs(RunConfig(), 0.0, HANDS, 1.0))
+        verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
 
 
 def test_the_command_verifies_without_casadi_or_splines_and_says_what_changed(folder, capsys):
@@ -118,16 +119,16 @@ def test_hands_whose_intervals_are_wrong_are_one_line(tmp_path, capsys):
 
 
 def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_is_said():
-    point = certified_rivers(RunConfig(mode="bunny"))[""]
-    along = certified_rivers(RunConfig(mode="bunny", bunny_attraction="along"))[""]
+    point = certified_rivers(run_config(mode="bunny"))[""]
+    along = certified_rivers(run_config(mode="bunny", bunny_attraction="along"))[""]
     assert (point.law.slides, along.law.slides) == (False, True)
-    tubes = certified_rivers(RunConfig(mode="stretch-then-follow", seek=140.0, rubber=160.0))
+    tubes = certified_rivers(run_config(mode="stretch-then-follow", seek=140.0, rubber=160.0))
     assert [(name, river.k_r, river.law.slides) for name, river in tubes.items()] == [
         ("", 140.0, True), ("_held", 160.0, False), ("_then", 300.0, True),
     ]  # fmt: skip
-    assert certified_rivers(RunConfig(mode="rivers"))[""].width == RunConfig().river_tube
+    assert certified_rivers(run_config(mode="rivers"))[""].width == run_config().river_tube
     with pytest.raises(ParameterError, match="governor"):
-        certified_rivers(RunConfig(mode="rivers", governor=True))
+        certified_rivers(run_config(mode="rivers", governor=True))
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])
@@ -143,7 +144,7 @@ def test_what_is_no_certificate_is_refused(tmp_path, text):
 def test_a_held_file_that_is_no_certificate_is_replaced(folder, tmp_path):
     (tmp_path / CERTIFICATE).write_text("not json")
     (tmp_path / PAGE).write_text("")
-    assert certify_into(RunConfig(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
+    assert certify_into(run_config(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
 
 
 def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged_by(tmp_path, capsys):

@@ -1,49 +1,127 @@
-"""Compilation before a run: in a process of its own, once, and only when a part is missing."""
+"""Compilation before a run: what it needs is known before it is wired, and only what is missing is compiled."""
 
-import pickle
+import os
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
+from numba import typeof, types
 from rich.console import Console
 
-from controllers.haptic_map.base import CompiledMap
-from controllers.haptic_map.expressive import EXPRESSIVE
-from experiments import compiling
-from experiments.compiling import compile_once, compiled_parts
+from experiments.compiling import compile_once
 from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.words import run_config
 from experiments.setups.robot_arm import wire_arm
+from experiments.setups.wiring import wire
+from sim.compilation import unit_workers
+from sim.compilation.unit_workers import compile_units, missing_units
+from sim.compilation.units import Unit, unit_function
+from sim.errors import SimError
+
+TOYS = Path(__file__).parent.parent / "sim"
+
+
+class _Told(Exception):
+    """Stops a wiring when it has said what it needs."""
+
+
+def _names(units: tuple[Unit, ...]) -> list[str]:
+    return [unit.name for unit in units]
+
+
+def _stop(units: tuple[Unit, ...]) -> None:
+    raise _Told(units)
 
 
 @pytest.fixture
-def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Configurations that a process was started with."""
-    configs: list[object] = []
-    monkeypatch.setattr(compiling, "CACHE_FOLDER", tmp_path)
-    monkeypatch.setattr(compiling.subprocess, "run", lambda command, input, **_: configs.append(pickle.loads(input)))
-    return configs
+def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TOYS), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.syspath_prepend(str(TOYS))
+    unit_function.cache_clear()
+    import toy_kernels  # pyright: ignore[reportMissingImports]
+
+    vector = types.Array(types.float64, 1, "C")
+    spring = typeof(toy_kernels.Spring(1.0, 0.0))
+    return (
+        Unit.of(toy_kernels.other, types.float64, vector),
+        Unit.of(toy_kernels.force, spring, types.float64, vector),
+    )
 
 
-def test_parts_are_the_loop_the_maps_and_the_laws():
-    expressive = CompiledMap(EXPRESSIVE, np.array([1.0, 0.0]), np.zeros(1))
-    assert compiled_parts("figure", expressive) == ("figure", "map-6", "map-1")
-    ops = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [3, 0, 0, 0], [12, 0, 0, 0], [0, 0, 0, 0]])
-    assert compiled_parts("figure", expressive, ops) == ("figure", "map-6", "map-1", "law-0", "law-1")
-
-
-def test_a_process_is_started_when_a_part_is_missing_and_with_the_run_s_configuration(started, tmp_path, capsys):
-    config = RunConfig(seconds=3.0, mode="bunny")
-    (tmp_path / "figure.compiled").touch()
-    compile_once(Console(), config, ("figure", "law-1"))
-    assert started == [config]
-    assert "Compiling" in capsys.readouterr().out
-    (tmp_path / "law-1.compiled").touch()
-    compile_once(Console(), config, ("figure", "law-1"))
-    assert started == [config]
+def test_what_is_missing_is_compiled_side_by_side_and_told_once(toys, capsys):
+    assert missing_units((*toys, *toys)) == (toys[1], toys[0])
+    compile_once(Console(), toys)
+    told = capsys.readouterr().out
+    assert "Compiling" in told
+    assert "2 of 2" in told
+    assert missing_units(toys) == ()
+    compile_once(Console(), toys)
     assert not capsys.readouterr().out
 
 
+def test_only_what_is_missing_is_compiled(toys):
+    done: list[Unit] = []
+    toys[0].load()
+    compile_units(toys, done.append)
+    assert done == [toys[1]]
+
+
+def test_what_cannot_be_compiled_is_left_to_the_run(toys):
+    done: list[Unit] = []
+    wrong = Unit(toys[0].module, "other", (types.float64, types.float64))
+    compile_units((wrong, toys[1]), done.append)
+    assert done == [toys[1]]
+    assert missing_units((wrong, toys[1])) == (wrong,)
+
+
+def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
+    for unit in toys:
+        unit.load()
+    monkeypatch.setattr(unit_workers.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
+    compile_units(toys)
+
+
+def test_a_unit_is_a_function_of_a_module():
+    with pytest.raises(SimError, match="no_such"):
+        unit_function("sim.world.plant", "no_such")
+    assert "toy_kernels" not in sys.modules or hasattr(sys.modules["toy_kernels"], "force")
+
+
 def test_a_robot_arm_says_what_it_needs_before_it_is_made():
-    told: list[tuple[str, ...]] = []
-    wire_arm(ArmConfig(), told.append)
-    assert told == [("arm", "map-4", "law-0")]
+    with pytest.raises(_Told) as told:
+        wire_arm(ArmConfig(), _stop)
+    assert _names(told.value.args[0]) == [
+        "run_block", "update_reference", "robot_torque", "robot_arm_map", "follow_wrench", "_poses_along",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("config", "more"),
+    [
+        (run_config(), ["cylindrical_map", "follow_wrench", "_poses_along"]),
+        (
+            run_config(mode="bunny", expressive=True),
+            ["express", "cylindrical_map", "bunny_wrench"],
+        ),
+        (run_config(mode="rivers", map="rivers"), ["river_clips_map", "_derivative", "_reference_along"]),
+        (run_config(mode="lead"), ["led_map", "leading_wrench", "_poses_along"]),
+        (run_config(mode="stretch"), ["stretchy_wrench", "stood"]),
+    ],
+    ids=lambda value: value.mode.kind if isinstance(value, RunConfig) else "",
+)
+def test_a_run_says_what_it_needs_before_it_is_made(config: RunConfig, more: list[str]):
+    with pytest.raises(_Told) as told:
+        wire(config, ready=_stop)
+    names = _names(told.value.args[0])
+    assert names[:3] == ["run_block", "update_reference", "figure_torque"]
+    assert set(more) <= set(names)
+
+
+def test_runs_of_the_figure_share_the_loop_and_all_that_drives_it():
+    parts: list[tuple[Unit, ...]] = []
+    for config in (run_config(), run_config(mode="bunny"), run_config(mode="lead")):
+        with pytest.raises(_Told) as told:
+            wire(config, ready=_stop)
+        parts.append(told.value.args[0][:3])
+    assert parts[0] == parts[1] == parts[2]

@@ -9,9 +9,11 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
-from experiments.config.run_config import RunConfig
+from experiments.config.modes import OrientationMoment
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
-from experiments.setups.expression import expressive_figure, oriented
+from experiments.setups.expression import expressive_figure
+from experiments.setups.fixed_curve import with_moment
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded, embedded_names
@@ -30,7 +32,7 @@ def rotations(poses, joint):
 
 @pytest.fixture(scope="module")
 def figure_map():
-    return expressive_figure(wire(RunConfig(clips=("walk",), seconds=0.1), load_clips(("walk",))[0]).haptic_map)
+    return expressive_figure(wire(run_config(clips=("walk",), seconds=0.1), load_clips(("walk",))[0]).haptic_map)
 
 
 def placed(pose):
@@ -84,12 +86,18 @@ def test_no_joint_leaves_its_range_however_the_stylus_is_turned(figure_map, name
 def test_a_moment_is_added_only_when_it_is_asked_for_and_not_to_a_curve_that_is_bent():
     curve = Trajectory.circle(0.05, 4.0)
     program = Follow(curve, 300.0, 8.0).program()
-    assert oriented(program, RunConfig(), curve) is program
-    assert len(oriented(program, RunConfig(orientation_damping=1e-3), curve).ops) == len(program.ops) + 2
-    for config, says in (
-        (RunConfig(mode="stretch", orientation_stiffness=0.1), "needs a curve that stays; stretch bends it"),
-        (RunConfig(orientation_stiffness=-0.1), "k_o must be finite and at least 0"),
-        (RunConfig(orientation_damping=np.nan), "b_o must be finite"),
+    for none in (None, OrientationMoment(), run_config().mode.orientation):
+        assert with_moment(program, none, curve, 0.25) is program
+    damped = run_config(orientation_damping=1e-3).mode.orientation
+    assert len(with_moment(program, damped, curve, 0.25).ops) == len(program.ops) + 2
+    belongs = "it belongs to --mode follow, --mode bunny, --mode rivers"
+    for options, says in (
+        (
+            {"mode": "stretch", "orientation_stiffness": 0.1},
+            f"--orientation-stiffness has no meaning with --mode stretch; {belongs}",
+        ),
+        ({"orientation_stiffness": -0.1}, "--orientation-stiffness is -0.1; expected 0 N m/rad or more, and finite"),
+        ({"orientation_damping": np.nan}, "--orientation-damping is nan; expected 0 N m s/rad or more, and finite"),
     ):
         with pytest.raises(ParameterError, match=says):
-            oriented(program, config, curve)
+            run_config(**options)

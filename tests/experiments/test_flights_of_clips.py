@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from controllers.certificates.flight.tolerance import Judging
-from experiments.certify.ballistics import clip_ballistics, fly
-from experiments.certify.repair import repair_clip, repair_file
+from experiments.flights.ballistics import clip_ballistics, fly
+from experiments.flights.repair import repair_clip, repair_file
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_spec
 from models.mocap.clip import Clip

@@ -5,8 +5,8 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.certify.ballistics import clip_ballistics
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips
 from experiments.setups.governor import Governed, animation_along
 from experiments.setups.wiring import wire
@@ -55,25 +55,27 @@ def test_a_hand_that_slows_down_in_mid_flight_meets_a_force(bench):
 
 
 def test_a_run_governs_its_field_by_its_own_animation():
-    config = RunConfig(clips=("backflip",), governor=True, seconds=1.0)
-    session = wire(config, load_clips(config.clips)[0])
+    config = run_config(clips=("backflip",), governor=True, seconds=1.0)
+    session = wire(config)
     assert isinstance(session.field, Governed)
-    assert session.field.governor.speeds[:, 0].max() > session.curve.length / config.lap
-    plain = wire(RunConfig(clips=("backflip",), seconds=1.0), session.clips)
+    assert session.field.governor.speeds[:, 0].max() > session.curve.length / config.map.around.lap
+    plain = wire(run_config(clips=("backflip",), seconds=1.0), session.clips)
     assert session.servo.field.budget[0] > plain.servo.field.budget[0]
-    gated = wire(RunConfig(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True), load_clips(
+    gated = wire(run_config(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True), load_clips(
         ("cheer", "backflip"))[0])  # fmt: skip
     flies = [river.speeds[:, 0].max() > 0.0 for river in gated.field.bundle.rivers]
     assert flies == [False, True, False]
 
 
 def test_a_curve_under_which_nobody_flies_asks_for_no_speed():
-    config = RunConfig(clips=("cheer", "angry"))
-    session = wire(config, load_clips(config.clips)[0])
-    clip = animation_along(session.haptic_map, Trajectory.circle(config.radius, config.lap))
+    config = run_config(clips=("cheer", "angry"))
+    session = wire(config)
+    clip = animation_along(
+        session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, config.map.around.lap)
+    )
     assert not clip_ballistics(clip).flights
 
 
 def test_a_curve_that_is_bent_has_no_governor():
-    with pytest.raises(ParameterError, match="no governor"):
-        wire(RunConfig(mode="stretch", governor=True, clips=("cheer",)), load_clips(("cheer",))[0])
+    with pytest.raises(ParameterError, match="--governor has no meaning with --mode stretch"):
+        wire(run_config(mode="stretch", governor=True, clips=("cheer",)), load_clips(("cheer",))[0])

@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.curves.trajectory import Trajectory
-from experiments.config.run_config import FIGURE_CLIPS, RunConfig
+from experiments.config.maps import Cylindrical
+from experiments.config.words import run_config
 from experiments.setups.balance import nearest_supported
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import clip_map
+from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.balance import supported
@@ -17,7 +17,8 @@ from models.mocap.dynamics.floor_forces import Floor, residual
 from sim.reference.reference import poses_along
 
 TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
-CONFIG = RunConfig(seconds=1.0)
+CONFIG = run_config(seconds=1.0)
+FIGURE_CLIPS = Cylindrical().clips
 STANDING = ("walk", "cheer", "angry", "squat_dance")
 STEPPING = (
     ("walk", "run"),
@@ -33,7 +34,7 @@ MANY = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0
 @pytest.fixture(scope="module")
 def maps():
     return {
-        clips: wire(RunConfig(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
+        clips: wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
         for clips in (FIGURE_CLIPS, STANDING, *STEPPING)
     }
 
@@ -41,9 +42,10 @@ def maps():
 def laps(h_map, r, z, rows=ROWS, count=1.0):
     """Poses of a hand that goes round evenly, at a place of the half plane in units of the reach."""
     angles = 2 * np.pi * (np.arange(int(rows * count)) + 0.5) / rows
-    radius = CONFIG.radius + r * CONFIG.reach
+    reach = CONFIG.map.reach
+    radius = CONFIG.map.around.radius + r * reach
     x = np.zeros((len(angles), 7))
-    x[:, 0], x[:, 1], x[:, 2], x[:, 3] = radius * np.cos(angles), radius * np.sin(angles), z * CONFIG.reach, 1.0
+    x[:, 0], x[:, 1], x[:, 2], x[:, 3] = radius * np.cos(angles), radius * np.sin(angles), z * reach, 1.0
     poses, (kind, params, memory) = np.empty((len(x), h_map.nq)), h_map.compiled()
     poses_along(kind, params, memory.copy(), x, poses)
     return poses
@@ -84,7 +86,7 @@ def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
 
 @pytest.mark.parametrize("clips", [("walk", "angry", "cheer"), ("ginga", "angry", "walk"), ("run", "walk", "cheer")])
 def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
-    h_map = wire(RunConfig(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
+    h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
     places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
     for feet in places:
         assert slide(feet) < 0.01
@@ -103,8 +105,7 @@ DRAGGED = {
 
 @pytest.mark.parametrize("clips", DRAGGED)
 def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip_alone(clips):
-    config = RunConfig(clips=clips, seconds=1.0)
-    h_map = clip_map(config, load_clips(clips)[0], Trajectory.circle(config.radius, config.lap), figure_model())
+    h_map = map_parts(run_config(clips=clips, seconds=1.0), figure_model()).haptic_map
     for rows in (ROWS, 217):
         for r, z in DRAGGED[clips]:
             places = soles(laps(h_map, r, z, rows, count=1.5))
@@ -114,7 +115,7 @@ def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip
 
 @pytest.mark.parametrize(("clips", "most"), [(FIGURE_CLIPS, 0.04), (STANDING, 0.06)])
 def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most):
-    floor, step, shares = Floor(), CONFIG.lap / ROWS, []
+    floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
         poses = laps(maps[clips], r, z, count=1.0 + 4 / ROWS)
         change = pose_difference(poses[:-1], poses[1:]) / step

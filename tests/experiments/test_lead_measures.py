@@ -7,11 +7,11 @@ from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
 from controllers.haptic_map.led import Led
 from experiments.cli import main
-from experiments.config.run_config import RunConfig
+from experiments.config.modes import Lead
+from experiments.config.words import run_config
 from experiments.results.lead_measures import LeadSummary, _Retrace, _Soles, support_at
-from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs
-from experiments.setups.lead import gait_remark, law, leading_hand, led_map, s_curve, walker_argument
+from experiments.setups.figure_legs import figure_legs
+from experiments.setups.lead import gait_remark, leading, leading_hand, led_map, s_curve, walker_argument
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import Clip, PlanarDisplacement
@@ -104,7 +104,7 @@ def test_how_far_soles_slide_while_they_touch() -> None:
 
 
 def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
-    field = law(RunConfig(mode="lead"), GAIT)
+    field = leading(Lead(), GAIT)
     path = leading_hand(field).path
     for place in path[::50]:
         phantom_angles(place)
@@ -117,25 +117,25 @@ def test_the_hand_leads_within_the_workspace_and_comes_back() -> None:
 
 @pytest.mark.parametrize(("name", "most"), [("walk", 2), ("run", 1)])
 def test_a_figure_begins_in_the_middle_of_its_surest_stance(name: str, most: int) -> None:
-    led, gait = led_map(embedded(name), figure_legs(figure_model()), 0)
+    led, gait = led_map(embedded(name), figure_legs(figure_model()))
     assert gait.support[0] == most
-    field = law(RunConfig(mode="lead"), gait)
+    field = leading(Lead(), gait)
     assert support_at(field, np.array([0.0]))[0] == most
     assert led.pose(walker_argument(np.zeros(1))[0])[2] == pytest.approx(0.9, abs=0.1)
 
 
 def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     legs = figure_legs(figure_model())
-    walk, run = (led_map(embedded(name), legs, 0)[0] for name in ("walk", "run"))
+    walk, run = (led_map(embedded(name), legs)[0] for name in ("walk", "run"))
     jerked = embedded("run").poses.copy()
     jerked[-20:, 7:11] = jerked[-21, 7:11]
-    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), legs, 0)
+    capture, _ = led_map(Clip(jerked, embedded("run").fps, "capture"), legs)
     assert gait_remark("walk", walk) == ()
     assert "led slowly it goes without flights" in gait_remark("run", run)[0]
     assert "by steps of 0.75 m at most, at " in gait_remark("capture", capture)[0]
     standing = np.zeros((8, 2), dtype=bool)
     standing[:4, 0] = True
-    hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, 0, standing)
+    hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, standing)
     assert "may fall where it is slow" in gait_remark("hop", hop)[0]
 
 
@@ -156,17 +156,16 @@ def test_the_lines_tell_it() -> None:
     [
         ({"map": "composite"}, "leave out --map"),
         ({"user": "push"}, "--user push"),
-        ({"walls": True}, "--walls"),
+        ({"walls": True}, "--walls has no meaning with --mode lead"),
         ({"clips": ("walk", "run")}, "one clip is led, got 2"),
         ({"clips": ("cheer",)}, "must go somewhere"),
-        ({"floor_scale": -1.0}, "scale must be finite"),
-        ({"leash": -1.0}, "k_l must be finite"),
+        ({"floor_scale": -1.0}, "--floor-scale is -1; expected 0.001 or more, and finite"),
+        ({"leash": -1.0}, "--leash is -1; expected 0 N/m or more, and finite"),
     ],
 )
 def test_what_cannot_be_led_is_refused(options: dict, says: str) -> None:
-    config = RunConfig(mode="lead", **options)
     with pytest.raises(ParameterError, match=says):
-        wire(config, load_clips(config.clips)[0])
+        wire(run_config(mode="lead", **options))
 
 
 def test_the_command_refuses_in_a_line(tmp_path, capsys) -> None:

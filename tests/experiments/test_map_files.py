@@ -12,12 +12,13 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.cli import main
-from experiments.config.run_config import RunConfig
+from experiments.config.part import to_dict
+from experiments.config.words import run_config
 from experiments.files.archives import read_archive, write_archive
 from experiments.files.field_files import save_field
 from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map
-from experiments.run import RECORDING, config_dict
-from experiments.setups.figure_maps import figure_legs
+from experiments.results.folder import RECORDING
+from experiments.setups.figure_legs import figure_legs
 from experiments.setups.wiring import wire
 from models.mocap.library import embedded
 from models.scene import SceneConfig
@@ -133,7 +134,7 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
 def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
     path = tmp_path / "map.npz"
     save_map(MAPS[2], path)
-    session = wire(RunConfig(map=str(path), seconds=1.0), ())
+    session = wire(run_config(map=str(path), seconds=1.0))
     assert [clip.name for clip in session.clips] == ["walk", "a/b", "../jump"]
     np.testing.assert_array_equal(session.haptic_map.compiled().params, MAPS[2].compiled().params)
     assert any("clips are those of the map: walk, a/b" in remark for remark in session.remarks)
@@ -168,10 +169,10 @@ def test_a_run_keeps_the_digest_of_its_map_and_is_not_repeated_with_another(tmp_
     path, folder = tmp_path / "map.npz", tmp_path / "run"
     folder.mkdir()
     save_map(lifted(), path)
-    config = RunConfig(map=str(path), seconds=1.0)
-    static = wire(config, ()).static()
+    config = run_config(map=str(path), seconds=1.0)
+    static = wire(config).static()
     groups = {"ticks": Group(1000.0, {"t": ()}), "frames": Group(100.0, {"t": ()})}
-    with Recorder(folder / RECORDING, config_dict(config), 1, groups, static) as recorder:
+    with Recorder(folder / RECORDING, to_dict(config), 1, groups, static) as recorder:
         recorder.append("ticks", {"t": np.zeros(1)})
     save_map(swaying(), path)
     assert main(["reproduce", str(folder)]) == 2

@@ -4,12 +4,13 @@ from dataclasses import dataclass, field, fields, replace
 from math import inf, nan
 
 import pytest
+from experiments.config.options import Interval, above, at_least, check_numbers
 
 from controllers.errors import ParameterError
-from experiments.config.options import Interval, above, at_least, check_numbers
-from experiments.config.run_config import ArmConfig, RunConfig
+from experiments.config.run_config import ArmConfig
+from experiments.config.words import run_config
 
-CONFIGS = (RunConfig(), ArmConfig())
+CONFIGS = (run_config(), ArmConfig())
 NUMBERS = [(config, option) for config in CONFIGS for option in fields(config) if "interval" in option.metadata]
 
 

@@ -10,7 +10,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.results import stretch_measures
 from experiments.results.phases import EditingSummary, PerformanceSummary, PressSummary
 from experiments.results.stretch_measures import press_summaries
@@ -30,7 +30,7 @@ CHANNELS = {"t": (), "p": (3,), "user": (3,), "switch": (), "phase": (), "neares
 
 def recorded(path: Path, grabs: Sequence[Grab], seconds: float) -> tuple[StretchyTubes, np.ndarray, Recording]:
     """A hand on a mass in the field, recorded; returned with the field and its memory at the end."""
-    field, arm = law(RunConfig(mode="stretch"), CURVE, tuple(grabs)), Arm(grabs=grabs).compiled()
+    field, arm = law(run_config(mode="stretch"), CURVE, tuple(grabs)), Arm(grabs=grabs).compiled()
     program = field.program()
     params, memory, hand = program.params, program.fresh_memory(), np.zeros(HAND_SIZE)
     wrench, user, p, v = np.zeros(6), np.zeros(3), CURVE.point(0.0), np.zeros(3)
@@ -111,7 +111,7 @@ def test_a_press_that_the_run_ends_in_is_told(tmp_path: Path) -> None:
 def test_a_hand_bends_the_curve_before_it_pushes(mode: str, seconds: float) -> None:
     """A push during the tour would carry the click that undoes, and a held point faster than a body goes."""
     grabs = stretch_grabs(CURVE, EPSILON)
-    config = RunConfig(mode=mode, user="push", seconds=seconds, grabs=grabs)  # pyright: ignore[reportArgumentType]
+    config = run_config(mode=mode, user="push", seconds=seconds, grabs=grabs)  # pyright: ignore[reportArgumentType]
     starts = [push.start for push in user_arm(config, CURVE, grabs).pushes]
     assert min(starts) > edited_until(grabs) + CURVE.duration
     assert len(starts) == (4 if seconds == 30.0 else 2)
@@ -121,7 +121,7 @@ def test_a_hand_bends_the_curve_before_it_pushes(mode: str, seconds: float) -> N
 
 def test_hands_that_push_in_other_modes_do_so_from_the_second_lap_on() -> None:
     for seconds in (3.0, 9.0, 20.0, 22.0):
-        config = RunConfig(user="push", seconds=seconds)
+        config = run_config(user="push", seconds=seconds)
         starts = [push.start for push in user_arm(config, CURVE, ()).pushes[::2]]
         laps = range(1, max(2, int(seconds / 4.0)))
         assert starts == [4.0 * lap + 0.4 for lap in laps]
@@ -129,11 +129,11 @@ def test_hands_that_push_in_other_modes_do_so_from_the_second_lap_on() -> None:
 
 
 def test_a_hand_that_traces_or_leads_never_pushes() -> None:
-    for config in (RunConfig(user="trace"), RunConfig(mode="lead")):
+    for config in (run_config(user="trace"), run_config(mode="lead")):
         assert handled(config) == ((0.0, np.inf),)
-    assert handled(RunConfig()) == ()
-    assert "--expressive" in hand_remarks(RunConfig(user="turn"), CURVE)[0]
-    assert hand_remarks(RunConfig(user="turn", expressive=True), CURVE) == ()
+    assert handled(run_config()) == ()
+    assert "--expressive" in hand_remarks(run_config(user="turn"), CURVE)[0]
+    assert hand_remarks(run_config(user="turn", expressive=True), CURVE) == ()
 
 
 def test_editing_and_performing_are_told_apart() -> None:

@@ -5,12 +5,12 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.lifted_runs import default_pushes, lifted_river, lifted_rivers, pushed_over
 from models.mocap.library import embedded
 
 TURN = 2.0 * np.pi
-CONFIG = RunConfig(map="map.npz", mode="rivers", user="push")
+CONFIG = run_config(map="map.npz", mode="rivers", user="push")
 
 
 def two_clips(transitions=((0.0, 1.0, 4.0, 0.1, 0.1),)):
@@ -24,9 +24,9 @@ def two_clips(transitions=((0.0, 1.0, 4.0, 0.1, 0.1),)):
 
 def test_gains_that_are_not_given_are_soft_where_rivers_are_side_by_side_and_as_usual_elsewhere():
     assert CONFIG.gains == (50.0, 20.0)
-    for usual in (RunConfig(), RunConfig(mode="rivers"), RunConfig(map="map.npz")):
+    for usual in (run_config(), run_config(mode="rivers"), run_config(map="map.npz")):
         assert (usual.stiffness, usual.damping) == (300.0, 8.0)
-    given = RunConfig(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)
+    given = run_config(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)
     assert (given.stiffness, given.damping) == (300.0, 8.0)
 
 
@@ -57,7 +57,7 @@ def test_a_push_begins_before_the_transition_on_the_curve_and_goes_towards_the_o
 def test_a_hand_that_pushes_goes_over_at_the_first_curve_s_best_transition_and_comes_back():
     h_map = two_clips(((0.0, 1.0, 4.0, 0.1, 0.1), (0.0, 1.0, 1.0, 0.2, 0.2)))
     for curve in ("first", "second"):
-        there, back = default_pushes(h_map, RunConfig(map="map.npz", mode="rivers", user="push", curve=curve))
+        there, back = default_pushes(h_map, run_config(map="map.npz", mode="rivers", user="push", curve=curve))
         assert np.array(there.direction) == pytest.approx(-np.array(back.direction))
         assert (there.start, back.start) == pytest.approx((2.2, 8.8))
 

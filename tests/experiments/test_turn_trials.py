@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.certificates.flight.tolerance import JUDGING
-from experiments.certify.ballistics import clip_ballistics
+from experiments.flights.ballistics import clip_ballistics
 from experiments.studies.turn_trials import follow, parabola, trial
 from models.mocap.clip import Clip
 from models.mocap.library import embedded

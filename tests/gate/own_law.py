@@ -4,8 +4,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from experiments.setups.own_law import loop_with
-from sim.recording.recorder import Recorder
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra import Weight
@@ -13,7 +11,9 @@ from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
 from experiments.config.run_config import RunConfig
+from experiments.setups.own_law import loop_with
 from sim.loop.loop import groups, record_into
+from sim.recording.recorder import Recorder
 
 
 def wall(hand: HandState) -> np.ndarray:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiments.setups.modes import law
 from numba import njit
 
 from controllers.curves.trajectory import Trajectory
@@ -15,7 +16,6 @@ from controllers.fields.edited import Edited, performance
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
 from experiments.config.run_config import RunConfig
-from experiments.setups.modes import law
 
 GOLDEN = Path(__file__).with_name("fields.csv")
 CURVE = Trajectory.circle(0.0477, 4.0)
@@ -30,14 +30,14 @@ FLAGS = partial(
 
 
 @njit
-def _glide(ops, params, memory, push, path):
+def _glide(units, ops, params, memory, push, path):
     hand, wrench, p, v = np.zeros(15), np.zeros(6), path[0].copy(), np.zeros(3)
     hand[4] = 1.0
     for k in range(10 * len(path)):
         if k % 10 == 0:
             path[k // 10] = p
         hand[0], hand[1:4], hand[8:11] = k * 1e-3, p, v
-        evaluate(ops, params, memory, hand, wrench)
+        evaluate(units, ops, params, memory, hand, wrench)
         v += 1e-2 * (wrench[:3] + push[k])
         p += 1e-3 * v
 
@@ -58,7 +58,7 @@ def _trajectory(mode):
     push[1300:1500] = [0.0, 0.05, 0.1]
     # Away from where rivers meet: there the smooth field decides by a hair.
     path[0] = CURVE.point(0.25) + np.array([0.002, 0.0, 0.001])
-    _glide(program.ops, program.params, program.fresh_memory(), push, path)
+    _glide(*program.compiled(), program.fresh_memory(), push, path)
     return path
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, Gait
+from controllers.fields.leading import Gait
 from controllers.fields.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
-from experiments.config.run_config import RunConfig
-from experiments.setups.lead import law, leading_hand
+from experiments.config.modes import Lead
+from experiments.setups.lead import leading, leading_hand
 from sim.users.arm import hand_force
 
 GOLDEN = Path(__file__).with_name("lead.json")
@@ -22,17 +21,17 @@ MASS, PERIOD, SECONDS, EVERY = 0.15, 1e-3, 19.0, 250
 
 
 def _run() -> dict[str, list]:
-    field = law(RunConfig(mode="lead"), GAIT)
+    field = leading(Lead(), GAIT)
     program, arm = field.program(), leading_hand(field).compiled()
     memory, hand, wrench, user = program.fresh_memory(), np.zeros(HAND_SIZE), np.zeros(6), np.zeros(3)
     p, v, ways = np.array([*field.start, 0.001]), np.zeros(3), []
     for k in range(round(SECONDS / PERIOD)):
         hand[0] = k * PERIOD
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
-        evaluate(program.ops, program.params, memory, hand, wrench)
+        evaluate(*program.compiled(), memory, hand, wrench)
         hand_force(arm, k * PERIOD, p, v, user)
         if k % EVERY == 0:
-            ways.append([*p.tolist(), float(memory[TRACE_SIZE + ARGUMENT])])
+            ways.append([*p.tolist(), float(field.walker(memory).argument[0])])
         v = v + PERIOD / MASS * (wrench[:3] + user)
         p = p + PERIOD * v
     return {"ways": ways}

@@ -38,7 +38,7 @@ def _run(mode: str) -> dict[str, list]:
     for k in range(round(SECONDS / PERIOD)):
         hand[0], hand[HAND_SWITCH] = k * PERIOD, arm.switch[0]
         hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3] = p, v
-        evaluate(program.ops, program.params, memory, hand, wrench)
+        evaluate(*program.compiled(), memory, hand, wrench)
         hand_force(arm, k * PERIOD, p, v, user)
         if k % EVERY == 0:
             path.append(p.tolist())

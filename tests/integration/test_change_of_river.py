@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.run import run
 from models.mocap.clip import pose_difference
 from sim.recording.recording import Recording
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rivers") / "run"
-    run(RunConfig(mode="rivers", map="rivers", clips=(), seconds=6.0, user="push"), folder, False, 0.0)
+    run(run_config(mode="rivers", map="rivers", clips=(), seconds=6.0, user="push"), folder, False, 0.0)
     return folder
 
 

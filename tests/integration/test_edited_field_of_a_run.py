@@ -6,7 +6,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.own_law import loop_with
 from sim.users.intent import Push
 
@@ -16,7 +16,7 @@ CURVE = Trajectory.circle(0.0477, 4.0)
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, -0.8, 0.2), (-1.0, 0.3, -0.5)])
 def test_a_push_on_the_simulated_phantom_comes_out_of_v_plus_u(direction):
     river = River(CURVE, 0.08, 4.0 / 300.0, 4.0)
-    config = RunConfig(clips=("cheer", "angry"), seconds=1.4, pushes=(Push(0.4, 0.5, 3.0, direction),))
+    config = run_config(clips=("cheer", "angry"), seconds=1.4, pushes=(Push(0.4, 0.5, 3.0, direction),))
     rows = []
     _, loop = loop_with(config, river.program(), lambda ticks, frames, n: rows.append(ticks.hand[:n, :4].copy()))
     loop.run(config.seconds)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.run import run
 from experiments.setups import lead
 from sim.recording.recording import Recording
@@ -20,7 +20,7 @@ MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("led") / "run"
-    run(RunConfig(mode="lead", seconds=19.0), folder, False, 0.0)
+    run(run_config(mode="lead", seconds=19.0), folder, False, 0.0)
     return folder
 
 
@@ -86,7 +86,7 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
 def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, residual: float) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
-    run(RunConfig(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
+    run(run_config(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)
     assert summary["figure"]["residual_force_rms"] < residual
@@ -98,12 +98,12 @@ def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
     monkeypatch.setattr(lead, "_BEND", 0.4 * np.pi)
     clip = str(MOCAP / "deepmimic/humanoid3d_run.txt")
-    run(RunConfig(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
+    run(run_config(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))
 
 
 def test_a_run_flies_along_the_s_and_comes_back(tmp_path: Path) -> None:
-    run(RunConfig(mode="lead", clips=("run",), seconds=19.0), tmp_path / "run", False, 0.0)
+    run(run_config(mode="lead", clips=("run",), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)
     assert summary["figure"]["flight_seconds"] > 0.2

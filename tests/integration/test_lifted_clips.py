@@ -7,7 +7,7 @@ import pytest
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, embedded_names, load_clip

@@ -9,7 +9,7 @@ from controllers.motion.lap import MEMORY
 from experiments.lifting.in_betweens import measure_motion
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.map_quality import in_between, neighbours
-from experiments.setups.figure_maps import figure_legs
+from experiments.setups.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names

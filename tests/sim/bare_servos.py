@@ -4,7 +4,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from controllers.fields.instructions import Program
+from controllers.fields.law import Program
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import HandState
@@ -13,7 +13,6 @@ from models.phantom.kinematics import encoder_reading, gimbal_reading
 from models.scene import SceneConfig
 from sim.body.unsimulated import no_figure
 from sim.compilation.compiled import entry_point
-from sim.compilation.kernel_units import law_units
 from sim.devices.device import DeviceState, read_device, write_device
 from sim.devices.exchange import (
     READING_CLOCK,
@@ -26,7 +25,7 @@ from sim.devices.exchange import (
 )
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.loop import make_logs
-from sim.loop.servo import Field, FrameLog, Servo, TickLog, run_block
+from sim.loop.servo import FrameLog, Servo, TickLog, run_block, unlinked_field
 from sim.reference.reference import no_reference
 from sim.users.arm import Arm
 from sim.world.phantom_port import PhantomPort, phantom_port
@@ -53,12 +52,9 @@ def bare_servo(world: World, device: DeviceState, program: Program | None = None
     program = program or follow_program()
     period = world.config.servo_period
     limiter, tank = limiter or ForceLimiter(period), tank or EnergyTank(period, power=0.2, capacity=0.5)
-    field = Field(
-        units=law_units(program.ops), ops=program.ops, params=program.params, memory=program.fresh_memory(),
-        limits=limiter.limits(), limiter=limiter.fresh_memory(), budget=tank.params(), tank=tank.fresh_memory(),
-        wrench=np.zeros(6), force=np.zeros(3),
-    )  # fmt: skip
-    return Servo(make_plant(world), device, field, no_reference(), no_figure(), FIGURE_TICKS, device.hand[1:8])
+    field = unlinked_field(program, limiter, tank)
+    servo = Servo(make_plant(world), device, field, no_reference(), no_figure(), FIGURE_TICKS, device.hand[1:8])
+    return servo.linked(program)
 
 
 def simulated(world: World, arm: Arm | None = None) -> SimulatedPhantom:

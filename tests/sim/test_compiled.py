@@ -1,4 +1,4 @@
-"""The cache of compiled code: found again by the next process, and never stale."""
+"""Hash of all sources, by which what is found with them is kept: other after any change."""
 
 import shutil
 from pathlib import Path

@@ -12,10 +12,10 @@ from controllers.haptic_map.river_clips import RiverClips
 from experiments.lifting.in_betweens import soles
 from experiments.setups.balance import nearest_supported
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs, packed_legs
-from experiments.setups.hands import stylus_path
-from experiments.setups.modes import river_bundle
+from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.rests import with_rests
+from experiments.setups.rivers import river_bundle
+from experiments.setups.stylus import stylus_path
 from experiments.studies.change_trials import (
     BLEND,
     LAP,

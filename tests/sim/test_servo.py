@@ -6,6 +6,7 @@ import pytest
 from controllers.fields.program import evaluate
 from controllers.safety.limiter import limit_force
 from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.hands import lap_pushes
 from experiments.setups.session import Session
@@ -24,7 +25,7 @@ from sim.world.world import World, phantom_angles
 from tests.sim.bare_servos import Stepped
 
 CLIPS = ("cheer", "angry")
-CONFIG = RunConfig(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
+CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,7 @@ def test_a_recorded_run_replays_to_the_same_states_bit_for_bit(clips: tuple) -> 
 
 def test_a_run_is_a_pure_function_of_configuration_and_seed(clips: tuple) -> None:
     def trace(seed: int) -> dict:
-        config = RunConfig(clips=CLIPS, seconds=0.2, seed=seed)
+        config = run_config(clips=CLIPS, seconds=0.2, seed=seed)
         ticks, _ = run_logged(wire(config, clips), 200)
         return tick_channels(ticks, 200)
 
@@ -141,7 +142,7 @@ def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: t
     phantom, path = Stepped(stepped.world, arm, CONFIG.cutoff), []
     for _ in range(300):
         hand = phantom.read().vector()
-        evaluate(field.ops, field.params, field.memory, hand, field.wrench)
+        evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
         limit_force(field.limits, field.limiter, field.wrench, field.force)
         phantom.write(field.force)
         path.append(hand[1:4])
@@ -154,7 +155,7 @@ def test_a_physics_step_that_does_not_divide_the_servo_period_is_refused() -> No
 
 
 def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
-    config = RunConfig(clips=CLIPS, seconds=0.1, scene=SceneConfig(servo_period=2e-3, physics_step=5e-4))
+    config = run_config(clips=CLIPS, seconds=0.1, scene=SceneConfig(servo_period=2e-3, physics_step=5e-4))
     session = wire(config, clips)
     run_logged(session, 50)
     assert session.world.data.time == pytest.approx(0.1, abs=1e-9)

@@ -7,11 +7,11 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
-from experiments.setups.figure_maps import figure_legs, packed_legs
-from experiments.setups.hands import stylus_path
+from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.stretch import edited_until, flight_remarks
+from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
@@ -133,7 +133,7 @@ def test_what_nobody_can_do_is_said_beforehand() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("clips", [("jump",), ("walk", "run", "jump", "angry")])
 def test_a_figure_whose_flights_are_held_and_carried_stands(clips: tuple[str, ...]) -> None:
-    config = RunConfig(clips=clips, mode="stretch-then-follow", seconds=18.0)
+    config = run_config(clips=clips, mode="stretch-then-follow", seconds=18.0)
     session = wire(config, load_clips(clips)[0])
     root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
     errors: list[float] = []

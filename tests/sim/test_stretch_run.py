@@ -10,12 +10,13 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve
 from experiments.results.stretch_figure import draw_stretch
-from experiments.setups.clips import load_clips
-from experiments.setups.hands import stylus_path
+from experiments.results.stretch_summary import stretch_summary
 from experiments.setups.session import Session
-from experiments.setups.stretch import CURVE_FILE, law, load_curve, save_curve, stretch_grabs, stretch_summary
+from experiments.setups.stretch import law, stretch_grabs
+from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.mocap.clip import pose_difference
 from sim.errors import SimError
@@ -33,8 +34,8 @@ SECONDS = 4.3  # the first grab, and a little more
 
 
 def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
-    config = RunConfig(clips=("cheer", "angry"), seconds=SECONDS)
-    session = wire(config, load_clips(config.clips)[0])
+    config = run_config(clips=("cheer", "angry"), seconds=SECONDS)
+    session = wire(config)
     grabs = stretch_grabs(session.curve, FLAGS.rubber_tube)[:1]
     field = law(FLAGS, session.curve, grabs)
     program, channels = field.program(), {"p": [], "switch": [], "distance": [], "force": []}

@@ -8,7 +8,7 @@ import pytest
 
 from controllers.fields.python_law import PythonLaw
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.hands import lap_pushes
 from experiments.setups.own_law import loop_with
@@ -17,7 +17,7 @@ from sim.loop.loop import Loop
 from sim.users.intent import Push
 
 CLIPS = ("cheer", "angry")
-CONFIG = RunConfig(clips=CLIPS, seconds=1.0)
+CONFIG = run_config(clips=CLIPS, seconds=1.0)
 OPEN = EnergyTank(1e-3, power=1e3, capacity=1e3)
 
 
@@ -29,7 +29,7 @@ def run(program, tank=None, seconds=1.0, config=CONFIG):
         logs.append((ticks.hand[:n, 1:4].copy(), ticks.force[:n].copy(), ticks.tank[:n].copy()))
 
     if program is None:
-        session = wire(config, load_clips(config.clips)[0])
+        session = wire(config)
         loop = Loop(session.servo, session.world, keep)
     else:
         session, loop = loop_with(config, program, keep, tank)

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.config.run_config import RunConfig
-from experiments.setups.clips import load_clips
+from experiments.config.words import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.scene import PHANTOM
@@ -102,10 +101,10 @@ def test_the_stylus_goes_where_the_hand_turns_it_and_its_tip_stays():
 
 
 def test_a_run_with_turns_replays_bit_for_bit():
-    config = RunConfig(
+    config = run_config(
         clips=("cheer",), seconds=0.4, turns=TURNS, expressive=True, orientation_stiffness=0.2, orientation_damping=1e-3
     )
-    first, second = (wire(config, load_clips(config.clips)[0]) for _ in range(2))
+    first, second = (wire(config) for _ in range(2))
     ticks, frames = make_logs(first.servo, 400)
     _, again = make_logs(second.servo, 400)
     run_block(first.servo, 0, 400, False, ticks, frames)

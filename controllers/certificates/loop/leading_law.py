@@ -18,8 +18,9 @@ from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.sampled_loop import KEPT, SampledLoop
 from controllers.curves.trajectory import piece_point, piece_velocity
-from controllers.fields.leading import leading_force, walker_acceleration
+from controllers.fields.leading import leading_force
 from controllers.state import Array
+from controllers.walking.walker import walker_acceleration
 
 _INSIDE = 1e-9  # [m] of floor on the side of an edge where the spring acts
 _WIDE = 10.0  # [m] a dead band in which nothing is felt

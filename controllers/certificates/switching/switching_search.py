@@ -14,8 +14,9 @@ import numpy as np
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
-from controllers.fields.higher_order import HigherOrder, higher_order_wrench
+from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
+from controllers.fields.program import evaluate
 from controllers.state import Array, HandState
 
 LOST = 0.02  # [s] without a river from which on a hand counts as thrown out
@@ -96,14 +97,13 @@ def course(field: HigherOrder, loop: SampledLoop, place: Array, start: Array, ve
     x = np.concatenate([np.linalg.solve(jacobian, start - place), np.linalg.solve(jacobian, velocity)])
     last, rate = _rounded(x[:3], linear.theta[0], step), x[3:].copy()
     points, river = np.zeros((n, 3)), np.zeros(n)
-    at, slot = int(program.ops[0, 1]), int(program.ops[0, 2])
     for k in range(n):
         read = _rounded(x[:3], linear.theta[0], step)
         rate = sampling.keep * rate + (1.0 - sampling.keep) * (read - last) / sampling.period
         last = read
         points[k] = place + jacobian @ x[:3]
         hand = HandState.at(place + jacobian @ read, jacobian @ rate, k * sampling.period)
-        higher_order_wrench(program.params, at, 0, memory, slot, hand.vector(), wrench)
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
         river[k] = memory[TRACE_RIVER]
         force = wrench[:3].copy()
         if push is not None and push.start <= k * sampling.period < push.start + push.duration:

@@ -12,11 +12,11 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, SPEED, Gait, Leading, leading_wrench
+from controllers.fields.leading import Gait, Leading, leading_wrench
 from controllers.state import HandState
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.lead import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted
@@ -95,9 +95,9 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
 
     def course(x, ticks):
         memory, out = program.fresh_memory(), []
-        walker = memory[TRACE_SIZE:]
+        walker = field.walker(memory)
         for k in range(ticks):
-            out.append(np.append(x, walker[[ARGUMENT, SPEED]]))
+            out.append(np.append(x, [walker.argument[0], walker.speed[0]]))
             state = HandState.at(place + jacobian @ x[:3], loop.measured_velocity[0] @ x, k * sampling.period)
             wrench = np.zeros(6)
             leading_wrench(program.params, 0, 0, memory, TRACE_SIZE, state.vector(), wrench)
@@ -120,7 +120,7 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
 
 
 def test_the_executed_law_gives_no_more_power_than_is_certified():
-    field = leading_field(RunConfig(mode="lead"), embedded("walk"))
+    field = leading_field(run_config(mode="lead"), embedded("walk"))
     verdict = leading_energy(field)
     rng = np.random.default_rng(7)
     most = 0.0
@@ -152,7 +152,7 @@ def test_ahead_and_aside_the_force_has_no_potential():
 
 @pytest.mark.slow
 def test_led_figures_are_certified_and_one_with_little_damping_is_refuted():
-    config = RunConfig(mode="lead")
+    config = run_config(mode="lead")
     field = leading_field(config, embedded("walk"))
     assert leading_regimes(field)["_beyond"][0].turn > leading_regimes(field)["_aside"][0].turn > 0.5
     hands = type("Few", (), {"hands": lambda self: [NO_HAND, HandImpedance(0.1, 2.0, 0.0)]})()

@@ -15,8 +15,8 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
 from experiments.certify.certify import certified_rivers
 from experiments.certify.crossing_simulation import simulated_course
-from experiments.config.run_config import RunConfig
-from experiments.setups.modes import law
+from experiments.config.words import run_config
+from experiments.setups.rivers import default_choice, law_of
 from experiments.studies.switching_trials import straight_pair, trials
 
 CLOCK = Sampling(1e-3)
@@ -176,14 +176,14 @@ def test_failures_are_told_apart():
 
 @pytest.mark.slow
 def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
-    config = RunConfig(mode="rivers")
+    config = run_config(mode="rivers")
     main = certified_rivers(config)[""]
     curve, clock = main.curve, main.sampling
     verdict = certify_rivers(config, main, HandRange(), 0.5, {"": curve})["switching"]
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
-    found, field = verdict.counterexample, law(config, curve)
+    found, field = verdict.counterexample, law_of(config.mode, default_choice(config.mode, curve, config.map.reach))
     way = _in_mujoco(field, clock, found)
     ended = failure(way.river, clock.period, found["river"], any(found["force"]))
     assert ended.kind == found["kind"]

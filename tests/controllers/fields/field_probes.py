@@ -8,19 +8,19 @@ from controllers.state import HandState
 
 
 @njit
-def run_over(ops, params, memory, hands, wrenches):
+def run_over(units, ops, params, memory, hands, wrenches):
     for i in range(len(hands)):
-        evaluate(ops, params, memory, hands[i], wrenches[i])
+        evaluate(units, ops, params, memory, hands[i], wrenches[i])
 
 
 @njit
-def glide(ops, params, memory, mass, period, push, path, velocity):
+def glide(units, ops, params, memory, mass, period, push, path, velocity):
     """A mass in a field, from path[0] at velocity[0], pushed by a force at each tick."""
     hand, wrench = np.zeros(15), np.zeros(6)
     hand[4] = 1.0
     for k in range(len(path) - 1):
         hand[0], hand[1:4], hand[8:11] = k * period, path[k], velocity[k]
-        evaluate(ops, params, memory, hand, wrench)
+        evaluate(units, ops, params, memory, hand, wrench)
         velocity[k + 1] = velocity[k] + period / mass * (wrench[:3] + push[k])
         path[k + 1] = path[k] + period * velocity[k + 1]
 
@@ -28,7 +28,7 @@ def glide(ops, params, memory, mass, period, push, path, velocity):
 def force_of(program, hand):
     """Force at the first tick of a run."""
     wrenches = np.empty((1, 6))
-    run_over(program.ops, program.params, program.fresh_memory(), hand.vector()[None], wrenches)
+    run_over(*program.compiled(), program.fresh_memory(), hand.vector()[None], wrenches)
     return wrenches[0, :3]
 
 
@@ -37,7 +37,7 @@ def mass_in(program, start, velocity, push, mass=0.1, period=1e-3):
     path, speed = np.zeros((len(push), 3)), np.zeros((len(push), 3))
     path[0], speed[0] = start, velocity
     memory = program.fresh_memory()
-    glide(program.ops, program.params, memory, mass, period, push, path, speed)
+    glide(*program.compiled(), memory, mass, period, push, path, speed)
     return path, memory
 
 

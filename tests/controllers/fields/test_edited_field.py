@@ -98,13 +98,13 @@ def test_after_its_end_and_far_from_it_a_recording_is_not_felt():
 def test_a_recording_that_waits_goes_on_when_the_hand_comes_by_and_begins_again():
     performed = performance(TIMES, _pushed(np.random.default_rng(5), 2.0)[0])
     program = Edited(RIVER, (performed,), (1.0,), pace="wait").program()
-    slot = int(program.ops[1, 2])
+    slot = program.slot_of(program.laws[1])
     clock = np.arange(9000) * 1e-3
     held = np.array([HandState.at([0.0, 0.0, 0.06], t=t).vector() for t in clock[:100]])
     along = np.array([HandState.at(performed.point(t % 4.0), t=0.1 + t).vector() for t in clock])
     memory, places = program.fresh_memory(), []
     for hand in np.concatenate((held, along)):
-        run_over(program.ops, program.params, memory, hand[None], np.empty((1, 6)))
+        run_over(*program.compiled(), memory, hand[None], np.empty((1, 6)))
         places.append(memory[slot + 1])
     assert places[99] == 0.0
     np.testing.assert_allclose(places[100:4000], clock[:3900], atol=2e-3)

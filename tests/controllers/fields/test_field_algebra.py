@@ -8,7 +8,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra import Weight
 from controllers.fields.follow import Follow
-from controllers.fields.program import Program
+from controllers.fields.law import Program
 from controllers.fields.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
@@ -76,13 +76,9 @@ def test_composed_fields_have_no_jump():
 def test_laws_in_python_keep_their_order_through_the_algebra():
     one, two = (PythonLaw(lambda hand, k=k: [k, 0.0, 0.0]) for k in (1.0, 2.0))
     field = (one.program() + A).blended(two.program().limited(5.0), Weight.constant(0.5))
-    assert field.python_laws == (one.function, two.function)
-    assert len(field.external_slots) == 2
-    memory = field.fresh_memory()
-    for slot, law in zip(field.external_slots, field.python_laws, strict=True):
-        memory[slot : slot + 3] = law(HAND)
-    filled = Program(field.ops, field.params, memory, field.python_laws)
-    np.testing.assert_allclose(force_of(filled, HAND), 0.5 * F + np.array([1.5, 0.0, 0.0]), rtol=1e-12)
+    assert [law(HAND)[0] for law in field.python_laws] == [1.0, 2.0]
+    assert len(field.python_feeds) == 2
+    np.testing.assert_allclose(field.wrench(HAND).force, 0.5 * F + np.array([1.5, 0.0, 0.0]), rtol=1e-12)
     np.testing.assert_array_equal(one.wrench(HAND).force, [1.0, 0.0, 0.0])
 
 
@@ -93,7 +89,10 @@ def test_laws_in_python_keep_their_order_through_the_algebra():
         (lambda: Weight.speed(0.3, 0.2), "low < high"),
         (lambda: Weight.constant(np.nan), "finite"),
         (lambda: A.limited(-1.0), "force must be at least 0 N"),
-        (lambda: Program(PythonLaw(lambda h: h.p).program().ops, np.zeros(0), np.zeros(14)), "one law in Python"),
+        (lambda: Program(A.ops[:0], A.params, A.memory, A.kernels, A.laws), "must leave one wrench"),
+        (lambda: Program(A.ops, A.params, A.memory, (), A.laws), "got 0 kernels and 1 laws"),
+        (lambda: PythonLaw(lambda hand: 1.0).wrench(HAND), r"gave numbers of shape \(\); expected a force of three"),
+        (lambda: PythonLaw(lambda hand: [0.0, np.inf, 0.0]).wrench(HAND), "expected finite numbers"),
     ],
 )
 def test_bad_weights_and_limits_are_refused(make, says):

@@ -10,7 +10,8 @@ from controllers.errors import ParameterError
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
-from controllers.fields.program import Program, evaluate
+from controllers.fields.law import Program
+from controllers.fields.program import evaluate
 from controllers.fields.python_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
@@ -21,7 +22,7 @@ SPEED = 2.0 * np.pi * 0.05 / 4.0
 
 def _run(program, hand, memory):
     wrench = np.empty(6)
-    evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+    evaluate(*program.compiled(), memory, hand.vector(), wrench)
     return wrench
 
 
@@ -155,7 +156,7 @@ def test_programs_add_and_python_may_fill_in_a_wrench():
     external = PythonLaw(lambda hand: hand.p).program()
     program = laws[0].program() + (external + laws[1].program()) + laws[2].program()
     memory = program.fresh_memory()
-    memory[program.external_slots[0] : program.external_slots[0] + 6] = [1, 2, 3, 4, 5, 6]
+    memory[program.python_feeds[0].slot : program.python_feeds[0].slot + 6] = [1, 2, 3, 4, 5, 6]
     wrench = _run(program, hand, memory)
     force = sum(law.wrench(hand).force for law in laws)
     np.testing.assert_allclose(wrench, np.concatenate([force + np.array([1, 2, 3]), [4, 5, 6]]), rtol=1e-14)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import HELD, SPEED, Leading
+from controllers.fields.leading import Leading
 from controllers.fields.program import evaluate
 from controllers.walking.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
 
@@ -18,7 +17,7 @@ def decided(shares, speed, memory=None):
     memory = fresh_decision(True) if memory is None else memory
     held = []
     for share in shares:
-        decide_flight(memory, 0, share, speed, 2.7, 2.5)
+        decide_flight(memory, share, speed, 2.7, 2.5)
         held.append(memory[0])
     return np.array(held), memory
 
@@ -28,9 +27,9 @@ def test_stances_are_where_a_foot_bears():
     turned = Gait(2.2, 3.0, np.roll(RUN.support, -10), 0.6)
     np.testing.assert_allclose(np.sort(turned.stances[:, 0]), [34 / 88, 78 / 88])
     table = turned.stances.ravel()
-    shares = np.array([share_of_stance(table, 0, 2, lap) for lap in (np.arange(176) + 0.5) / 88])
+    shares = np.array([share_of_stance(table, lap) for lap in (np.arange(176) + 0.5) / 88])
     np.testing.assert_array_equal(shares >= 0.0, np.tile(turned.support, 2) > 0)
-    assert share_of_stance(table, 0, 2, -1.0 + 40.5 / 88) == pytest.approx(share_of_stance(table, 0, 2, 40.5 / 88))
+    assert share_of_stance(table, -1.0 + 40.5 / 88) == pytest.approx(share_of_stance(table, 40.5 / 88))
     assert Gait(1.4, 1.25, np.array([2, 1]), 0.4).stances.shape == (0, 2)
 
 
@@ -75,12 +74,13 @@ def led(seconds):
     program = FIELD.program()
     memory, hand, wrench = program.fresh_memory(), np.zeros(15), np.zeros(6)
     hand[4] = 1.0
+    walker = FIELD.walker(memory)
     trail = np.empty((round(seconds / RATE), 3))
     for k in range(len(trail)):
         hand[0] = k * RATE
         hand[1] = FIELD.start[0] + min(hand[0], 3.0) * RUN.speed / FIELD.scale
-        evaluate(program.ops, program.params, memory, hand, wrench)
-        trail[k] = memory[TRACE_SIZE], memory[TRACE_SIZE + HELD], memory[TRACE_SIZE + SPEED]
+        evaluate(*program.compiled(), memory, hand, wrench)
+        trail[k] = walker.argument[0], walker.argument[1], walker.speed[0]
     return trail
 
 

@@ -71,7 +71,7 @@ def test_it_adds_to_a_field_and_is_the_compiled_law_in_the_sum():
     hands = [HandState.at(CIRCLE.point(t) + rng.normal(scale=3e-3, size=3), rng.normal(scale=0.1, size=3))
              for t in rng.uniform(0.0, 4.0, 40)]  # fmt: skip
     wrenches, memory = np.empty((len(hands), 6)), both.fresh_memory()
-    run_over(both.ops, both.params, memory, np.array([hand.vector() for hand in hands]), wrenches)
+    run_over(*both.compiled(), memory, np.array([hand.vector() for hand in hands]), wrenches)
     for hand, wrench in zip(hands, wrenches, strict=True):
         np.testing.assert_allclose(wrench[:3], follow.wrench(hand).force + GOVERNOR.wrench(hand).force, atol=1e-9)
 

@@ -15,7 +15,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.river import River
 from controllers.state import HandState
-from experiments.setups.modes import ADMISSION, HYSTERESIS, SIGMA, river_bundle
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
 from experiments.studies.field_figures import SPEED, crossing, eight, straight_river
 
 SCALE = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
@@ -33,7 +33,7 @@ def _pair(degrees):
 
 def _run(program, hands):
     memory, wrenches = program.fresh_memory(), np.empty((len(hands), 6))
-    run_over(program.ops, program.params, memory, np.array([hand.vector() for hand in hands]), wrenches)
+    run_over(*program.compiled(), memory, np.array([hand.vector() for hand in hands]), wrenches)
     return wrenches[:, :3], memory
 
 

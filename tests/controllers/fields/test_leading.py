@@ -8,7 +8,7 @@ from numba import njit
 
 from controllers.errors import ParameterError
 from controllers.fields.instructions import TRACE_SIZE
-from controllers.fields.leading import ARGUMENT, PATH, SPEED, Gait, Leading, leading_force
+from controllers.fields.leading import Gait, Leading, leading_force
 from controllers.fields.program import evaluate
 from controllers.state import HandState
 from controllers.walking.walked_path import (
@@ -21,6 +21,7 @@ from controllers.walking.walked_path import (
     path_front,
     path_value,
 )
+from controllers.walking.walker import walker_at
 
 # A run: one foot, none, the other, none; and a walk on one or two.
 _RUN = Gait(2.2, 3.0, np.repeat([1, 0, 1, 0], [32, 12, 32, 12]), 0.6)
@@ -31,31 +32,32 @@ RATE = 1e-3
 
 
 @njit
-def lead_along(ops, params, memory, hands, period, walker):
+def lead_along(units, ops, params, memory, hands, period, walker):
     """A hand that is where it wants to be; s, speed and force after each tick."""
     hand, wrench = np.zeros(15), np.zeros(6)
     hand[4] = 1.0
     for k in range(len(hands)):
         hand[0], hand[1:4] = hand[0] + period, hands[k]
-        evaluate(ops, params, memory, hand, wrench)
-        walker[k, 0], walker[k, 1] = memory[TRACE_SIZE + ARGUMENT], memory[TRACE_SIZE + SPEED]
+        evaluate(units, ops, params, memory, hand, wrench)
+        state = walker_at(memory, TRACE_SIZE)
+        walker[k, 0], walker[k, 1] = state.argument[0], state.speed[0]
         walker[k, 2:] = wrench[:3]
 
 
 def led(field, hands, memory=None):
     program, walker = field.program(), np.empty((len(hands), 5))
     memory = program.fresh_memory() if memory is None else memory
-    lead_along(program.ops, program.params, memory, np.ascontiguousarray(hands), RATE, walker)
+    lead_along(*program.compiled(), memory, np.ascontiguousarray(hands), RATE, walker)
     return walker, memory
 
 
 def frames(memory, places):
-    at = TRACE_SIZE + PATH
-    return np.array([[path_value(memory, at, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in places])
+    path = FIELD.walker(memory).path
+    return np.array([[path_value(path, s, k)[0] for k in (PATH_X, PATH_Y, PATH_HEADING)] for s in places])
 
 
 def turn_rates(walker, memory):
-    slopes = np.array([path_value(memory, TRACE_SIZE + PATH, s, PATH_HEADING)[1] for s in walker[:, 0]])
+    slopes = np.array([path_value(FIELD.walker(memory).path, s, PATH_HEADING)[1] for s in walker[:, 0]])
     return np.abs(slopes * walker[:, 1])
 
 
@@ -214,19 +216,19 @@ def test_led_along_an_s_and_straight_back_it_retraces_its_path(gait):
 def test_forward_again_it_enters_its_path_and_goes_on_beyond_its_end():
     forth = np.vstack([s_shaped(FIELD), rest(s_shaped(FIELD)[-1])])
     walker, memory = led(FIELD, forth)
-    front = path_front(memory, TRACE_SIZE + PATH)
+    front = path_front(FIELD.walker(memory).path)
     places = np.linspace(0.0, front, 300)
     before = frames(memory, places)
     half = forth[len(forth) // 3]
     _, memory = led(FIELD, np.vstack([straight(forth[-1], half, 5.0), rest(half)]), memory)
-    middle = memory[TRACE_SIZE + ARGUMENT]
+    middle = float(FIELD.walker(memory).argument[0])
     assert 0.2 * walker[-1, 0] < middle < 0.6 * walker[-1, 0]
-    assert path_front(memory, TRACE_SIZE + PATH) == front
+    assert path_front(FIELD.walker(memory).path) == front
     ahead = forth[-1] + 0.04 * np.array([np.cos(before[-1, 2]), np.sin(before[-1, 2]), 0.0])
     way = np.vstack([straight(half, forth[-1], 5.0), straight(forth[-1], ahead, 2.0), rest(ahead)])
     _, memory = led(FIELD, way, memory)
     np.testing.assert_array_equal(frames(memory, places), before)
-    assert memory[TRACE_SIZE + ARGUMENT] > walker[-1, 0] + 1.0
+    assert FIELD.walker(memory).argument[0] > walker[-1, 0] + 1.0
 
 
 def test_an_endless_walk_needs_no_more_memory_and_can_go_back_as_far_as_it_remembers():
@@ -242,7 +244,7 @@ def test_an_endless_walk_needs_no_more_memory_and_can_go_back_as_far_as_it_remem
     assert len(memory) == len(FIELD.program().memory)
     radii = np.hypot(*(frames(memory, walker[-4000:, 0])[:, :2] / FIELD.scale - circle[:, :2].mean(axis=0)).T)
     assert np.ptp(radii) < 0.15 * radius
-    oldest = path_back(memory, TRACE_SIZE + PATH)
+    oldest = path_back(FIELD.walker(memory).path)
     assert oldest > 5.0
     returning, memory = led(FIELD, circle[::-1], memory)
     assert returning[-1, 0] >= oldest
@@ -253,10 +255,10 @@ def test_the_same_tick_again_moves_nothing():
     _, memory = led(FIELD, s_shaped(FIELD)[:1500])
     program, wrenches = FIELD.program(), np.empty((2, 6))
     hand = HandState.at([0.0, 0.0, 0.0], t=2.0).vector()
-    evaluate(program.ops, program.params, memory, hand, wrenches[0])
+    evaluate(*program.compiled(), memory, hand, wrenches[0])
     kept = memory.copy()
-    evaluate(program.ops, program.params, memory, hand, wrenches[1])
-    np.testing.assert_allclose(memory[TRACE_SIZE + ARGUMENT], kept[TRACE_SIZE + ARGUMENT], rtol=0, atol=0)
+    evaluate(*program.compiled(), memory, hand, wrenches[1])
+    assert FIELD.walker(memory).argument[0] == FIELD.walker(kept).argument[0]
 
 
 @pytest.mark.parametrize(

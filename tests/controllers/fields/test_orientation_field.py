@@ -127,8 +127,8 @@ def test_added_to_a_force_it_leaves_the_force_and_the_trace_as_they_are():
     for k in range(100):
         turned = Rotation.random(random_state=RNG)
         state = HandState(0.0, CURVE.point(0.02 * k) * 1.1, wxyz(turned), RNG.normal(size=3), RNG.normal(size=3))
-        evaluate(both.ops, both.params, memory, state.vector(), wrench)
-        evaluate(alone.ops, alone.params, memory_alone, state.vector(), force)
+        evaluate(*both.compiled(), memory, state.vector(), wrench)
+        evaluate(*alone.compiled(), memory_alone, state.vector(), force)
         np.testing.assert_array_equal(wrench[:3], force[:3])
         np.testing.assert_array_equal(memory[:8], memory_alone[:8])
         # To the last bit what Python gives; t* is warm here and found anew there.
@@ -139,16 +139,16 @@ def test_python_and_the_compiled_program_agree_to_the_last_bit():
     program, wrench = FIELD.program(), np.empty(6)
     for _ in range(50):
         state = hand(Rotation.random(random_state=RNG), RNG.normal(scale=0.05, size=3), RNG.normal(size=3))
-        evaluate(program.ops, program.params, program.fresh_memory(), state.vector(), wrench)
+        evaluate(*program.compiled(), program.fresh_memory(), state.vector(), wrench)
         np.testing.assert_array_equal(wrench, np.concatenate(FIELD.wrench(state)))
 
 
 @njit
-def _turn(ops, params, memory, state, inertia, steps, angles):
+def _turn(units, ops, params, memory, state, inertia, steps, angles):
     """A ball on the curve's point at t = 1, with the moment alone: semi-implicit steps of 0.1 ms."""
     wrench, h = np.empty(6), 1e-4
     for k in range(steps):
-        evaluate(ops, params, memory, state, wrench)
+        evaluate(units, ops, params, memory, state, wrench)
         state[11:14] += h / inertia * wrench[3:]
         half = 0.5 * h * state[11:14]
         w, x, y, z = state[4], state[5], state[6], state[7]
@@ -168,7 +168,7 @@ def test_a_stylus_let_go_turns_to_the_curve_the_short_way_and_never_away():
         q = Rotation.from_rotvec(3.0 * axis / np.linalg.norm(axis))
         state = HandState(0.0, circle.point(1.0), wxyz(q), np.zeros(3), np.zeros(3)).vector()
         angles = np.empty(2000)
-        _turn(field.ops, field.params, field.fresh_memory(), state, inertia, 2000, angles)
+        _turn(*field.compiled(), field.fresh_memory(), state, inertia, 2000, angles)
         assert angles[0] == pytest.approx(3.0, abs=0.01)
         assert (np.diff(angles) < 1e-9).all()
         assert angles[-1] < 1e-4

@@ -5,8 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
+from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import evaluate
-from controllers.fields.soft_wall import SoftWall, raise_walls
+from controllers.fields.soft_wall import SoftWall
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
 from experiments.setups.robot_arm import robot_arm_map
@@ -168,8 +169,8 @@ def test_the_compiled_sum_with_another_field_is_the_same_to_the_last_bit():
     units = map_units([MAP.compiled()[:2]])
     for angle in np.linspace(0.0, 6.0, 30):
         hand = HandState.at(place(0.065, angle, 0.02), (0.2, -0.1, 0.05))
-        raise_walls(units, program.ops, program.params, memory, hand.vector())
-        evaluate(program.ops, program.params, memory, hand.vector(), wrench)
+        feed_maps(units, feed_rows(program.map_feeds), program.params, memory, hand.vector())
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
         np.testing.assert_array_equal(wrench[:3], WALL.wrench(hand).force + BRAKE.wrench(hand).force)
 
 

@@ -8,7 +8,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError, ParameterError
 from controllers.fields.follow import Follow
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_SIZE
-from controllers.fields.program import Program, evaluate
+from controllers.fields.law import Program
+from controllers.fields.program import evaluate
 from controllers.fields.stretchy_tubes import CLICK_TIME, StretchyTubes, stretch_force
 from controllers.state import HandState
 
@@ -31,7 +32,7 @@ class Session:
         self.time += after
         hand = HandState(self.time, np.array(p, float), UPRIGHT, np.array(v, float), np.zeros(3), switch)
         wrench = np.empty(6)
-        evaluate(self.program.ops, self.program.params, self.memory, hand.vector(), wrench)
+        evaluate(*self.program.compiled(), self.memory, hand.vector(), wrench)
         assert (wrench[3:] == 0.0).all()
         return wrench[:3]
 
@@ -218,7 +219,7 @@ def test_two_tubes_share_a_space_and_each_bends_its_own_curve() -> None:
     upper = StretchyTubes(Trajectory.circle(0.05, 4.0, (0.0, 0.0, 0.05)), 50.0, 200.0, 0.0)
     program = TUBES.program() + upper.program()
     session = Session(TUBES, program)
-    slots = [int(row[2]) for row in program.ops[:2]]
+    slots = [program.slot_of(field) for field in (TUBES, upper)]
     session.at([0.05, 0.0, 0.05])
     session.drag([0.05, 0.0, 0.05], [0.065, 0.0, 0.05])
     assert [len(field.edits(session.memory, slot)) for field, slot in zip((TUBES, upper), slots, strict=True)] == [0, 1]
@@ -252,7 +253,7 @@ def test_from_python_and_from_the_program_the_force_is_the_same_to_the_last_bit(
         hand = HandState.at(rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.1, 0.3)
         wrench = np.empty(6)
         program = TUBES.program()
-        evaluate(program.ops, program.params, program.fresh_memory(), hand.vector(), wrench)
+        evaluate(*program.compiled(), program.fresh_memory(), hand.vector(), wrench)
         np.testing.assert_array_equal(TUBES.wrench(hand).force, wrench[:3])
 
 

@@ -1,13 +1,15 @@
 """The demo: the four-clip cylinder of the paper's Fig. 3 (Donald & Henle 2000)."""
 
-from experiments.config.run_config import RunConfig
+from experiments.config.maps import Circle
+from experiments.config.run_config import RunConfig, User
 from experiments.setups.hands import lap_pushes
 
-_LAP = 4.0
+_LAP = Circle().lap
 _RELAXED = 2.2 * _LAP  # two laps: the device's friction makes them a little longer than the curve's own
 _FORCE = 4.0  # [N]; more than the motors can hold for ever, and they need not
 
 
 def demo_config() -> RunConfig:
     """Two laps of a relaxed hand, then one in which it pushes outwards and then inwards."""
-    return RunConfig(user="push", seconds=_RELAXED + 1.2 * _LAP, lap=_LAP, pushes=lap_pushes(_RELAXED, _LAP, _FORCE))
+    pushes = lap_pushes(_RELAXED, _LAP, _FORCE)
+    return RunConfig(user=User(does="push", pushes=pushes), seconds=_RELAXED + 1.2 * _LAP)

@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
-from experiments.certify.ballistics import ClipBallistics, clip_ballistics
+from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts

@@ -18,7 +18,7 @@ from controllers.certificates.flight.flight_fit import FlightFit, best_fall
 from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
-from experiments.certify.certified_field import clip_inputs
+from experiments.files.certificate_files import clip_inputs
 from models.humanoid.skeleton import N_POSE
 from models.mocap import quaternions
 from models.mocap.clip import Clip, pose_difference

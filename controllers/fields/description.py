@@ -1,0 +1,79 @@
+"""What a law is, in plain data: names and values that can be hashed, compared and read."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from types import CodeType, FunctionType
+from typing import Any, cast
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.haptic_map.base import HapticMap
+from controllers.state import Array
+
+_SHORT = 16  # numbers that are told one by one
+
+
+def digest(*parts: Array | bytes) -> str:
+    """SHA-256 of arrays and bytes, 16 hex digits."""
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(part if isinstance(part, bytes) else f"{part.shape}".encode())
+        total.update(b"" if isinstance(part, bytes) else np.ascontiguousarray(part).tobytes())
+    return total.hexdigest()[:16]
+
+
+def described(value: object) -> object:
+    """A parameter as plain data.
+
+    Numbers, words and short arrays are told as they are; of curves, maps and long arrays a hash is told; of a
+    dataclass, or a named tuple, what it is made of by name.
+    """
+    if isinstance(value, Trajectory):
+        return {"curve": digest(value.packed())}
+    if isinstance(value, HapticMap):
+        kind, params, memory = value.compiled()
+        return {"map": type(value).__name__, "kind": kind, "numbers": digest(params, memory)}
+    if isinstance(value, np.ndarray):
+        array = np.asarray(value, dtype=np.float64)
+        return array.tolist() if array.size <= _SHORT else {"shape": list(array.shape), "numbers": digest(array)}
+    if hasattr(value, "description"):
+        return cast(Any, value).description()
+    if is_dataclass(value) and not isinstance(value, type):
+        return parts_of(value)
+    if isinstance(value, tuple | list):
+        return [described(part) for part in cast("list[object]", value)]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def parts_of(value: Any) -> dict[str, object]:
+    """Parameters of a dataclass by name."""
+    return {field.name: described(getattr(value, field.name)) for field in fields(value)}
+
+
+def code_digest(function: object) -> str:
+    """Hash of what a function computes: its code, the constants that it reads, and the functions that it calls.
+
+    Of a name that is neither a number, a word, a tuple nor a function in Python only the name is in the hash.
+    """
+    return digest(*_told(function, set()))
+
+
+def _told(value: object, seen: set[int]) -> Iterator[bytes]:
+    value = getattr(value, "py_func", value)
+    if isinstance(value, CodeType):
+        yield value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode()
+        for constant in value.co_consts:
+            yield from _told(constant, seen)
+    elif isinstance(value, FunctionType):
+        if id(value) not in seen:
+            seen.add(id(value))
+            yield from _told(value.__code__, seen)
+            read = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
+            for cell in (*(value.__defaults__ or ()), *(c.cell_contents for c in value.__closure__ or ()), *read):
+                yield from _told(cell, seen)
+    elif value is None or isinstance(value, int | float | str | tuple):
+        yield repr(value).encode()
+    elif isinstance(value, np.ndarray):
+        yield digest(np.asarray(value, dtype=np.float64)).encode()

@@ -1,0 +1,277 @@
+"""Laws of force and their algebra: what every field can do, built in, composed, or one's own."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.checks import checked
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.algebra import WEIGHT_SIZE, Weight
+from controllers.fields.description import parts_of
+from controllers.fields.instructions import LAW_ARGUMENTS, STACK, TRACE_SIZE, Join, Kernel, empty_trace
+from controllers.fields.program import Compiled, evaluate
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
+from controllers.kernel_call import address_of
+from controllers.state import HAND_POSITION, Array, HandState, IntArray, Wrench
+
+
+class Law(ABC):
+    r"""A field of force F(hand), and the algebra of fields.
+
+    .. math:: F + F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
+
+    by ``+``, ``*``, `gated`, `blended` and `limited`; each gives another law, and s is a `Weight`.
+    """
+
+    @abstractmethod
+    def program(self) -> "Program":
+        """The field as the servo runs it."""
+
+    def wrench(self, hand: HandState) -> Wrench:
+        """Force and moment at one hand state, by the compiled laws, at the first tick of a run."""
+        program, wrench = self.program(), np.empty(6)
+        memory = program.fresh_memory()
+        program.feed(memory, hand)
+        evaluate(*program.compiled(), memory, hand.vector(), wrench)
+        return Wrench(wrench[:3], wrench[3:])
+
+    def description(self) -> dict[str, object]:
+        """The law's name and its parameters by name, in plain data; what a certificate of the law depends on."""
+        return {"law": type(self).__name__, "parameters": parts_of(self)}
+
+    def __add__(self, other: "Law") -> "Program":
+        """Sum of two fields."""
+        return self.program().joined(other.program(), Join.ADD)
+
+    def __rmul__(self, factor: float) -> "Program":
+        """Field times a number."""
+        return self.gated(Weight.constant(factor))
+
+    def gated(self, weight: Weight) -> "Program":
+        """Field times a weight: s F."""
+        return self.program().followed(Join.GATE, weight.row)
+
+    def blended(self, other: "Law", weight: Weight) -> "Program":
+        """Blend of two fields: (1 − s) F + s F'."""
+        return self.program().joined(other.program(), Join.BLEND, weight.row)
+
+    def limited(self, force: float, torque: float = np.inf) -> "Program":
+        """Field whose force [N] and moment [N m] are cut to a length, their direction kept."""
+        bounds = (("force", force, "N"), ("torque", torque, "N m"))
+        return self.program().followed(Join.LIMIT, [checked(*bound, infinite=True) for bound in bounds])
+
+
+class PythonFeed(NamedTuple):
+    """Six numbers in a field's memory, [F (3), τ (3)], that a Python function gives before each evaluation.
+
+    Attributes
+    ----------
+    slot : int
+        Where in the memory.
+    function : callable
+        From the measured hand to the six numbers.
+    """
+
+    slot: int
+    function: Callable[[HandState], Array]
+
+    def moved(self, params: int, memory: int) -> "PythonFeed":
+        """The same behind so many more parameters, and numbers of the memory."""
+        return self._replace(slot=self.slot + memory)
+
+
+class MapFeed(NamedTuple):
+    """Pose h (nq) and derivative h_* (nv × 6) of a haptic map at the stylus, that a law finds in its memory.
+
+    Attributes
+    ----------
+    slot : int
+        Where in the memory; the map's own memory is behind them.
+    at : int
+        Where in the parameters those of the map are.
+    haptic_map : HapticMap
+    """
+
+    slot: int
+    at: int
+    haptic_map: HapticMap
+
+    def moved(self, params: int, memory: int) -> "MapFeed":
+        """The same behind so many more parameters, and numbers of the memory."""
+        return self._replace(slot=self.slot + memory, at=self.at + params)
+
+
+@dataclass(frozen=True, eq=False)
+class Program(Law):
+    """Field of force in the form that the servo runs.
+
+    Parameters
+    ----------
+    ops : IntArray, shape (n, 4)
+        Instructions, see `controllers.fields.instructions`.
+    params : Array
+        Gains and packed curves; never written.
+    memory : Array
+        Initial memory. Evaluation writes into a copy of it (`fresh_memory`), one copy for every run.
+    kernels : tuple of Kernel
+        Compiled laws, each once; the code of a law's instruction is its kernel's number here.
+    laws : tuple of Law
+        Whose instructions they are, in their order.
+    python_feeds, map_feeds
+        What laws are given before each evaluation, besides the hand.
+
+    Raises
+    ------
+    ParameterError
+        If the instructions do not leave exactly one wrench, need a stack deeper than `STACK`, or a law has no kernel.
+    """
+
+    ops: IntArray
+    params: Array
+    memory: Array
+    kernels: tuple[Kernel, ...] = ()
+    laws: tuple[Law, ...] = ()
+    python_feeds: tuple[PythonFeed, ...] = ()
+    map_feeds: tuple[MapFeed, ...] = ()
+
+    def __post_init__(self) -> None:
+        codes: list[int] = self.ops[:, 0].tolist()
+        depth = np.cumsum([1 if code >= 0 else 1 - Join(code).takes for code in codes])
+        if len(depth) == 0 or depth[-1] != 1 or depth.min() < 1 or depth.max() > STACK:
+            raise ParameterError(
+                f"a field must leave one wrench and stack at most {STACK}; its instructions stack {depth.tolist()}"
+            )
+        laws = [code for code in codes if code >= 0]
+        if max(laws) >= len(self.kernels) or len(laws) != len(self.laws):
+            raise ParameterError(
+                f"a field of {len(laws)} laws with the codes {laws} needs their kernels and names; "
+                f"got {len(self.kernels)} kernels and {len(self.laws)} laws"
+            )
+
+    @staticmethod
+    def of(
+        law: Law,
+        kernel: Kernel,
+        params: Sequence[float] | Array,
+        memory: Sequence[float] | Array,
+        curve: Trajectory | None = None,
+        feeds: tuple["PythonFeed | MapFeed", ...] = (),
+    ) -> "Program":
+        """One law of force: its kernel, parameters, initial memory and curve, and what it is given before each tick.
+
+        Its memory begins at `TRACE_SIZE`.
+        """
+        blob = np.zeros(0) if curve is None else curve.packed()
+        ops = np.array([[0, 0, TRACE_SIZE, len(params)]], dtype=np.int64)
+        numbers = np.concatenate([np.asarray(params, dtype=np.float64), blob])
+        python = tuple(feed for feed in feeds if isinstance(feed, PythonFeed))
+        maps = tuple(feed for feed in feeds if isinstance(feed, MapFeed))
+        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps)
+
+    def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
+        """Both programs one after the other, and an operation that makes one wrench of theirs."""
+        kernels = (*self.kernels, *(kernel for kernel in other.kernels if kernel not in self.kernels))
+        gap, kept = len(self.params), len(self.memory) - TRACE_SIZE
+        moved = other.ops + np.array([0, gap, kept, gap])
+        laws = moved[:, 0] >= 0
+        moved[laws, 0] = [kernels.index(other.kernels[code]) for code in moved[laws, 0]]
+        return Program(
+            np.vstack([self.ops, moved, [[join, gap + len(other.params), 0, 0]]]),
+            np.concatenate([self.params, other.params, params]),
+            np.concatenate([self.memory, other.memory[TRACE_SIZE:]]),
+            kernels,
+            self.laws + other.laws,
+            self.python_feeds + tuple(feed.moved(gap, kept) for feed in other.python_feeds),
+            self.map_feeds + tuple(feed.moved(gap, kept) for feed in other.map_feeds),
+        )
+
+    def followed(self, join: Join, params: Sequence[float]) -> "Program":
+        """The program, and an operation on its wrench."""
+        ops = np.vstack([self.ops, [[join, len(self.params), 0, 0]]])
+        return replace(self, ops=ops, params=np.concatenate([self.params, params]))
+
+    def program(self) -> "Program":
+        """Itself."""
+        return self
+
+    @cached_property
+    def _compiled(self) -> Compiled:
+        units = np.array([address_of(kernel, LAW_ARGUMENTS) for kernel in self.kernels], dtype=np.int64)
+        return Compiled(units, self.ops, self.params)
+
+    def compiled(self) -> Compiled:
+        """Arguments of `evaluate`; its laws are compiled in this process if they have not been."""
+        return self._compiled
+
+    @property
+    def python_laws(self) -> tuple[Callable[[HandState], Array], ...]:
+        """Functions that the loop calls at every tick, each for six numbers."""
+        return tuple(feed.function for feed in self.python_feeds)
+
+    def fresh_memory(self) -> Array:
+        """Memory for a new run."""
+        return self.memory.copy()
+
+    def feed(self, memory: Array, hand: HandState) -> None:
+        """Write what its laws are given besides the hand, from Python."""
+        for slot, function in self.python_feeds:
+            memory[slot : slot + 6] = function(hand)
+        stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
+        for slot, _, haptic_map in self.map_feeds:
+            first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT
+            kept = memory[last : last + len(haptic_map.compiled().memory)]
+            memory[slot:first] = haptic_map.pose(stylus, kept)
+            memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
+
+    def slot_of(self, law: Law) -> int:
+        """Where in the memory the part of one of its laws begins.
+
+        Raises
+        ------
+        ParameterError
+            If it is not one of its laws.
+        """
+        for row, own in zip(self.ops[self.ops[:, 0] >= 0], self.laws, strict=True):
+            if own is law:
+                return int(row[2])
+        raise ParameterError(f"{law!r} is no law of this field; it has {', '.join(map(repr, self.laws))}")
+
+    def composition(self) -> Iterator[tuple[Law | Join, Array]]:
+        """Laws and operations in their order, as on a pocket calculator, with the numbers of the operations."""
+        laws = iter(self.laws)
+        for code, at, *_ in self.ops.tolist():
+            if code >= 0:
+                yield next(laws), np.zeros(0)
+            else:
+                join = Join(code)
+                yield join, self.params[at : at + {Join.ADD: 0, Join.LIMIT: 2}.get(join, WEIGHT_SIZE)]
+
+    def with_law(self, law: Law, other: Law) -> "Program":
+        """The same composition with another law in the place of one of its laws."""
+        stack: list[Program] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append((other if what is law else what).program())
+                continue
+            last = stack.pop()
+            stack.append(
+                last.followed(what, list(numbers)) if what.takes == 1
+                else stack.pop().joined(last, what, list(numbers))
+            )  # fmt: skip
+        return stack[0]
+
+    def description(self) -> dict[str, object]:
+        """What it is composed of: operations, and its laws with their parameters by name."""
+        stack: list[dict[str, object]] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append(what.description())
+                continue
+            taken, stack = stack[len(stack) - what.takes :], stack[: len(stack) - what.takes]
+            stack.append({what.name.lower(): taken, "parameters": numbers.tolist()})
+        return stack[0]

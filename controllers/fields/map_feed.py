@@ -1,0 +1,44 @@
+"""What laws are told of a haptic map: its pose and derivative at the stylus, written before they are evaluated.
+
+Only where a map is at hand can this be done, so the laws of force do not depend on the maps: the servo calls
+`feed_maps` before `evaluate`.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.fields.law import MapFeed
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT
+from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.state import HAND_POSITION, Array, IntArray
+
+
+def feed_rows(feeds: tuple[MapFeed, ...]) -> IntArray:
+    """A field's `map_feeds` as numbers, shape (n, 6): slot, at, kind and number of parameters, nq, nv."""
+    rows = np.zeros((len(feeds), 6), dtype=np.int64)
+    for row, (slot, at, haptic_map) in zip(rows, feeds, strict=True):
+        kind, params, _ = haptic_map.compiled()
+        row[:] = slot, at, kind, len(params), haptic_map.nq, haptic_map.nv
+    return rows
+
+
+@njit
+def feed_maps(units: IntArray, feeds: IntArray, params: Array, memory: Array, hand: Array) -> None:
+    """Write h and h_* of the maps of a field into its memory, where its laws find them.
+
+    Parameters
+    ----------
+    units : IntArray
+        Of the maps (see `controllers.haptic_map.evaluate`).
+    feeds : IntArray
+        See `feed_rows`.
+    params, memory, hand
+        As `controllers.fields.program.evaluate` takes them.
+    """
+    stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
+    for n in range(feeds.shape[0]):
+        slot, at, kind = feeds[n, 0], feeds[n, 1], feeds[n, 2]
+        size, nq, nv = feeds[n, 3], feeds[n, 4], feeds[n, 5]
+        first, last = slot + nq, slot + nq + nv * STYLUS_TANGENT
+        pose, jacobian = memory[slot:first], memory[first:last].reshape((nv, STYLUS_TANGENT))
+        evaluate_map_jacobian(units, kind, params[at : at + size], stylus, memory[last:], pose, jacobian)

@@ -1,0 +1,131 @@
+"""Haptic maps that a run can have, one dataclass for each kind."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.config.part import above, part
+
+
+@part
+class Circle:
+    """The default curve: a circle about the vertical axis of the hand frame.
+
+    Parameters
+    ----------
+    lap : float
+        Time of a lap [s].
+    radius : float
+        [m]
+    """
+
+    lap: float = above(0.0, default=4.0, unit="s")
+    radius: float = above(0.0, default=0.0477, unit="m")
+
+
+@part
+class Cylindrical:
+    """Four clips at the corners of a cylinder: the angle is the frame, radius and height blend.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        Inner low, outer low, inner high, outer high: names of embedded clips, or motion files; fewer are repeated.
+    around : Circle
+        The curve.
+    reach : float
+        Half width of the map's domain about the curve, in radius and in height [m].
+    expressive : bool
+        Whether the figure looks where the stylus points, and leans as it leans.
+    """
+
+    kind: Literal["cylindrical"] = "cylindrical"
+    clips: tuple[str, ...] = ("squat_dance", "cheer", "angry", "spin")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
+    expressive: bool = False
+
+
+@part
+class Composite:
+    """The lower body of one clip, the upper body blended between two.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        Lower body, upper body inside, upper body outside; fewer are repeated.
+    around, reach, expressive
+        As in `Cylindrical`.
+    """
+
+    kind: Literal["composite"] = "composite"
+    clips: tuple[str, ...] = ("squat_dance", "angry", "cheer")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
+    expressive: bool = False
+
+
+@part
+class RiverClips:
+    """A clip for each of the three rivers.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        Of the level river, the wave, and the high one; fewer are repeated.
+    around, reach, expressive
+        As in `Cylindrical`.
+    """
+
+    kind: Literal["rivers"] = "rivers"
+    clips: tuple[str, ...] = ("squat_dance", "cheer", "angry")
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
+    expressive: bool = False
+
+
+@part
+class MapFile:
+    """A map from a file, with clips of its own, such as one that was lifted.
+
+    Parameters
+    ----------
+    file : str
+        The file (.npz).
+    curve : str
+        Of a lifted map, the curve that the run begins on, and that a single one follows: a clip's name or number; by
+        default the first. It is timed by the clip.
+    around, reach, expressive
+        As in `Cylindrical`, for a map that has no curves of its own.
+    """
+
+    kind: Literal["file"] = "file"
+    file: str
+    curve: str = ""
+    around: Circle = Circle()
+    reach: float = above(0.0, default=0.025, unit="m")
+    expressive: bool = False
+
+    @property
+    def clips(self) -> tuple[str, ...]:
+        """None by name: those of the file count."""
+        return ()
+
+
+@part
+class Led:
+    """The clip of a figure that is led.
+
+    Parameters
+    ----------
+    clips : tuple of str
+        One clip that travels.
+    """
+
+    kind: Literal["led"] = "led"
+    clips: tuple[str, ...] = ("walk",)
+
+
+Map = Annotated[Cylindrical | Composite | RiverClips | MapFile | Led, Field(discriminator="kind")]
+MAPS = (Cylindrical, Composite, RiverClips, MapFile)
+MAP_SUFFIX = ".npz"

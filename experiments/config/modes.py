@@ -1,0 +1,219 @@
+"""Fields of force that a run can have, one dataclass for each mode."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.config.part import above, at_least, part
+
+
+@part
+class OrientationMoment:
+    """Moment that turns the stylus as the curve is turned.
+
+    Parameters
+    ----------
+    orientation_stiffness : float
+        [N m/rad]
+    orientation_damping : float
+        [N m s/rad]
+    """
+
+    orientation_stiffness: float = at_least(0.0, default=0.0, unit="N m/rad")
+    orientation_damping: float = at_least(0.0, default=0.0, unit="N m s/rad")
+
+
+@part
+class SpeedGovernor:
+    """Force on a hand that goes too slowly or too fast for the flights of the animation; rivers are gated instead.
+
+    Parameters
+    ----------
+    governor_drag : float
+        Of the hand's speed beyond what is admissible [N s/m].
+    """
+
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m")
+
+
+@part
+class JointWalls:
+    """Limits of the figure's joints, and of their speeds, that the hand feels.
+
+    Parameters
+    ----------
+    wall_stiffness : float
+        Of a joint beyond its limit [N m/rad].
+    wall_margin : float
+        Before a limit, where the wall begins [rad].
+    joint_speed : float
+        Greatest speed of a joint without resistance [rad/s].
+    """
+
+    wall_stiffness: float = at_least(0.0, default=0.1, unit="N m/rad")
+    wall_margin: float = at_least(1e-6, default=0.09, unit="rad")
+    joint_speed: float = at_least(1e-6, default=20.0, unit="rad/s", infinite=True)
+
+
+@part
+class Follow:
+    """A spring to the curve and a damper to its tangent velocity.
+
+    Parameters
+    ----------
+    stiffness : float
+        k_r [N/m].
+    damping : float
+        b_d [N s/m].
+    tube : float
+        ε, beyond which the field ends [m].
+    orientation, governor, walls
+        What is added, if anything.
+    """
+
+    kind: Literal["follow"] = "follow"
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
+    orientation: OrientationMoment | None = None
+    governor: SpeedGovernor | None = None
+    walls: JointWalls | None = None
+
+
+@part
+class Bunny:
+    """An attractor that runs along the curve, felt only near it.
+
+    Parameters
+    ----------
+    stiffness : float
+        k_r [N/m].
+    damping : float
+        b_d [N s/m].
+    bunny_width : float
+        δ of its Gaussian [m].
+    bunny_attraction : {"point", "along"}
+        To the bunny itself, or to the curve beside the hand.
+    bunny_pace : {"clock", "wait"}
+        Whether it keeps the clock's pace, or waits for the hand.
+    orientation, governor, walls
+        What is added, if anything.
+    """
+
+    kind: Literal["bunny"] = "bunny"
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    bunny_width: float = at_least(1e-4, default=0.05, unit="m")
+    bunny_attraction: Literal["point", "along"] = "point"
+    bunny_pace: Literal["clock", "wait"] = "wait"
+    orientation: OrientationMoment | None = None
+    governor: SpeedGovernor | None = None
+    walls: JointWalls | None = None
+
+
+@part
+class Rivers:
+    """Several crossing rivers, of which one has the hand.
+
+    Parameters
+    ----------
+    stiffness : float, optional
+        k_r [N/m]; by default 150, softer than one curve alone, so that a push takes a hand over into another river
+        before it throws it out of all; 50 on a map from a file, whose rivers lie side by side.
+    damping : float, optional
+        b_d [N s/m]; by default 16, and 20 on a map from a file.
+    river_tube : float
+        ε of each river [m].
+    crossing : {"smooth", "discrete", "sum"}
+        How rivers share a hand where they cross.
+    orientation, governor, walls
+        What is added, if anything.
+    """
+
+    kind: Literal["rivers"] = "rivers"
+    stiffness: float | None = above(0.0, default=None, unit="N/m")
+    damping: float | None = above(0.0, default=None, unit="N s/m")
+    river_tube: float = at_least(1e-4, default=0.015, unit="m")
+    crossing: Literal["smooth", "discrete", "sum"] = "discrete"
+    orientation: OrientationMoment | None = None
+    governor: SpeedGovernor | None = None
+    walls: JointWalls | None = None
+
+
+@part
+class Stretch:
+    """A curve that is sought, taken hold of and bent like rubber.
+
+    Parameters
+    ----------
+    seek : float, optional
+        k_f, with which the tube draws the hand to the curve [N/m]; by default 150, and 50 on a map from a file.
+    rubber : float
+        k_s of a held or pushed tube [N/m].
+    tube_damping : float, optional
+        Of the search and of the tube [N s/m]; by default 14, and 20 on a map from a file.
+    rubber_tube : float
+        Radius of the tube that can be held and pushed [m].
+    bump : float
+        Half width of what a bend changes [s], at most half a lap.
+    walls
+        What is added, if anything.
+    """
+
+    kind: Literal["stretch"] = "stretch"
+    seek: float | None = at_least(0.0, default=None, unit="N/m")
+    rubber: float = at_least(0.0, default=150.0, unit="N/m")
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
+    bump: float = above(0.0, default=0.5, unit="s")
+    walls: JointWalls | None = None
+
+
+@part
+class StretchThenFollow:
+    """A curve that is bent, and performed by FOLLOW when the hand has done with it.
+
+    Parameters
+    ----------
+    seek, rubber, tube_damping, rubber_tube, bump
+        As in `Stretch`.
+    stiffness, damping, tube
+        Of the performance, as in `Follow`.
+    walls
+        What is added, if anything.
+    """
+
+    kind: Literal["stretch-then-follow"] = "stretch-then-follow"
+    seek: float | None = at_least(0.0, default=None, unit="N/m")
+    rubber: float = at_least(0.0, default=150.0, unit="N/m")
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
+    bump: float = above(0.0, default=0.5, unit="s")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
+    walls: JointWalls | None = None
+
+
+@part
+class Lead:
+    """The stylus leads a walking figure.
+
+    Parameters
+    ----------
+    leash : float
+        k_l, of the force that keeps the hand from running ahead [N/m].
+    damping : float
+        Of the hand [N s/m].
+    floor_scale : float, optional
+        Metres of floor for one of the stylus; by default such that the figure goes along the default S in 5 s.
+    """
+
+    kind: Literal["lead"] = "lead"
+    leash: float = at_least(0.0, default=120.0, unit="N/m")
+    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    floor_scale: float | None = at_least(1e-3, default=None)
+
+
+Mode = Annotated[Follow | Bunny | Rivers | Stretch | StretchThenFollow | Lead, Field(discriminator="kind")]
+MODES = (Follow, Bunny, Rivers, Stretch, StretchThenFollow, Lead)

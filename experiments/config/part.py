@@ -1,0 +1,145 @@
+"""What parts of a configuration are made of: frozen dataclasses, checked when they are made, by pydantic.
+
+A part is given by keyword. One that is wrong raises `ParameterError`: the option, its value, what would be right.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar, cast, dataclass_transform, get_args
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as checked_dataclass
+
+from controllers.errors import ParameterError
+
+_Part = TypeVar("_Part")
+_CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
+
+
+def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False) -> Any:
+    """Number of a part that is `least` or more, by default finite; `unit` is for messages.
+
+    Without a default it stands in the annotation, where the command line is to find the default itself.
+    """
+    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
+
+
+def whole(least: int, *, default: Any = ...) -> Any:
+    """Whole number of a part from `least` on, within what a file's 64 bits hold."""
+    return Field(default=default, ge=least, lt=2**63)
+
+
+def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
+    """Number of a part that is greater than `least`, and finite."""
+    return Field(default=default, gt=least, allow_inf_nan=False, json_schema_extra={"unit": unit})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
+def part(cls: type[_Part]) -> type[_Part]:
+    """Make a class a part of a configuration."""
+    made = cast(Any, checked_dataclass(config=_CONFIG, frozen=True, kw_only=True)(cls))  # pyright: ignore
+    init = made.__init__
+
+    def __init__(self: object, *arguments: Any, **values: Any) -> None:
+        try:
+            init(self, *arguments, **values)
+        except ValidationError as error:
+            raise ParameterError(one_line(error, made)) from None
+
+    made.__init__ = __init__
+    return cast(type[_Part], made)
+
+
+def to_json(value: object) -> str:
+    """A part as JSON text."""
+    return TypeAdapter(type(value)).dump_json(value, indent=2).decode() + "\n"  # pyright: ignore
+
+
+def to_dict(value: object) -> dict[str, object]:
+    """A part as nested dictionaries and lists."""
+    return TypeAdapter(type(value)).dump_python(value, mode="python")  # pyright: ignore
+
+
+def from_json(cls: type[_Part], text: str | bytes, where: str) -> _Part:
+    """A part from JSON text.
+
+    Raises
+    ------
+    ParameterError
+        If it is not one; the message begins with `where`.
+    """
+    try:
+        return TypeAdapter(cls).validate_json(text)
+    except ValidationError as error:
+        raise ParameterError(f"{where}: {one_line(error, cls)}") from None
+
+
+def from_dict(cls: type[_Part], values: Mapping[str, object], where: str) -> _Part:
+    """A part from nested dictionaries, as `from_json`."""
+    try:
+        return TypeAdapter(cls).validate_python(values)
+    except ValidationError as error:
+        raise ParameterError(f"{where}: {one_line(error, cls)}") from None
+
+
+def one_line(error: ValidationError, cls: type) -> str:
+    """The first thing that is wrong, in one line: option, value, and what would be right."""
+    first = error.errors(include_url=False)[0]
+    place, kind, context = first["loc"], first["type"], first.get("ctx", {})
+    names = [str(name) for name in place if not isinstance(name, int)]
+    option = "--" + names[-1].replace("_", "-") if names else cls.__name__
+    unit = _unit(cls, place)
+    finite = ", and finite"
+    if kind in ("greater_than_equal", "greater_than", "finite_number"):
+        least = context.get("ge", context.get("gt"))
+        field = _field(cls, place)
+        if least is None and field is not None:
+            least = next((getattr(m, a) for m in field.metadata for a in ("ge", "gt") if hasattr(m, a)), None)
+        opens = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
+        bound = f"more than {least:g}{unit}" if opens else f"{least:g}{unit} or more"
+        infinite = field is not None and any(getattr(m, "allow_inf_nan", None) is True for m in field.metadata)
+        return f"{option} is {float(first['input']):g}; expected {bound}{'' if infinite else finite}"
+    if kind in ("unexpected_keyword_argument", "extra_forbidden", "unexpected_positional_argument"):
+        within = _within(cls, place[:-1])
+        known = ", ".join(field.name for field in fields(cast(Any, within)))
+        return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
+    if kind == "less_than":
+        return f"{option} is {first['input']}; expected less than {context['lt']}"
+    if kind == "literal_error":
+        return f"{option} is {first['input']!r}; expected {context['expected']}"
+    if kind == "union_tag_invalid":
+        return f"{'.'.join(names)} is of kind {context['tag']!r}; expected {context['expected_tags']}"
+    if kind == "json_invalid":
+        return f"is not JSON ({context['error']}); expected a configuration"
+    where = ".".join(map(str, place))
+    if kind in ("missing", "missing_argument"):
+        return f"{where} is missing"
+    return f"{where or cls.__name__} is {first['input']!r}; {first['msg'][0].lower()}{first['msg'][1:]}"
+
+
+def _field(cls: type, place: Sequence[str | int]) -> Any:
+    """Pydantic's field at a place of a part; None where there is none."""
+    for depth in reversed(range(len(place))):
+        table = getattr(_within(cls, place[:depth]), "__pydantic_fields__", {})
+        if place[depth] in table:
+            return table[place[depth]]
+    return None
+
+
+def _within(cls: type, place: Sequence[str | int]) -> type:
+    """The part that is at a place of another."""
+    for name in place:
+        table = getattr(cls, "__pydantic_fields__", {})
+        if name in table:
+            cls = table[name].annotation
+        # In a union the kind of the member, or its name, stands in the place.
+        cls = next((m for m in get_args(cls) if name in (getattr(m, "kind", None), getattr(m, "__name__", ""))), cls)
+        members = [m for m in get_args(cls) if m is not type(None)]
+        cls = members[0] if len(members) == 1 else cls
+    return cls
+
+
+def _unit(cls: type, place: Sequence[str | int]) -> str:
+    field = _field(cls, place)
+    unit = (field.json_schema_extra or {}).get("unit", "") if field is not None else ""
+    return f" {unit}" if unit else ""

@@ -1,0 +1,276 @@
+"""A run in words: the flat options of the command line, made from the parts of a configuration and sorted into them.
+
+Each field of a part is an option of the same name. An option that is given and does not belong to the parts that are
+chosen is refused by name: nothing is ignored.
+"""
+
+import types
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields, make_dataclass
+from pathlib import Path
+from typing import Annotated, Any, Union, cast, get_args, get_origin, get_type_hints
+
+import docstring_parser
+import tyro
+
+from controllers.errors import ParameterError
+from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
+from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
+from experiments.config.run_config import Clock, Figure, Phantom, RunConfig, User, load_config
+
+ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
+"""Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
+_SWITCHES = ("governor", "walls")
+_USERS = ("relaxed", "trace", "push", "turn")
+_NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
+
+
+@dataclass(frozen=True)
+class Word:
+    """An option: its type, what it means, and the parts that it belongs to."""
+
+    hint: Any
+    help: str
+    parts: tuple[type, ...]
+
+
+def _parameters(cls: type) -> dict[str, str]:
+    """What the parameters of a part mean, by name, from its docstring."""
+    described = docstring_parser.parse(cls.__doc__ or "")
+    found: dict[str, str] = {}
+    for parameter in described.params:
+        for name in parameter.arg_name.split(", "):
+            found[name] = " ".join((parameter.description or "").split())
+    return found
+
+
+def _vocabulary() -> dict[str, Word]:
+    """All options by name."""
+    words: dict[str, Word] = {}
+    for cls in (*MODES, *ADDED.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
+        hints, help_of = get_type_hints(cls), _parameters(cls)
+        for option in fields(cast(Any, cls)):
+            if option.name in _NOT_WORDS:
+                continue
+            default = cast(Any, cls).__pydantic_fields__[option.name].default
+            said = help_of.get(option.name, "")
+            known = words.get(option.name)
+            if known is None:
+                shown = f" Default: {_shown(default)}." if default not in (None, "", False) else ""
+                words[option.name] = Word(_plain(hints[option.name]), said + shown, (cls,))
+            else:
+                words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
+    return words
+
+
+def _shown(default: object) -> str:
+    return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
+
+
+def _plain(hint: Any) -> Any:
+    """The type of a word that need not be given."""
+    if get_origin(hint) in (Union, types.UnionType):
+        hint = next(inner for inner in get_args(hint) if inner is not type(None))
+    return hint if hint is bool or get_origin(hint) is tuple else hint | None
+
+
+VOCABULARY = _vocabulary()
+
+
+def run_config(mode: str = "follow", map: str = "", user: str = "", **words: object) -> RunConfig:
+    """A run in words, as the command line takes them.
+
+    Parameters
+    ----------
+    mode : str
+        Kind of one of `experiments.config.modes`.
+    map : str
+        Kind of one of `experiments.config.maps`, or a map's file (.npz); by default "cylindrical".
+    user : str
+        What the hand does; by default it is relaxed.
+    **words
+        Fields of the parts by name, and `seconds`, `seed`, `pushes`, `turns`, `grabs`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such mode, map or word, a word does not belong to what is chosen, or a number is out of its
+        interval.
+    """
+    given = dict(words)
+    mode_cls = _named("mode", mode, MODES)
+    if mode == "lead":
+        wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
+        if wrong:
+            raise ParameterError(
+                f"in the mode lead the map is the led figure's and the hand leads; leave out {', '.join(wrong)}"
+            )
+        map_cls, user = Led, "lead"
+    elif map.endswith(MAP_SUFFIX):
+        map_cls = MapFile
+        given["file"] = map
+    else:
+        map_cls = _named("map", map or "cylindrical", tuple(cls for cls in MAPS if cls is not MapFile))
+    if mode != "lead" and user and user not in _USERS:
+        raise ParameterError(f"no user {user!r}; there are {', '.join(_USERS)}")
+    if not given.get("clips", True):
+        del given["clips"]
+    taken = _Words(given, f"--mode {mode}" + (f" --map {map}" if map else ""))
+    mode_part = mode_cls(**taken.added(mode_cls), **taken.of(mode_cls))
+    around = {"around": Circle(**taken.of(Circle))} if "around" in _names(map_cls) else {}
+    config = RunConfig(
+        mode=mode_part,  # pyright: ignore[reportArgumentType]
+        map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
+        user=User(does=user or "relaxed", **taken.of(User)),  # pyright: ignore[reportArgumentType]
+        figure=Figure(**taken.of(Figure)), device=Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
+        **taken.of(RunConfig, ("seconds", "seed")),
+    )  # fmt: skip
+    taken.check_empty()
+    return config
+
+
+def _named(what: str, name: str, parts: tuple[type, ...]) -> Any:
+    kinds = _kinds(parts)
+    if name not in kinds:
+        known = ", ".join(kinds)
+        raise ParameterError(f"no {what} {name!r}; there are {known}" + (", or give a file (.npz)" * (what == "map")))
+    return kinds[name]
+
+
+def _kinds(parts: tuple[type, ...]) -> dict[str, type]:
+    return {cast(Any, cls).__pydantic_fields__["kind"].default: cls for cls in parts}
+
+
+def _names(cls: type) -> set[str]:
+    return {option.name for option in fields(cast(Any, cls))} - {"kind"}
+
+
+class _Words:
+    """Words that are given, as they are taken by the parts they belong to."""
+
+    def __init__(self, given: dict[str, object], chosen: str):
+        self._given, self._chosen = given, chosen
+
+    def of(self, cls: type, names: Iterable[str] = ()) -> dict[str, Any]:
+        """Take those of a part, or of some of its names."""
+        return {name: self._given.pop(name) for name in sorted(names or _names(cls)) if name in self._given}
+
+    def added(self, mode: type) -> dict[str, Any]:
+        """Take the parts that are added to a mode."""
+        found: dict[str, Any] = {}
+        for name, cls in ADDED.items():
+            if name not in _names(mode):
+                continue
+            switched = bool(self._given.pop(name, False))
+            if switched or (name not in _SWITCHES and _names(cls) & self._given.keys()):
+                found[name] = cast(Any, cls)(**self.of(cls))
+        return found
+
+    def check_empty(self) -> None:
+        """Refuse what no part has taken."""
+        left = {name: value for name, value in self._given.items() if value is not False}
+        if not left:
+            return
+        name = next(iter(left))
+        owners = [_kind(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
+        if name in ADDED:
+            owners = [_kind(cls) for cls in MODES if name in _names(cls)]
+        option = "--" + name.replace("_", "-")
+        if not owners:
+            raise ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
+        raise ParameterError(f"{option} has no meaning with {self._chosen}; it belongs to {', '.join(owners)}")
+
+
+def _kind(cls: type) -> str:
+    """How a part is chosen on the command line."""
+    added = next((name for name, part in ADDED.items() if part is cls), None)
+    if added in _SWITCHES:
+        return f"--{added}"
+    if added is not None:
+        return ", ".join(_kind(mode) for mode in MODES if added in _names(mode))
+    kind = cast(Any, cls).__pydantic_fields__.get("kind")
+    what = "--map" if cls in MAPS else "--mode"
+    if cls is MapFile:
+        return "--map FILE.npz"
+    if cls is Circle:
+        return "maps about a circle"
+    return f"{what} {kind.default}" if kind is not None and cls is not Led else "--mode lead"
+
+
+def _options() -> Iterator[tuple[str, Any, Any]]:
+    """Fields of the options' dataclass."""
+
+    def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
+        return name, Annotated[kind, tyro.conf.arg(help=text, help_behavior_hint="")], field(default=default)
+
+    top = _parameters(RunConfig)
+    yield option("config", Path | None, "A configuration in a JSON file; other options change it.", None)
+    yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
+    yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
+    yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + ".", "")
+    yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)
+    yield option("seed", int | None, top["seed"] + " Default: 1.", None)
+    for name in _SWITCHES:
+        yield option(name, bool, (ADDED[name].__doc__ or "").strip().split("\n")[0], False)
+    for name, word in VOCABULARY.items():
+        yield option(name, word.hint, word.help, () if name == "clips" else False if word.hint is bool else None)
+
+
+RunOptions = make_dataclass("RunOptions", list(_options()), frozen=True)
+"""The options of a run as the command line takes them; all but those of its parts are left out."""
+
+
+def config_of_options(options: object) -> RunConfig:
+    """The configuration that options ask for; those that are given change the one of ``--config``.
+
+    Raises
+    ------
+    ParameterError, SimError
+        As `run_config`, or if the file holds no configuration.
+    """
+    given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
+    # A zero is given, although it equals False.
+    given = {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
+    file = given.pop("config", None)
+    return run_config(**given) if file is None else changed(load_config(cast(Path, file)), given)
+
+
+def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
+    """A configuration with some of its words changed; a mode or a map of another kind begins with its own defaults.
+
+    Raises
+    ------
+    ParameterError
+        As `run_config`.
+    """
+    kept, left = words_of(config), set[str]()
+    kinds = str(words.get("mode", config.mode.kind)), str(words.get("map", kept.get("map", "")))
+    leads = (kinds[0] == "lead") != (config.mode.kind == "lead")
+    if kinds[0] != config.mode.kind:
+        left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
+    if leads or ("file" if kinds[1].endswith(MAP_SUFFIX) else kinds[1]) != config.map.kind:
+        left |= _names(type(config.map)) | _names(Circle) | {"map"}
+    if leads:
+        left |= {"user"}
+    kept = {name: value for name, value in kept.items() if name not in left}
+    return run_config(**(kept | dict(words)))  # pyright: ignore[reportArgumentType]
+
+
+def words_of(config: RunConfig) -> dict[str, object]:
+    """A configuration in words: the inverse of `run_config`."""
+    words: dict[str, object] = {"seconds": config.seconds, "seed": config.seed, "mode": config.mode.kind}
+    led = config.mode.kind == "lead"
+    if not led:
+        words |= {"map": config.map.kind, "user": config.user.does}
+    for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
+        words |= {name: getattr(part, name) for name in _names(type(part)) - {"does", "file", *ADDED, "around"}}
+    for name, cls in ADDED.items():
+        part = getattr(config.mode, name, None)
+        if part is not None:
+            words |= {word: getattr(part, word) for word in _names(cls)} | ({name: True} if name in _SWITCHES else {})
+    if isinstance(config.map, MapFile):
+        words["map"] = config.map.file
+    around = getattr(config.map, "around", None)
+    if around is not None:
+        words |= {"lap": around.lap, "radius": around.radius}
+    return words

@@ -1,0 +1,62 @@
+"""Certificates in files: read, and checked against what they are of, without CasADi."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+from controllers.certificates.flight.tolerance import Judging
+from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
+from models.mocap.clip import Clip
+from sim.compilation.compiled import source_hash
+
+
+def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
+    """All that the verdicts on a clip depend on, by name, for `hash_of`."""
+    return {"clip": (clip.fps, clip.poses), "judging": judging, "code": code_inputs()}
+
+
+def code_inputs() -> list[object]:
+    """Hashes of the code that verdicts depend on, and versions of the libraries."""
+    experiments = Path(__file__).parents[1]
+    makers = sorted(path for room in ("certify", "flights", "setups") for path in (experiments / room).glob("*.py"))
+    return [
+        source_hash(),
+        [hashlib.sha256(file.read_bytes()).hexdigest() for file in makers],
+        [version(library) for library in ("casadi", "numpy", "scipy")],
+    ]
+
+
+def read_certificate(file: Path) -> Certificate:
+    """Certificate of a file.
+
+    Raises
+    ------
+    CertificateError
+        If it holds none.
+    """
+    try:
+        return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise CertificateError(f"{file}: cannot be opened ({error.strerror}); expected a certificate.json") from None
+    except (ValueError, RecursionError) as error:
+        raise CertificateError(f"{file}: {error}") from None
+
+
+def verify_certificate(file: Path, inputs: Mapping[str, object]) -> Certificate:
+    """The certificate of a file, if it is of these inputs: `certificate_inputs` or `clip_inputs`.
+
+    Raises
+    ------
+    CertificateError
+        If the file holds none.
+    ChangedInputs
+        If any input differs; the message says which.
+    """
+    certificate = read_certificate(file)
+    try:
+        certificate.check(inputs)
+    except ChangedInputs as error:
+        raise ChangedInputs(f"{file}: {error}") from None
+    return certificate

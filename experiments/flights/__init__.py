@@ -1,0 +1,1 @@
+"""Flights of clips: judged, flown by the physical figure, repaired."""

@@ -1,0 +1,52 @@
+"""The folder of a run: what lies in it, and what a recording says of its configuration."""
+
+import shutil
+from pathlib import Path
+
+from controllers.errors import ParameterError
+from experiments.config.part import from_dict
+from experiments.config.run_config import RunConfig
+from experiments.files.curve_files import CURVE_FILE
+from models.mocap.clip import Clip
+from sim.errors import SimError
+from sim.recording.recording import Recording
+
+RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
+EDITED, DEFAULT, FIGURES = "edited.bvh", "default.bvh", "figures"
+
+
+def check_folder(out: Path, overwrite: bool) -> None:
+    """Refuse a folder that cannot be written, or whose run may not be replaced."""
+    if out.exists() and not out.is_dir():
+        raise SimError(f"{out}: is a file; expected a folder to write the run into")
+    if (out / RECORDING).exists() and not overwrite:
+        raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
+
+
+def clear_folder(out: Path) -> None:
+    """Make the folder, and remove what an earlier run left in it; other files stay."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE):
+        (out / name).unlink(missing_ok=True)
+    shutil.rmtree(out / FIGURES, ignore_errors=True)
+
+
+def config_of(recording: Recording) -> RunConfig:
+    """The configuration of a recording.
+
+    Raises
+    ------
+    SimError
+        If it is of another version of the program.
+    """
+    try:
+        return from_dict(RunConfig, recording.config, "the recording's configuration")
+    except ParameterError as error:
+        raise SimError(f"{error}; it was recorded by another version of the program, which can run it again") from None
+
+
+def clips_of(recording: Recording) -> tuple[Clip, ...]:
+    """The clips of a recording, as they were on the figure."""
+    names = recording.texts["clip_names"].split("\n")
+    rates = recording.array("clip_fps")
+    return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))

@@ -1,0 +1,47 @@
+"""The animation of a run's curve as it was given, beside which the edited one is held."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.state import Array
+from experiments.setups.figure_legs import packed_legs
+from experiments.setups.session import Session
+from experiments.setups.stylus import stylus_path
+from sim.reference.reference import make_reference, poses_along, reference_along
+
+
+def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
+    """The map at nearest points (k, 3) of phases (k,) on rivers (k,), as a function from these to poses.
+
+    Called with rows in the order of time, `stride` figure updates apart.
+    """
+    if session.parts.maps.plays_rivers:
+        return _clips_of_rivers(session, stride)
+    kind, params, memory = session.haptic_map.compiled()
+    if session.parts.walker is not None:
+        memory = session.parts.walker(session.servo.field.memory).path.copy()
+
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
+        poses = np.empty((len(nearest), session.haptic_map.nq))
+        poses_along(kind, params, memory, session.parts.argument_at(nearest, phases), poses)
+        return poses
+
+    return poses_at
+
+
+def _clips_of_rivers(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
+    """Likewise where rivers play clips, which go over into each other as they did for the figure."""
+    period = stride * session.servo.figure_ticks * session.servo.plant.period
+    compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.figure
+    reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))
+
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
+        traces = np.zeros((len(nearest), TRACE_SIZE))
+        traces[:, TRACE_PHASE], traces[:, TRACE_RIVER] = phases, rivers
+        poses = np.empty((len(nearest), session.haptic_map.nq))
+        reference_along(reference, stylus_path(nearest), traces, poses)
+        return poses
+
+    return poses_at

@@ -1,0 +1,133 @@
+"""Crossing rivers as a run: the default three about a circle, or those of a lifted map."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.law import Law
+from controllers.fields.river import River
+from controllers.safety.energy_tank import river_power
+from experiments.config.modes import Rivers
+from experiments.config.run_config import RunConfig
+from experiments.setups.budget import fastest
+from experiments.setups.certified_law import CertifiedLaw
+from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
+from experiments.setups.governor import governed, speeds_along
+from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
+
+# Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
+# at a right angle is not: it is √2 from it.
+ADMISSION, HYSTERESIS = 1.2, 0.15
+BESIDE = 0.05  # the hysteresis of rivers side by side, as a map's own are: places tell them apart, not directions
+# Smooth, σ says up to which angle rivers are blended, and a blend of tubes that part throws the hand out of both: with
+# 0.05 it ends at 20°, before the middle leaves the tubes.
+SIGMA = {"discrete": 0.15, "smooth": 0.05}
+# Encoders make 10 mm/s of noise, which is more than the smooth form's σ; the discrete one has its hysteresis.
+LOOK = {"discrete": 0.0, "smooth": 8e-3}
+GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
+WAVE = 0.6  # height of the wave, of the map's half width
+GAINS = {"default": (150.0, 16.0), "file": (50.0, 20.0)}
+"""k_r [N/m] and b_d [N s/m] of the rivers about a circle, and of a map from a file."""
+# Those of a map lie side by side: a hand that goes over from one to the other is drawn within τ = b_d/k_r, or the
+# figure would have to be at the other clip's speed at once.
+
+
+def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "rivers"."""
+    stiffness, damping = gains(mode)
+    course, choice, urged = maps.course(damping), maps.rivers(mode), 0.0
+    if mode.governor is not None and mode.crossing != "sum":
+        law = law_of(mode, gated(choice, maps), GATE)
+    else:
+        law, urged = governed(mode.governor, law_of(mode, choice), course, maps)
+    bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
+    power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
+    springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
+    notes = Notes(mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
+    pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
+    field = FixedField(law, course, power, springs, notes, urged, pushes=pushes)
+    return fixed_curve_parts(config, mode, maps, field)
+
+
+def rivers_laws(mode: Rivers) -> dict[str, CertifiedLaw]:
+    """What is certified of each of them.
+
+    Raises
+    ------
+    ParameterError
+        If they are governed.
+    """
+    if mode.governor is not None:
+        raise ParameterError("rivers are certified without --governor")
+    return {"": CertifiedLaw("follow", *gains(mode), mode.river_tube)}
+
+
+def gains(mode: Rivers) -> tuple[float, float]:
+    """k_r [N/m] and b_d [N s/m], by default those of rivers about a circle."""
+    stiffness, damping = GAINS["default"]
+    return mode.stiffness or stiffness, mode.damping or damping
+
+
+def river_time(mode: Rivers) -> float:
+    """τ = b_d / k_r of a river [s]."""
+    stiffness, damping = gains(mode)
+    return damping / stiffness
+
+
+def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
+    """Law of rivers: their sum, or of higher order."""
+    bundle, pace, hysteresis = choice
+    if mode.crossing == "sum":
+        return bundle
+    return HigherOrder(
+        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis * pace, mode.crossing, LOOK[mode.crossing]
+    )
+
+
+def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
+    """The same rivers, each with the speeds that the flights of its animation admit."""
+    rivers = tuple(
+        replace(river, speeds=speeds_along(maps.haptic_map, river.curve, i))
+        for i, river in enumerate(choice.bundle.rivers)
+    )
+    return choice._replace(bundle=replace(choice.bundle, rivers=rivers))
+
+
+def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice:
+    """The default rivers about a curve (`river_bundle`), told apart by its mean speed."""
+    bundle = river_bundle(curve, reach, river_time(mode), gains(mode)[1], mode.river_tube)
+    return RiverChoice(bundle, curve.length / curve.duration, HYSTERESIS)
+
+
+def drawn(bundle: RiverBundle) -> Static:
+    """Names and curves of rivers, for figures and replays."""
+    share = np.linspace(0.0, 1.0, 241)
+    curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
+    return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
+
+
+def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:
+    """The default curve; a wave about it, up and down twice a lap; and the curve lifted to the wave's crests.
+
+    The wave crosses the first, and touches the last: there a hand can change over.
+
+    Parameters
+    ----------
+    curve : Trajectory
+        A lap about the z axis.
+    reach : float
+        Half width of the map's domain [m]; the crests are at `WAVE` times it.
+    tau, drag, epsilon : float
+        Of the rivers: τ [s], b [N s/m], ε [m].
+    """
+    times = np.linspace(curve.start, curve.end, 129)
+    level = curve.point(times)
+    level[-1] = level[0]
+    height = WAVE * reach * np.stack((np.zeros(129), np.sin(4.0 * np.pi * np.linspace(0.0, 1.0, 129)), np.ones(129)))
+    height[1, -1] = 0.0
+    curves = [Trajectory(times, level + np.outer(z, [0.0, 0.0, 1.0]), periodic=True) for z in height]
+    return RiverBundle(tuple(River(c, epsilon, tau, drag) for c in curves), ("level", "wave", "high"))

@@ -1,0 +1,264 @@
+"""A run from Python: parts that are put together, run in memory or into a folder, and looked at."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from dataclasses import replace as replaced
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from rich.console import Console
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
+from controllers.fields.law import Law
+from controllers.safety.energy_tank import EnergyTank
+from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array, HandState, Wrench
+from experiments.compiling import compile_once
+from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.run_result import Run
+from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, reached
+from experiments.setups.parts import ClipMapParts, Notes, Parts
+from experiments.setups.session import Session
+from experiments.setups.stylus import stylus_path
+from experiments.setups.wiring import assemble, check_rates, ticks_of
+from models.mocap.clip import Clip
+from models.scene import SceneConfig
+from sim.loop.loop import Loop
+from sim.users.arm import Arm
+from sim.users.intent import Grab, Push, Turn
+from sim.world.world import World
+
+_SECONDS = 1e9  # [s] a hand that traces does so as long as anybody runs it
+
+
+class FigureMap(Protocol):
+    """A haptic map of the figure, to be made for the figure of a run."""
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        ...
+
+
+@dataclass(frozen=True)
+class Cylindrical:
+    """Four clips at the corners of a cylinder: the angle is the frame, radius and height blend (the paper's Fig. 3).
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Inner low, outer low, inner high, outer high; fewer are repeated.
+    around : Trajectory
+        Curve about the z axis of H, in the middle of the map's domain.
+    reach : float
+        Half width of the domain about the curve, in radius and in height [m].
+    expressive : bool
+        Whether the figure looks where the stylus points, and leans as it leans.
+    """
+
+    clips: Sequence[Clip]
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    expressive: bool = False
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return cylindrical_parts(tuple(self.clips), _place(self), world.figure)
+
+
+@dataclass(frozen=True)
+class Composite:
+    """The lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Lower body, upper body inside, upper body outside; fewer are repeated.
+    around, reach, expressive
+        As in `Cylindrical`.
+    """
+
+    clips: Sequence[Clip]
+    around: Trajectory = field(repr=False)
+    reach: float = 0.025
+    expressive: bool = False
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return composite_parts(tuple(self.clips), _place(self), world.figure)
+
+
+def _place(part: Cylindrical | Composite) -> Place:
+    curve = reached(part.around)
+    points = curve.point(np.linspace(curve.start, curve.end, 65))
+    return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), part.reach, part.expressive)
+
+
+@dataclass(frozen=True)
+class User:
+    """The simulated hand: relaxed, or tracing, and what it does besides.
+
+    Parameters
+    ----------
+    pushes, turns, grabs : sequences of Push, Turn, Grab
+        What it does.
+    traces : Trajectory, optional
+        A curve that it means to trace, again and again.
+    """
+
+    pushes: Sequence[Push] = ()
+    turns: Sequence[Turn] = ()
+    grabs: Sequence[Grab] = ()
+    traces: Trajectory | None = field(default=None, repr=False)
+
+    def arm(self, seconds: float) -> Arm:
+        """The hand for a run of so long [s]."""
+        if self.traces is None:
+            return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+        path = self.traces.point(np.arange(0.0, seconds, 0.01))
+        return Arm(path=path, period=0.01, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+
+
+class Tick(NamedTuple):
+    """One tick of a simulation that is stepped.
+
+    Attributes
+    ----------
+    hand : HandState
+        As measured.
+    field : Wrench
+        Of the field.
+    force : Array
+        That the device was asked for, after limiter and tank, in H [N], shape (3,).
+    pose : Array
+        The animation h(p), shape (75,).
+    figure : Array
+        The figure as it is, qpos, shape (75,).
+    """
+
+    hand: HandState
+    field: Wrench
+    force: Array
+    pose: Array
+    figure: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """A hand, a field, a map and a figure, with the device and the clock: all that decides a run.
+
+    Parameters
+    ----------
+    field : Law
+        Law of force, built in, composed or one's own.
+    haptic_map : FigureMap
+        From the stylus to the figure.
+    user : User
+        The simulated hand.
+    device : Phantom
+        The device.
+    figure : Figure
+        The figure that plays the animation.
+    clock : Clock
+        The rates.
+    seed : int
+        Of where exactly the hand lets go of the stylus at the start.
+    tank : EnergyTank, optional
+        What the field may inject; by default bounded by the device's force and the curve's pace.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If the rates do not divide.
+    """
+
+    field: Law
+    haptic_map: FigureMap
+    user: User = User()
+    device: Phantom = Phantom()  # noqa: RUF009 - frozen
+    figure: Figure = Figure()  # noqa: RUF009
+    clock: Clock = Clock()  # noqa: RUF009
+    seed: int = 1
+    tank: EnergyTank | None = None
+
+    def __post_init__(self) -> None:
+        if self.figure.figure_ticks is None:
+            object.__setattr__(self, "figure", replaced(self.figure, figure_ticks=8))
+        check_rates(self)
+
+    @property
+    def scene(self) -> SceneConfig:
+        """Of the world: the figure's size and the rates."""
+        figure, clock = self.figure, self.clock
+        return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
+
+    def session(self, seconds: float = 60.0) -> Session:
+        """The simulation, wired up for at most so long [s]; compiles what it needs.
+
+        Raises
+        ------
+        ModelError, ControllerError, SimError
+            If its parts do not fit together.
+        """
+        world, console = World(self.scene), Console(stderr=True)
+        maps = self.haptic_map.parts(world)
+        return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
+
+    def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
+        limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
+        power, spring = limiter.peak * fastest(maps.curve), (np.inf, SPAN)
+        tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
+        handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
+        return Parts(
+            config=self, maps=maps, field=self.field, program=program, course=maps.curve,
+            user=self.user.arm(seconds), tank=tank, notes=Notes(maps.reach), gains=maps.gains,
+            argument_at=lambda nearest, phases: stylus_path(nearest),
+            handled=((0.0, np.inf),) if self.user.traces is not None else handled,
+        )  # fmt: skip
+
+    def run(self, seconds: float, record: str | Path | None = None, overwrite: bool = False) -> Run:
+        """Run from the start, and keep what happened.
+
+        Parameters
+        ----------
+        seconds : float
+            Simulated time [s].
+        record : path, optional
+            Folder to write recording, summary, animations, figures and page into; by default nothing is left behind.
+        overwrite : bool
+            Replace a run that the folder holds.
+
+        Raises
+        ------
+        ModelError, ControllerError, SimError
+            If the parts do not fit together, or the folder cannot be written or holds a run.
+        """
+        least = 2.0 * self.clock.servo_period * ticks_of(self)
+        if not least <= seconds < np.inf:
+            raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
+        return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
+
+    def __iter__(self) -> Iterator[Tick]:
+        """Step tick by tick, for ever: ``for tick in sim``."""
+        session = self.session()
+        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws)
+        while True:
+            ticks, frames = loop.step()
+            force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
+            yield Tick(
+                HandState.of(ticks.hand[0]), Wrench(force, torque), ticks.force[0].copy(),
+                session.servo.reference.pose.copy(), session.figure_pose(frames.qpos[0]),
+            )  # fmt: skip
+
+    def description(self) -> dict[str, object]:
+        """What it is made of, in plain data, as its recordings keep it."""
+        clips = getattr(self.haptic_map, "clips", ())
+        return {
+            "simulation": "of Python objects; the script that made it makes it again",
+            "field": self.field.description(),
+            "map": {"kind": type(self.haptic_map).__name__, "clips": [clip.name for clip in clips]},
+            "clock": {"servo_period": self.clock.servo_period, "physics_step": self.clock.physics_step},
+            "seed": self.seed,
+        }

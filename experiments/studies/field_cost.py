@@ -1,0 +1,55 @@
+"""What a tick of the heaviest field costs: ten rivers that all come near."""
+
+import time
+
+import numpy as np
+from numba import njit
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.law import Program
+from controllers.fields.program import evaluate
+from controllers.fields.river import River
+from controllers.safety.limiter import ForceLimiter, limit_force
+from controllers.state import Array, HandState, IntArray
+
+
+@njit
+def _ticks(
+    ops: IntArray, params: Array, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
+) -> float:
+    wrench, total = np.zeros(6), 0.0
+    for i in range(hands.shape[0]):
+        evaluate(ops, params, memory, hands[i], wrench)
+        limit_force(limits, limiter, wrench, force)
+        total += force[0]
+    return total
+
+
+def heaviest_field() -> tuple[Program, Array]:
+    """Ten rivers that all come near, smooth, of higher order, limited; and a lap of hands that feel them."""
+    lap = Trajectory.circle(0.05, 4.0)
+    times = np.linspace(0.0, 4.0, 129)
+    angle = 0.5 * np.pi * times
+    rivers: list[River] = []
+    for k in range(10):
+        points = lap.point(times)
+        points[:, 2] = 0.015 * np.sin((k % 3 + 1) * angle + k)
+        points[-1] = points[0]
+        rivers.append(River(Trajectory(times, points, periodic=True)))
+    bundle = RiverBundle(tuple(rivers), tuple(f"river {k}" for k in range(10)))
+    hands = np.array([HandState.at(lap.point(t), lap.velocity(t), t).vector() for t in np.arange(4000) * 1e-3])
+    return HigherOrder(bundle, 0.09, 0.025).program().limited(8.0), hands
+
+
+def tick_microseconds(program: Program, hands: Array) -> float:
+    """Mean processor time of a tick of a field with the safety limiter [µs], the best of five laps of hands."""
+    limiter, memory, best = ForceLimiter(1e-3), program.fresh_memory(), np.inf
+    heat = limiter.fresh_memory()
+    for lap in range(6):
+        rows = hands[:2] if lap == 0 else hands
+        begin = time.thread_time()
+        _ticks(program.ops, program.params, memory, limiter.limits(), heat, rows, np.zeros(3))
+        best = best if lap == 0 else min(best, time.thread_time() - begin)
+    return 1e6 * best / len(hands)

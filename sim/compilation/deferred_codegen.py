@@ -1,0 +1,235 @@
+"""numba's code generation, left to the unit: a function that only compiled code calls is not emitted by itself.
+
+numba optimises each called function, links its own callees into it, emits code for it and for a wrapper that Python
+could call, and does the same again one level up. Here a called function is typed and lowered only; the unit that is
+called from Python, or by its address, links all of them, is optimised once and emitted once. Results are the same to
+the last bit.
+
+This reaches into numba. With a version that it was not tested with, numba is left as it is: slower, not wrong.
+"""
+
+# pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
+# What is patched here is numba's own, and TESTED says of which versions.
+
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numba
+from llvmlite import ir
+from numba.core import base, codegen, cpu, dispatcher, sigutils
+from numba.core.environment import lookup_environment
+
+from sim.errors import SimError
+
+TESTED = ("0.68",)
+"""Minor versions of numba whose internals are known to be what is assumed here."""
+
+_SYMBOL = "_ZN"  # begins the names that numba gives to functions
+_ENVIRONMENT = "_ZN08NumbaEnv"  # and to the places of their constants
+
+
+class UndefinedSymbol(SimError):
+    """A compiled unit refers to a function that none of its parts defines."""
+
+
+class _NoEntry:
+    """Stands for the entry point of a function that only compiled code calls."""
+
+
+class _Depth:
+    """How many compilations the one at work is nested in, itself included; held under numba's compiler lock."""
+
+    now = 0
+
+    def __enter__(self) -> None:
+        _Depth.now += 1
+
+    def __exit__(self, *error: object) -> None:
+        _Depth.now -= 1
+
+
+_defining: "WeakValueDictionary[str, UnitLibrary]" = WeakValueDictionary()
+
+
+class UnitLibrary(codegen.JITCodeLibrary):
+    """Code of one function: emitted if the compilation began with it, else kept to be linked into what did.
+
+    Attributes
+    ----------
+    deferred : bool
+        Whether it is only to be linked.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any):
+        super().__init__(*arguments, **options)
+        self.deferred = _Depth.now > 1
+
+    def add_ir_module(self, ir_module: ir.Module) -> None:
+        """Add a module of IR; where its functions are is kept in mind, for those that refer to them by name."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                _defining[function.name] = self
+        super().add_ir_module(ir_module)
+
+    def finalize(self) -> None:
+        """Link, optimise and emit; or nothing of it."""
+        if self.deferred:
+            self._raise_if_finalized()
+            self._finalized = True
+            return
+        self._linking_libraries = _needed(self._linking_libraries)
+        super().finalize()
+        # Recursion goes by way of the address of a function, which therefore has to have one.
+        for name in referred_by_name(self._final_module):
+            if name in _defining and _defining[name].deferred:
+                _defining[name].get_pointer_to_function(name)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function; a library that was to be linked only is then emitted."""
+        if self.deferred:
+            self.deferred = self._finalized = False
+            self.finalize()
+        return super().get_pointer_to_function(name)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        if not self.deferred:
+            super()._optimize_functions(ll_module)
+            return
+        ll_module.data_layout = self._codegen._data_layout
+        # numba makes the passes anew for each function, also for those that are only declared.
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        missing = undefined_symbols(self._final_module)
+        if missing:
+            raise UndefinedSymbol(f"{self.name} refers to {', '.join(sorted(missing))}, which nothing defines")
+        super()._optimize_final_module()
+
+
+def referred_by_name(module: Any) -> list[str]:
+    """Functions that a module of LLVM calls by addresses which numba finds while it runs: those that are recursive."""
+    prefix = codegen.RuntimeLinker.PREFIX
+    return [v.name.removeprefix(prefix) for v in module.global_variables if v.name.startswith(prefix)]
+
+
+def undefined_symbols(module: Any) -> set[str]:
+    """Names of compiled functions that a module of LLVM uses and does not define."""
+    return {f.name for f in module.functions if f.is_declaration and f.name.startswith(_SYMBOL)}
+
+
+def _needed(libraries: list[Any]) -> list[Any]:
+    """Libraries and all that they need to be linked with, users first: LLVM takes only what is referred to already."""
+    order: list[Any] = []
+    seen: set[int] = set()
+
+    def visit(library: Any) -> None:
+        if id(library) not in seen:
+            seen.add(id(library))
+            if getattr(library, "deferred", False):
+                for other in reversed(library._linking_libraries):
+                    visit(other)
+            order.append(library)
+
+    for library in reversed(libraries):
+        visit(library)
+    return order[::-1]
+
+
+def is_nested() -> bool:
+    """Whether the compilation at work belongs to that of another function, whose unit it will be a part of."""
+    return _Depth.now > 0
+
+
+def install() -> bool:
+    """Leave code generation to units in this process, if this version of numba is one of those tested.
+
+    Returns
+    -------
+    bool
+        Whether it is; asked again, it says the same and does nothing.
+    """
+    if not any(numba.__version__.startswith(version + ".") for version in TESTED):
+        return False
+    kind = codegen.JITCPUCodegen
+    if kind._library_class is not UnitLibrary:
+        kind._library_class = UnitLibrary
+        _count_depth()
+        _spare_wrappers()
+        _compile_anew_for_python()
+    return True
+
+
+def _count_depth() -> None:
+    core, subroutine = dispatcher._FunctionCompiler._compile_core, base.BaseContext._compile_subroutine_no_cache
+
+    def compile_core(self: Any, *arguments: Any, **options: Any) -> Any:
+        with _Depth():
+            return core(self, *arguments, **options)
+
+    def compile_subroutine(self: Any, *arguments: Any, **options: Any) -> Any:
+        with _Depth():
+            return subroutine(self, *arguments, **options)
+
+    dispatcher._FunctionCompiler._compile_core = compile_core
+    base.BaseContext._compile_subroutine_no_cache = compile_subroutine
+
+
+def _spare_wrappers() -> None:
+    customize, executable = dispatcher._FunctionCompiler._customize_flags, cpu.CPUContext.get_executable
+    add = dispatcher._DispatcherBase.add_overload
+
+    def customize_flags(self: Any, flags: Any) -> Any:
+        flags = customize(self, flags)
+        if _Depth.now > 1:
+            flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+    def get_executable(self: Any, library: Any, fndesc: Any, env: Any) -> Any:
+        entry = _NoEntry() if _Depth.now > 1 else executable(self, library, fndesc, env)
+        if not library.deferred:
+            _set_environments(library)
+        return entry
+
+    def add_overload(self: Any, result: Any) -> None:
+        if isinstance(result.entry_point, _NoEntry):
+            self.overloads[tuple(result.signature.args)] = result
+        else:
+            add(self, result)
+
+    dispatcher._FunctionCompiler._customize_flags = customize_flags
+    cpu.CPUContext.get_executable = get_executable
+    dispatcher._DispatcherBase.add_overload = add_overload
+
+
+def _set_environments(library: UnitLibrary) -> None:
+    """Tell emitted code where the constants of all functions in it are, as numba does for code that it has cached."""
+    library._ensure_finalized()
+    for variable in library._final_module.global_variables:
+        environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
+        if environment is not None and library.codegen._engine.get_global_value_address(variable.name):
+            library.codegen.set_env(variable.name, environment)
+
+
+def _compile_anew_for_python() -> None:
+    """What has been a part of a unit is compiled once more when Python calls it, or asks for its code."""
+    compile_, result = dispatcher.Dispatcher.compile, dispatcher.Dispatcher.get_compile_result
+
+    def forget_part(self: Any, arguments: tuple[Any, ...]) -> None:
+        part = self.overloads.get(arguments)
+        if _Depth.now == 0 and part is not None and isinstance(part.entry_point, _NoEntry):
+            del self.overloads[arguments]
+
+    def compile_signature(self: Any, signature: Any) -> Any:
+        arguments, _ = sigutils.normalize_signature(signature)
+        forget_part(self, tuple(arguments))
+        return compile_(self, signature)
+
+    def get_compile_result(self: Any, signature: Any) -> Any:
+        forget_part(self, tuple(signature.args))
+        return result(self, signature)
+
+    dispatcher.Dispatcher.compile = compile_signature
+    dispatcher.Dispatcher.get_compile_result = get_compile_result

@@ -1,0 +1,155 @@
+"""Compiled units on disk, each in a file named by its key: found again as long as nothing that it is made of changes.
+
+A file is written whole under another name and then renamed, so that of several processes the last one wins and none
+reads a half; it carries a hash of its contents, and one that is cut short, changed or not understood is not believed.
+Units that nobody has asked for in a long time are removed.
+"""
+
+# pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
+# The cache of a dispatcher is not public in numba; `deferred_codegen` says of which versions this is true.
+
+import hashlib
+import os
+import pickle
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core import sigutils
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from sim.compilation.deferred_codegen import is_nested, referred_by_name
+from sim.compilation.unit_key import unit_key
+
+_SUFFIX = ".unit"
+_HASH = hashlib.sha256().digest_size
+_FORGOTTEN = 60 * 86400.0  # [s] after which a unit that was not loaded is removed
+_LOOKED_AT = 86400.0  # [s] how exactly the time of loading is kept
+
+
+def cache_folder() -> Path:
+    """Folder of compiled units: under ``HVF_CACHE_DIR``, or the user's cache folder."""
+    base = os.environ.get("HVF_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "hvf"
+
+
+class UnitCache(_Cache):
+    """The units of one function, as a dispatcher of numba's asks for them: one for each types of arguments.
+
+    Parameters
+    ----------
+    function : callable
+        As Python sees it.
+    options : dict
+        Of its compilation.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]):
+        self._function, self._options, self._enabled = function, options, True
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of all units."""
+        return str(cache_folder())
+
+    def path(self, signature: Any) -> Path:
+        """File of the unit for a signature or a tuple of types, whether it is there or not.
+
+        Raises
+        ------
+        UnknownIngredient
+            If no key can be made of it.
+        """
+        arguments: Iterable[Any] = sigutils.normalize_signature(signature)[0]
+        return cache_folder() / f"{self._name()}-{unit_key(self._function, arguments, self._options)}{_SUFFIX}"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled unit, or None."""
+        if not self._enabled or is_nested():
+            return None
+        target_context.refresh()
+        path = self.path(sig)
+        content = _read(path)
+        if content is None:
+            return None
+        try:
+            found = CompileResult._rebuild(target_context, *pickle.loads(content))
+        except Exception:  # what a file holds that is of our making and no good may raise anything
+            return None
+        _mark_used(path)
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a unit; a folder that cannot be written to is done without."""
+        if not self._enabled or is_nested():
+            return
+        if data.lifted or data.library.has_dynamic_globals or referred_by_name(data.library._final_module):
+            warnings.warn(f"{self._function.__qualname__} holds an address, so it cannot be kept", stacklevel=2)
+            return
+        content = dumps(data._reduce())
+        path = self.path(sig)
+        with suppress(OSError):
+            _write(path, content)
+            remove_forgotten(path.parent)
+
+    def enable(self) -> None:
+        """Use what is kept, and keep more."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Do neither."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Remove the units of this function, of all versions."""
+        for path in cache_folder().glob(f"{self._name()}-*{_SUFFIX}"):
+            path.unlink(missing_ok=True)
+
+    def _name(self) -> str:
+        return f"{self._function.__module__}.{self._function.__qualname__}".replace("<", "").replace(">", "")
+
+
+def is_sound(path: Path) -> bool:
+    """Whether a file is there, and whole."""
+    return _read(path) is not None
+
+
+def remove_forgotten(folder: Path, now: float | None = None) -> None:
+    """Remove the units of a folder that were neither written nor loaded for two months."""
+    now = time.time() if now is None else now
+    for path in folder.glob(f"*{_SUFFIX}*"):
+        with suppress(OSError):
+            if now - path.stat().st_mtime > _FORGOTTEN:
+                path.unlink()
+
+
+def _read(path: Path) -> bytes | None:
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    return content[_HASH:] if hashlib.sha256(content[_HASH:]).digest() == content[:_HASH] else None
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _mark_used(path: Path) -> None:
+    with suppress(OSError):
+        if time.time() - path.stat().st_mtime > _LOOKED_AT:
+            os.utime(path)

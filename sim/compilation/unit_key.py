@@ -1,0 +1,305 @@
+"""Key of a compiled unit: a hash of what its code is made of, and of nothing else.
+
+A walk from the unit's function over the globals and closures that it really names: functions by their instructions,
+constants by their value, types by their fields. Comments, docstrings, lines and folders are no part of it; so a unit is
+found again after any change that it does not depend on, and from another copy of the sources. What the walk does not
+know how to describe is an error: it might be something that the code depends on.
+"""
+
+# pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
+
+import dis
+import enum
+import hashlib
+import sys
+import types as python_types
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import mujoco
+import numba
+import numpy as np
+from numba import config, types
+from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
+from numba.core.registry import cpu_target
+
+from sim.compilation import deferred_codegen
+from sim.compilation.deferred_codegen import install
+from sim.errors import SimError
+
+Function = Callable[..., Any]
+
+# numba's settings that change the code; the others are of caches, threads and printing.
+_SETTINGS = (
+    "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS",
+    "LLVM_REFPRUNE_FLAGS", "ENABLE_AVX", "USING_SVML", "DISABLE_JIT", "USE_LEGACY_TYPE_SYSTEM",
+)  # fmt: skip
+_LITERALS = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), np.generic)
+_PLAIN_TYPES = (
+    types.Number, types.Boolean, types.NoneType, types.Omitted, types.Literal, types.Array, types.CPointer,
+    types.RawPointer, types.Record, types.UnicodeType, types.NumberClass, types.TypeRef,
+)  # fmt: skip
+
+
+class UnknownIngredient(SimError):
+    """A function refers to something of which a key cannot be made."""
+
+
+class UnknownName(SimError):
+    """A function names a global that does not exist."""
+
+
+def unit_key(function: Function, arguments: Iterable[Any], options: dict[str, Any]) -> str:
+    """Key of a function compiled for given types of arguments: 24 hex digits.
+
+    Parameters
+    ----------
+    function : callable
+        As Python sees it, not the dispatcher.
+    arguments : iterable of numba types
+        Of its arguments.
+    options : dict
+        Of its compilation, a dispatcher's `targetoptions`.
+
+    Raises
+    ------
+    UnknownIngredient
+        If something that it reaches is of an unknown kind.
+    """
+    digest = hashlib.sha256(repr((_platform(), [describe_type(argument) for argument in arguments])).encode())
+    seen: dict[int, int] = {}
+    waiting: list[tuple[Function, dict[str, Any]]] = [(function, options)]
+    # The place of a function in the walk stands for it, so two of one name are told apart.
+    while waiting:
+        reached, its_options = waiting.pop()
+        if id(reached) in seen:
+            digest.update(f"again {seen[id(reached)]};".encode())
+            continue
+        seen[id(reached)] = len(seen)
+        digest.update(repr(_items(its_options)).encode())
+        described, others = _described(reached)
+        digest.update(described)
+        waiting.extend(reversed(others))
+    return digest.hexdigest()[:24]
+
+
+def reached_functions(function: Function) -> list[Function]:
+    """All functions that are compiled into a unit of this one, itself first."""
+    found, waiting = {id(function): function}, [function]
+    while waiting:
+        for other, _ in _described(waiting.pop())[1]:
+            if id(other) not in found:
+                found[id(other)] = other
+                waiting.append(other)
+    return list(found.values())
+
+
+@cache
+def _platform() -> tuple[object, ...]:
+    """Versions, processor and settings that compiled code is for."""
+    settings = tuple((name, repr(getattr(config, name, None))) for name in _SETTINGS)
+    versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__, mujoco.__version__)
+    return versions, cpu_target.target_context.codegen().magic_tuple(), settings, _generation()
+
+
+def _generation() -> str:
+    """How code is generated: by numba as it is, or by `deferred_codegen`, of which the hash is taken."""
+    return hashlib.sha256(Path(deferred_codegen.__file__).read_bytes()).hexdigest() if install() else "numba"
+
+
+_Others = list[tuple[Function, dict[str, Any]]]
+
+
+@cache
+def _described(function: Function) -> tuple[bytes, _Others]:
+    """A function by itself, and the functions it refers to with their options, in order."""
+    others: _Others = []
+    name = f"{function.__module__}.{function.__qualname__}"
+    items: list[object] = [name, _code(function.__code__, name)]
+    items.append(_value(function.__defaults__, name, others))
+    items.append(_value(function.__kwdefaults__, name, others))
+    for free, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        items.append((free, _value(cell.cell_contents, f"{name}: {free}", others)))
+    for chain in sorted(_global_names(function.__code__)):
+        items.append((chain, _global(function, chain, others)))
+    return repr(items).encode(), others
+
+
+def _code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
+    """Instructions with what they name: not where they are written, nor a docstring, which none of them loads."""
+    instructions: list[object] = []
+    for instruction in dis.get_instructions(code):
+        value = instruction.argval
+        if isinstance(value, python_types.CodeType):
+            value = _code(value, name)
+        elif instruction.opcode in dis.hasconst:
+            assert instruction.arg is not None
+            value = _constant(code.co_consts[instruction.arg], name)
+        instructions.append((instruction.opname, instruction.arg if value is None else value))
+    table = getattr(code, "co_exceptiontable", b"")
+    counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags & ~_HAS_DOCSTRING)
+    return tuple(instructions), table, counts, code.co_varnames[: sum(counts[:3:2])]
+
+
+_HAS_DOCSTRING = 0x4000000  # a flag of code from Python 3.13 on
+
+
+def _constant(value: object, name: str) -> object:
+    if isinstance(value, tuple):
+        return tuple(_constant(item, name) for item in value)
+    if isinstance(value, frozenset):
+        return ("frozenset", sorted(repr(_constant(item, name)) for item in value))
+    return _literal(value, name)
+
+
+def _literal(value: object, name: str) -> object:
+    if isinstance(value, _LITERALS):
+        return type(value).__name__, repr(value)
+    raise UnknownIngredient(f"{name} is a {type(value).__qualname__}; expected a number, an array, a function, a type")
+
+
+def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
+    """Names of globals, each with the attributes that are taken of it one after the other."""
+    found: set[tuple[str, ...]] = set()
+    chain: tuple[str, ...] = ()
+    for instruction in dis.get_instructions(code):
+        if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            chain = (instruction.argval,)
+        elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD") and chain:
+            chain = (*chain, instruction.argval)
+        elif instruction.opname not in ("CACHE", "PUSH_NULL", "EXTENDED_ARG"):
+            found |= {chain} if chain else set()
+            chain = ()
+    for constant in code.co_consts:
+        if isinstance(constant, python_types.CodeType):
+            found |= _global_names(constant)
+    return found
+
+
+def _global(function: Function, chain: tuple[str, ...], others: _Others) -> object:
+    name = f"{function.__module__}.{function.__qualname__}: {'.'.join(chain)}"
+    if chain[0] not in function.__globals__:
+        builtins = function.__globals__["__builtins__"]
+        known = builtins if isinstance(builtins, dict) else vars(builtins)
+        if chain[0] not in known:
+            raise UnknownName(f"{name} does not exist")
+        return "builtin"
+    value = function.__globals__[chain[0]]
+    for attribute in chain[1:]:
+        # Attributes of anything but a module or a class belong to the value, which is described as a whole.
+        if not isinstance(value, python_types.ModuleType) and not _is_enumeration(value):
+            break
+        value = getattr(value, attribute)
+    return _value(value, name, others)
+
+
+def _is_enumeration(value: object) -> bool:
+    return isinstance(value, type) and issubclass(value, enum.Enum)
+
+
+def _value(value: Any, name: str, others: _Others) -> object:
+    """What a global, a closure's variable, a default or an option is, so that another one differs."""
+    if isinstance(value, Dispatcher):
+        others.append((value.py_func, value.targetoptions))
+        return "compiled function"
+    if isinstance(value, _Intrinsic):
+        others.append((value._defn, {}))
+        return "intrinsic"
+    if isinstance(value, types.ExternalFunction):
+        return "external", value.symbol, str(value.sig)
+    if isinstance(value, types.Type):
+        return "type", describe_type(value)
+    if isinstance(value, enum.Enum):
+        return "member", type(value).__qualname__, value.name, repr(value.value)
+    if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            raise UnknownIngredient(f"{name} is an array of objects; expected numbers")
+        content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+        return "array", value.dtype.str, value.shape, value.flags.c_contiguous, content
+    if isinstance(value, np.dtype):
+        return "dtype", repr(value)
+    if isinstance(value, dict):
+        return "dict", [(_value(key, name, others), _value(item, name, others)) for key, item in value.items()]
+    if isinstance(value, tuple):
+        kind = _class(type(value), name) if type(value) is not tuple else "tuple"
+        return kind, [_value(item, name, others) for item in value]
+    if isinstance(value, type):
+        return _class(value, name)
+    if _is_library(value):
+        return "library", type(value).__qualname__, str(getattr(value, "__module__", "")), _name_of(value)
+    if isinstance(value, python_types.FunctionType):
+        others.append((value, {}))
+        others.extend((template._overload_func, {}) for template in _overloads(value))
+        return "function"
+    return _literal(value, name)
+
+
+def _items(options: dict[str, Any]) -> list[object]:
+    others: _Others = []
+    described: list[object] = [(key, _value(options[key], f"option {key}", others)) for key in sorted(options)]
+    return [*described, *(f"{other.__module__}.{other.__qualname__}" for other, _ in others)]
+
+
+def _class(kind: type, name: str) -> tuple[object, ...]:
+    """A class: one of a library by its name; of ours those that compiled code can do something with."""
+    identity = (kind.__module__, kind.__qualname__)
+    fields = getattr(kind, "_fields", None)
+    if fields is not None:
+        return "named tuple", *identity, fields, repr(getattr(kind, "_field_defaults", {}))
+    if _is_library(kind) or issubclass(kind, BaseException):
+        return "class", *identity
+    raise UnknownIngredient(f"{name} is the class {kind.__qualname__}; expected a NamedTuple or an exception")
+
+
+def _is_library(value: object) -> bool:
+    """Whether something is a module, a class or a function of a library, whose version is in the key already.
+
+    An instance of a library's class is none of them, nor is a method of one: what they hold is nobody's version.
+    """
+    if isinstance(value, python_types.ModuleType):
+        name: object = value.__name__
+    elif callable(value) and _name_of(value) and isinstance(getattr(value, "__self__", None), _OF_MODULES):
+        name = getattr(value, "__module__", None) or type(value).__module__
+    else:
+        return False
+    top = str(name).split(".")[0]
+    return top in sys.stdlib_module_names - {"__main__"} or top in _LIBRARIES
+
+
+_OF_MODULES = (python_types.NoneType, python_types.ModuleType)
+_LIBRARIES = ("numpy", "numba", "llvmlite", "mujoco")
+
+
+def _name_of(value: object) -> str:
+    return str(getattr(value, "__qualname__", getattr(value, "__name__", "")))
+
+
+def _overloads(function: Function) -> Iterator[Any]:
+    """Templates by which numba compiles calls of a plain Python function."""
+    context = cpu_target.typing_context
+    context.refresh()
+    for template in getattr(context._globals.get(function), "templates", ()):
+        if hasattr(template, "_overload_func"):
+            yield template
+
+
+def describe_type(kind: Any) -> object:
+    """A type of numba's with the names of the fields of its tuples, which its own name lacks.
+
+    Raises
+    ------
+    UnknownIngredient
+        If it is of an unknown kind.
+    """
+    if isinstance(kind, types.NamedTuple | types.NamedUniTuple):
+        inner = [describe_type(field) for field in kind.types]
+        return kind.instance_class.__module__, kind.instance_class.__qualname__, kind.fields, inner
+    if isinstance(kind, types.BaseTuple):
+        return "tuple", [describe_type(item) for item in kind.types]
+    if isinstance(kind, _PLAIN_TYPES):
+        return type(kind).__name__, str(kind)
+    raise UnknownIngredient(f"the type {kind} is a {type(kind).__qualname__}; expected numbers, arrays and tuples")

@@ -1,0 +1,33 @@
+"""Which units of compiled code a servo's loop needs: said before any of them is compiled."""
+
+from numba import typeof, types
+
+from controllers.fields.law import Program
+from sim.body.drive import follow_units
+from sim.compilation.kernel_units import units_of_laws, units_of_map
+from sim.compilation.units import Unit
+from sim.loop.loop import make_logs
+from sim.loop.servo import Servo, run_block
+from sim.reference.reference import NO_MAP, poses_unit
+
+
+def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
+    """Units of the loop over a servo, of what it calls, and of poses along a path, by which runs begin and end.
+
+    Parameters
+    ----------
+    servo : Servo
+        With all arrays that it will have, but no address need be there (see `Servo.linked`).
+    program : Program
+        Of its field.
+    """
+    ticks, frames = make_logs(servo, servo.figure_ticks)
+    number, flag, reference = types.int64, types.boolean, servo.reference
+    maps = units_of_map(reference.kind, reference.params) if reference.kind != NO_MAP else ()
+    return (
+        Unit.of(run_block, typeof(servo), number, number, flag, typeof(ticks), typeof(frames)),
+        *follow_units(servo.figure, reference),
+        *maps,
+        *units_of_laws(program),
+        poses_unit(),
+    )

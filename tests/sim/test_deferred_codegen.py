@@ -1,0 +1,123 @@
+"""Code generation left to the unit: the same results, errors and addresses, and no symbol undefined."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from numba import njit, types
+
+from sim.compilation import deferred_codegen
+from sim.compilation.deferred_codegen import TESTED, UnitLibrary, install, undefined_symbols
+
+VECTOR = types.Array(types.float64, 1, "C")
+
+
+@njit
+def _halved(x):
+    if x < 0.0:
+        raise ValueError("negative")
+    return 0.5 * x
+
+
+@njit
+def _twice_halved(x):
+    return _halved(_halved(x))
+
+
+@njit
+def _factorial(n):
+    return n * _factorial(n - 1) if n > 1 else 1
+
+
+@njit
+def _all_of_it(x, out):
+    work = np.empty(3)
+    work[:] = x[:3]
+    out[0] = _twice_halved(work.sum()) + math.sin(x[0]) + _factorial(5)
+    out[1] = min(x[0], x[1]) ** 3
+
+
+def test_it_is_at_work_with_the_version_that_is_pinned():
+    assert install()
+    assert any(numba.__version__.startswith(version + ".") for version in TESTED)
+    pinned = Path(deferred_codegen.__file__).parent.parent / "pyproject.toml"
+    assert '"numba>=0.68,<0.69"' in pinned.read_text(encoding="utf-8")
+
+
+def test_another_version_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(deferred_codegen, "TESTED", ("0.1",))
+    assert not install()
+
+
+def test_a_unit_has_no_undefined_symbol_and_its_parts_are_not_emitted():
+    result = njit(_all_of_it.py_func).get_compile_result(types.void(VECTOR, VECTOR))
+    assert isinstance(result.library, UnitLibrary)
+    assert not result.library.deferred
+    assert not undefined_symbols(result.library._final_module)
+    (part,) = _twice_halved.overloads.values()
+    assert part.library.deferred
+    assert undefined_symbols(part.library._final_module)
+
+
+def test_results_are_those_of_python():
+    out, x = np.empty(2), np.array([0.3, 0.2, 0.5])
+    njit(_all_of_it.py_func)(x, out)
+    np.testing.assert_allclose(out, [0.25 + math.sin(0.3) + 120.0, 0.2**3], rtol=1e-15)
+
+
+def test_a_part_can_be_called_from_python_and_by_others_later():
+    @njit
+    def user(x):
+        return _halved(x) + 1.0
+
+    assert user(2.0) == 2.0
+    assert _halved(3.0) == 1.5
+    assert user(3.0) == 2.5
+    assert njit(lambda x: _halved(x) + user(x))(2.0) == 3.0
+
+
+def test_recursion_works_alone_and_within_a_unit():
+    assert njit(lambda n: _factorial(n) + 0)(6) == 720
+    assert _factorial(5) == 120
+
+
+def test_an_error_in_a_part_reaches_python():
+    with pytest.raises(ValueError, match="negative"):
+        njit(lambda x: _twice_halved(x))(-1.0)
+
+
+_PLAIN = """
+import sys
+if sys.argv[1] == "deferred":
+    from sim.compilation.deferred_codegen import install
+    assert install()
+import numpy as np
+from controllers.fields.follow import Follow
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.follow import follow_wrench
+from numba import njit
+program = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
+law = njit(follow_wrench.py_func)
+row, memory, wrench = program.ops[0], program.fresh_memory(), np.zeros(6)
+for t in np.linspace(0.0, 25.0, 200):
+    hand = np.zeros(15)
+    hand[1:4] = 0.055 * np.cos(t), 0.045 * np.sin(t), 0.004 * np.sin(3.0 * t)
+    hand[8:11] = 0.1 * np.sin(t), 0.2, -0.1
+    law(program.params, int(row[1]), int(row[3]), memory, int(row[2]), hand, wrench)
+    print(wrench.tobytes().hex(), memory.tobytes().hex())
+"""
+
+
+@pytest.mark.slow
+def test_a_law_gives_what_plain_numba_gives_to_the_last_bit():
+    root = Path(deferred_codegen.__file__).parent.parent
+    told = [
+        subprocess.run([sys.executable, "-c", _PLAIN, way], check=True, capture_output=True, text=True, cwd=root).stdout
+        for way in ("plain", "deferred")
+    ]
+    assert len(told[0]) > 10_000
+    assert told[0] == told[1]

@@ -1,0 +1,159 @@
+"""The key of a unit: other for all that its code is made of, the same for everything else."""
+
+import sys
+import types as python_types
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba import njit, typeof, types
+
+from controllers.fields.bunny import bunny_wrench
+from controllers.fields.follow import follow_wrench
+from controllers.fields.governor import governor_wrench
+from controllers.fields.higher_order import higher_order_wrench
+from controllers.fields.instructions import LAW_ARGUMENTS
+from controllers.fields.stretchy_tubes import stretchy_wrench
+from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS
+from sim.compilation.unit_key import UnknownIngredient, UnknownName, describe_type, reached_functions, unit_key
+from sim.loop.servo import run_block
+
+SOURCE = (Path(__file__).parent / "toy_kernels.py").read_text(encoding="utf-8")
+VECTOR = types.Array(types.float64, 1, "C")
+
+
+@pytest.fixture
+def keys(monkeypatch: pytest.MonkeyPatch):
+    """Keys of the toy's `force` and `other`, after its source was changed."""
+
+    def of(old: str = "", new: str = "") -> tuple[str, str]:
+        assert old in SOURCE
+        module = python_types.ModuleType("toy")
+        monkeypatch.setitem(sys.modules, "toy", module)
+        exec(compile(SOURCE.replace(old, new) if old else SOURCE, f"/somewhere/{hash(new)}.py", "exec"), vars(module))
+        spring = typeof(module.Spring(1.0, 0.0))
+        return (
+            unit_key(module.force.py_func, (spring, types.float64, VECTOR), {}),
+            unit_key(module.other.py_func, (types.float64, VECTOR), {}),
+        )
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("GAIN = 2.0\n", "# a comment\n\n\nGAIN = 2.0  # another\n"),
+        ('    """How far."""\n', ""),
+        ('    """How far."""\n', '    """How far it is stretched."""\n'),
+        ("def other", "def one_more(x: float) -> float:\n    return x\n\n\n@njit\ndef other"),
+        ("x: float, out: list[float]", "x, out"),
+    ],
+    ids=["comment", "no docstring", "docstring", "function more", "annotation"],
+)
+def test_what_does_not_change_the_code_does_not_change_the_key(keys, old: str, new: str):
+    assert keys(old, new) == keys()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("GAIN = 2.0", "GAIN = 3.0"),
+        ("GAIN = 2.0", "GAIN = 2"),
+        ("x - spring.rest", "spring.rest - x"),
+        ("GAIN * spring", "2.5 * GAIN * spring"),
+        ("@njit\ndef stretch", "@njit(fastmath=True)\ndef stretch"),
+        ("    stiffness: float\n    rest: float", "    rest: float\n    stiffness: float"),
+    ],
+    ids=["constant", "its type", "called function", "own code", "options", "fields of a tuple"],
+)
+def test_what_changes_the_code_changes_the_key_of_what_reaches_it_only(keys, old: str, new: str):
+    (force, other), (force_now, other_now) = keys(), keys(old, new)
+    assert force_now != force
+    assert other_now == other
+
+
+LAWS = (follow_wrench, bunny_wrench, governor_wrench, higher_order_wrench, stretchy_wrench)
+
+
+def _scaled(scale: object):
+    @njit
+    def kernel(x):
+        return x * scale
+
+    return kernel
+
+
+def test_a_closure_s_variable_is_part_of_the_key():
+    one, same, two = (unit_key(_scaled(scale).py_func, (types.float64,), {}) for scale in (1.0, 1.0, 2.0))
+    assert one == same != two
+    assert unit_key(_scaled(_scaled(1.0)).py_func, (), {}) != unit_key(_scaled(_scaled(2.0)).py_func, (), {})
+    array = np.arange(3.0)
+    first = unit_key(_scaled(array).py_func, (), {})
+    assert unit_key(_scaled(array.copy()).py_func, (), {}) == first != unit_key(_scaled(array + 1.0).py_func, (), {})
+
+
+def test_types_of_arguments_and_options_are_part_of_the_key():
+    function = _scaled(1.0).py_func
+    keys = {
+        unit_key(function, arguments, options)
+        for arguments in ((types.float64,), (types.int64,), (VECTOR,), (types.Array(types.float64, 1, "A"),))
+        for options in ({}, {"nogil": True}, {"boundscheck": True})
+    }
+    assert len(keys) == 12
+
+
+@pytest.mark.parametrize(
+    "value", [object(), [1.0], {1.0}, np.array([None]), Fraction(1, 2), np.random.default_rng(1), [].append]
+)
+def test_what_no_key_can_be_made_of_is_an_error(value: object):
+    with pytest.raises(UnknownIngredient, match="scale"):
+        unit_key(_scaled(value).py_func, (types.float64,), {})
+
+
+def test_unknown_types_and_names_are_errors():
+    with pytest.raises(UnknownIngredient, match="type"):
+        describe_type(types.ListType(types.float64))
+    namespace: dict[str, object] = {"__name__": "nowhere"}
+    exec("def wrong(x):\n    return missing(x)\n", namespace)
+    with pytest.raises(UnknownName, match="missing"):
+        unit_key(namespace["wrong"], (), {})  # pyright: ignore[reportArgumentType]
+
+
+def test_the_same_parts_in_another_place_are_another_key():
+    def made(first, second):
+        @njit
+        def kernel(x):
+            return first(x) - second(x)
+
+        return kernel
+
+    one, two = _scaled(1.0), _scaled(2.0)
+    assert unit_key(made(one, two).py_func, (), {}) != unit_key(made(two, one).py_func, (), {})
+
+
+def test_numba_s_settings_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch):
+    from sim.compilation import unit_key as module
+
+    before = unit_key(_scaled(1.0).py_func, (), {})
+    module._platform.cache_clear()
+    monkeypatch.setattr(module.config, "OPT", 1)
+    assert unit_key(_scaled(1.0).py_func, (), {}) != before
+    module._platform.cache_clear()
+
+
+def test_everything_that_a_run_compiles_has_a_key_of_its_own():
+    given = [(run_block, ())] + [(kernel, LAW_ARGUMENTS) for kernel in LAWS]
+    given += [(kernel, MAP_ARGUMENTS) for kernel in MAP_KERNELS.values()]
+    keys = {unit_key(function.py_func, arguments, {}) for function, arguments in given}  # pyright: ignore
+    assert len(keys) == len(given)
+
+
+def test_a_law_is_no_part_of_the_loop_and_the_loop_none_of_a_law():
+    loop = {f"{f.__module__}.{f.__qualname__}" for f in reached_functions(run_block.py_func)}  # pyright: ignore
+    laws = {kernel.__name__ for kernel in LAWS}
+    assert not {name.rsplit(".", 1)[1] for name in loop} & laws
+    assert not any("whole_body" in name or "reference." in name for name in loop)
+    follow = {f.__module__ for f in reached_functions(follow_wrench.py_func)}  # pyright: ignore
+    assert all(name.startswith("controllers.") for name in follow)
