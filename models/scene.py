@@ -126,6 +126,17 @@ def world_model(config: SceneConfig) -> mujoco.MjModel:
     return world_spec(config).compile()
 
 
+def device_world_model(config: SceneConfig) -> mujoco.MjModel:
+    """The compiled world without a figure: its configuration is the first part of that of `world_model`.
+
+    Raises
+    ------
+    ModelError
+        If the rates do not divide.
+    """
+    return _device_spec(config).compile()
+
+
 def robot_world_model(config: SceneConfig) -> mujoco.MjModel:
     """The compiled world with a robot arm (prefix ``robot/``) on a pedestal in the place of the figure.
 

@@ -58,6 +58,21 @@ def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -
         tank[TANK_FORCE + i], tank[TANK_POSITION + i] = force[i], p[i]
 
 
+@njit
+def book_force(tank: Array, force: Array) -> None:
+    """Tell the tank which force (3,) the hand really gets, where another limit came after the tank's."""
+    for i in range(3):
+        tank[TANK_FORCE + i] = force[i]
+
+
+def renew_tank(tank: Array) -> None:
+    """Make a memory usable after a fault: an energy that was lost is taken for none."""
+    if not np.isfinite(tank[TANK_ENERGY]):
+        tank[TANK_ENERGY] = 0.0
+    tank[TANK_SCALE], tank[TANK_STARTED] = 1.0, 0.0
+    tank[TANK_POSITION:TANK_STARTED] = 0.0
+
+
 @dataclass(frozen=True)
 class EnergyTank:
     """Budget of the energy that a field may inject.

@@ -6,12 +6,11 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
+from controllers.safety.faults import FORCE_NOT_FINITE, LIMITER_NOT_FINITE
 from controllers.state import Array
 
 _CONTINUOUS, _PEAK, _SHARE, _STEP = range(4)
 LIMITER_HEAT, LIMITER_FORCE, LIMITER_FAULT, LIMITER_SIZE = 0, 1, 4, 5
-
-FAULT_NONE, FAULT_NOT_FINITE = 0, 1
 
 
 @njit
@@ -22,8 +21,8 @@ def force_ceiling(heat: float, continuous: float, peak: float) -> float:
 
 
 @njit
-def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> None:
-    """Force that the device is asked for at this tick.
+def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> bool:
+    """Force of a wrench within the device's ceiling at this tick.
 
     Parameters
     ----------
@@ -34,23 +33,39 @@ def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> N
         renewed.
     wrench : Array, shape (6,)
         What the field asks for; the moment is dropped, the device has motors for a force only.
-    force : Array, shape (3,)
+    force : Array
         Written [N].
+
+    Returns
+    -------
+    bool
+        Whether there is no fault.
     """
-    if not np.isfinite(wrench[0] + wrench[1] + wrench[2]):
-        limiter[LIMITER_FAULT] = FAULT_NOT_FINITE
-    if limiter[LIMITER_FAULT] != FAULT_NONE:
+    if not np.isfinite(limiter[LIMITER_HEAT] + limiter[1] + limiter[2] + limiter[3]):
+        limiter[LIMITER_FAULT] = LIMITER_NOT_FINITE
+    elif not np.isfinite(wrench[0] + wrench[1] + wrench[2]):
+        limiter[LIMITER_FAULT] = FORCE_NOT_FINITE
+    # A comparison that a fault which is NaN itself does not pass.
+    if limiter[LIMITER_FAULT] != 0.0:
         for i in range(3):
             force[i] = limiter[LIMITER_FORCE + i] = 0.0
-        return
+        return False
     ceiling = force_ceiling(limiter[LIMITER_HEAT], limits[_CONTINUOUS], limits[_PEAK])
     # Scaling by the largest component first keeps the norm of a huge force finite.
     largest = max(abs(wrench[0]), abs(wrench[1]), abs(wrench[2]), 1e-300)
     norm = largest * np.sqrt((wrench[0] / largest) ** 2 + (wrench[1] / largest) ** 2 + (wrench[2] / largest) ** 2)
     scale = min(1.0, ceiling / max(norm, 1e-300))
-    change = 0.0
     for i in range(3):
         force[i] = scale * wrench[i]
+    return True
+
+
+@njit
+def slew_force(limits: Array, limiter: Array, force: Array) -> None:
+    """Hold a bounded force to the slew rate from the last one, in place, and remember it and its heat."""
+    ceiling = force_ceiling(limiter[LIMITER_HEAT], limits[_CONTINUOUS], limits[_PEAK])
+    change = 0.0
+    for i in range(3):
         change += (force[i] - limiter[LIMITER_FORCE + i]) ** 2
     change = np.sqrt(change)
     if change > limits[_STEP]:
@@ -67,6 +82,26 @@ def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> N
         limiter[LIMITER_FORCE + i] = force[i]
 
 
+@njit
+def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> None:
+    """Force that the device is asked for at this tick: `bound_force`, then `slew_force`, where no tank stands between.
+
+    Parameters
+    ----------
+    limits, limiter, wrench, force
+        As in `bound_force`.
+    """
+    if bound_force(limits, limiter, wrench, force):
+        slew_force(limits, limiter, force)
+
+
+def renew_limiter(limits: Array, limiter: Array) -> None:
+    """Clear the fault of a memory: the force comes from zero, and a heat that was lost is taken for the highest."""
+    if not (np.isfinite(limiter[LIMITER_HEAT]) and limiter[LIMITER_HEAT] >= 0.0):
+        limiter[LIMITER_HEAT] = limits[_CONTINUOUS] ** 2
+    limiter[LIMITER_FORCE:LIMITER_SIZE] = 0.0
+
+
 @dataclass(frozen=True)
 class ForceLimiter:
     r"""Limits of the force at the stylus: continuous, peak, and how fast it may change.
@@ -75,7 +110,7 @@ class ForceLimiter:
 
     The magnitude is scaled, the direction kept. h is the mean square of the force over the thermal time τ: a cold
     motor gives the peak force, a motor that has worked for some τ the continuous one (see `force_ceiling`). A force
-    that is not finite is a fault: zero from then on.
+    that is not finite is a fault, and so is such a memory: zero from then on.
 
     Parameters
     ----------

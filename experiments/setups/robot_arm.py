@@ -19,12 +19,13 @@ from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits, arm_model
 from models.scene import PHANTOM
 from sim.body.robot import robot_state
 from sim.compilation.units import Unit
+from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.reference import check_reference, poses_along, unlinked_reference
 from sim.users.arm import Arm
 from sim.world.phantom_port import phantom_port
-from sim.world.plant import make_hand, make_plant
+from sim.world.plant import make_plant
 from sim.world.robot_world import RobotWorld
 
 Array = npt.NDArray[np.float64]
@@ -88,15 +89,15 @@ def wire_arm(
     port = phantom_port(world.model, world.data, period, config.cutoff)
     check_reference(period * config.arm_ticks, config.smoothing, 0.0)
     nothing, arm_period = CompiledMap(ROBOT_ARM, np.zeros(0), np.zeros(0)), period * config.arm_ticks
+    device = simulated_phantom(port, Arm(pushes=pushes))
     servo = Servo(
         plant=make_plant(world),
-        port=port,
+        device=device,
         field=unlinked_field(program, limiter, tank),
-        hand=make_hand(Arm(pushes=pushes)),
         reference=unlinked_reference(world.arm, nothing, arm_period, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
-        argument=port.hand[1:8],
+        argument=device.hand[1:8],
     )  # fmt: skip
     # The map looks at its domain with compiled code, when everything else has been checked.
     ready(run_units(servo, program))

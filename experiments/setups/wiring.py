@@ -20,13 +20,14 @@ from models.mocap.clip import Clip
 from models.scene import FIGURE
 from sim.body.figure import Figure
 from sim.compilation.units import Unit
+from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.map_derivative import derivative_unit, map_derivative
 from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along, unlinked_reference
 from sim.reference.settling import stood, stood_unit
 from sim.world.phantom_port import phantom_port, sense_in_motion
-from sim.world.plant import make_hand, make_plant
+from sim.world.plant import make_plant
 from sim.world.world import World
 
 MOST_PACE = 1.4  # times the clips' own that passes without a word
@@ -128,18 +129,18 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
     figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
+    device = simulated_phantom(port, parts.user)
     servo = Servo(
         plant=make_plant(world),
-        port=port,
+        device=device,
         field=field,
-        hand=make_hand(parts.user),
         reference=unlinked_reference(
             world.figure, compiled, period * ticks, config.figure.smoothing, config.figure.blend, legs,
             parts.held_seconds,
         ),
         figure=figure.state,
         figure_ticks=ticks,
-        argument=port.hand[1:8] if walker is None else walker.argument,
+        argument=device.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
     return servo, figure
 
@@ -160,7 +161,8 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         return
     world.reset(begin.point, poses[0], orientation, begin.velocity, _velocity(whole_map, argument[0], begin))
     begin_in_motion(reference, np.array(begin))
-    sense_in_motion(servo.port)
+    assert isinstance(servo.device, SimulatedPhantom)
+    sense_in_motion(servo.device.port)
 
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:

@@ -28,12 +28,12 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE
 from models.scene import FIGURE
+from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
-from sim.world.plant import make_hand
 
 Array = npt.NDArray[np.float64]
 
@@ -127,7 +127,10 @@ class Bench:
         root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
         session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
         field = session.servo.field.of(program)
-        servo = session.servo._replace(field=field, hand=make_hand(Arm(400.0, 10.0, way, STEP)))
+        phantom = session.servo.device
+        assert isinstance(phantom, SimulatedPhantom)
+        device = phantom.held_by(Arm(400.0, 10.0, way, STEP))
+        servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
 
         def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:

@@ -1,21 +1,84 @@
-"""What follows the reference, the figure or a robot arm: the unit that sets its torques is chosen by its type."""
+"""What follows the reference: a figure or a robot arm in the physics, a figure that is only shown, or nothing.
+
+The unit that sets the torques is chosen by the body's type, and what of the reference is updated too.
+"""
 
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
+import numpy as np
 from numba import typeof
+from numba.extending import overload
 
 from controllers.fields.instructions import VECTOR
+from controllers.kernel_call import call_as_given
+from controllers.state import Array, IntArray
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
+from sim.body.unsimulated import KinematicFigure, NoFigure
 from sim.body.whole_body import figure_torque
 from sim.compilation.units import Unit
+from sim.errors import SimError
+from sim.reference.reference import update_unit
+from sim.reference.reference_state import CompiledReference
 
-BodyState: TypeAlias = FigureState | RobotState
+BodyState: TypeAlias = FigureState | RobotState | KinematicFigure | NoFigure
 
 _DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotState: robot_torque}
 
 
-def drive_unit(body: BodyState) -> Unit:
+def drive_unit(body: FigureState | RobotState) -> Unit:
     """The unit that sets a body's torques for the reference of a control tick: pose, velocity, acceleration."""
     return Unit.of(_DRIVES[type(body)], typeof(body), VECTOR, VECTOR, VECTOR)
+
+
+def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, ...]:
+    """Units that `follow` calls by their addresses, in their order: the reference's, then the body's; or fewer."""
+    if isinstance(body, NoFigure):
+        return ()
+    driven = (drive_unit(body),) if isinstance(body, FigureState | RobotState) else ()
+    return update_unit(reference), *driven
+
+
+def follow_addresses(body: BodyState, reference: CompiledReference) -> IntArray:
+    """Their addresses, 0 for what is not needed, shape (2,); compiles what is not kept."""
+    addresses = np.zeros(2, dtype=np.int64)
+    for i, unit in enumerate(follow_units(body, reference)):
+        addresses[i] = unit.address()
+    return addresses
+
+
+def follow(units: IntArray, body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> None:
+    """Update the reference at the map's argument (7,) and the field's trace, and what of a body follows it.
+
+    `units` are `follow_addresses`. For compiled code only.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+def _follow_in_physics(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+    if units[0] == 0 or units[1] == 0:
+        raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
+    call_as_given(units[0], (reference, argument, trace))
+    call_as_given(units[1], (body, reference.pose, reference.velocity, reference.acceleration))
+
+
+def _show(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+    if units[0] == 0:
+        raise SimError("what updates the figure is not compiled; take the servo's `linked`")
+    call_as_given(units[0], (reference, argument, trace))
+
+
+def _stay_away(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+    pass
+
+
+_FOLLOWS: dict[type, Any] = {
+    FigureState: _follow_in_physics, RobotState: _follow_in_physics, KinematicFigure: _show, NoFigure: _stay_away,
+}  # fmt: skip
+
+
+# Inlined, as a call would hand over all the arrays of body and reference, number by number.
+@overload(follow, strict=False, inline="always")
+def _follow(units: Any, body: Any, reference: Any, argument: Any, trace: Any) -> Any:
+    return _FOLLOWS[body.instance_class]

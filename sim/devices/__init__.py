@@ -1,1 +1,1 @@
-"""Devices: the simulated Phantom, a replayed recording, real hardware. One protocol for all."""
+"""Devices that the loop runs with: the simulated Phantom, a replayed hand, and a driver behind two arrays."""

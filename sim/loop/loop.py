@@ -11,12 +11,13 @@ from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_P
 from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
-from models.scene import FIGURE
-from sim.devices.simulated import read_phantom
+from sim.body.figure_state import FigureState
+from sim.body.robot import RobotState
+from sim.body.unsimulated import KinematicFigure, NoFigure
+from sim.devices.device import read_device, ticks_of
 from sim.errors import SimError
 from sim.loop.servo import FrameLog, Servo, TickLog, run_block
 from sim.recording.recorder import Group, Recorder
-from sim.world.plant import hand_torques
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
@@ -52,19 +53,29 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
             hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
             user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
             trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
-            applied=np.zeros((ticks, plant.substeps, hand_torques(servo.hand))),
-            residual=np.zeros((ticks, len(servo.figure.applied))),
+            applied=np.zeros((ticks, plant.substeps, servo.device.user_torques)),
+            residual=np.zeros((ticks, len(servo.figure.applied))), fault=np.zeros((ticks, 3)),
         ),
         FrameLog(
-            t=np.zeros(frames), qpos=np.zeros((frames, len(plant.qpos))),
+            t=np.zeros(frames), qpos=np.zeros((frames, configuration_size(servo))),
             reference=np.zeros((frames, len(servo.reference.pose))),
             report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
         ),
     )  # fmt: skip
 
 
+def configuration_size(servo: Servo) -> int:
+    """Numbers in a recorded configuration: the world's, and the pose of a figure that is shown but not in it."""
+    shown = len(servo.reference.pose) if isinstance(servo.figure, KinematicFigure) else 0
+    return len(servo.plant.qpos) + shown
+
+
 def groups(servo: Servo) -> dict[str, Group]:
-    """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's."""
+    """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's.
+
+    ``frames`` has what there is: of a figure that is only shown no errors, forces and torques, and without one no
+    reference.
+    """
     plant = servo.plant
     ticks = Group(
         1.0 / plant.period,
@@ -72,17 +83,18 @@ def groups(servo: Servo) -> dict[str, Group]:
             "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
             "force": (3,), "user": (3,), "tank": (), "tank_scale": (), "torque": (3,),
             "phase": (), "nearest": (3,), "distance": (), "river": (),
-            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, hand_torques(servo.hand)), "residual": (6,),
+            "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, servo.device.user_torques), "residual": (6,),
+            "fault": (), "fault_value": (), "gaps": (),
         },
     )  # fmt: skip
-    frames = Group(
-        1.0 / (plant.period * servo.figure_ticks),
-        {
-            "t": (), "qpos": (len(plant.qpos),), "reference": (N_POSE,), "joint_error": (), "root_error": (),
-            "residual": (6,), "ground": (3,), "flight": (), "saturated": (),
-        },
-    )  # fmt: skip
-    return {"ticks": ticks, "frames": frames}
+    channels: dict[str, tuple[int, ...]] = {"t": (), "qpos": (configuration_size(servo),)}
+    if not isinstance(servo.figure, NoFigure):
+        channels |= {"reference": (N_POSE,)}
+    if isinstance(servo.figure, FigureState | RobotState):
+        channels |= {
+            "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "saturated": (),
+        }  # fmt: skip
+    return {"ticks": ticks, "frames": Group(1.0 / (plant.period * servo.figure_ticks), channels)}
 
 
 Observer = Callable[[TickLog, FrameLog, int], None]
@@ -106,6 +118,10 @@ class Loop:
         `Program.python_laws` of the servo's field: from the measured hand to six numbers. With any, blocks go tick by
         tick: the hand is sensed, the laws are called, and the compiled loop does the rest of the tick.
 
+    before_tick : callable, optional
+        Called with the number of each tick before it, as a driver in Python is that writes the readings of an
+        `Exchange` and takes its commands; it may wait for the time of the tick. Blocks then go tick by tick.
+
     Raises
     ------
     SimError
@@ -119,6 +135,7 @@ class Loop:
         observe: Observer = lambda ticks, frames, n: None,
         block_seconds: float = BLOCK_SECONDS,
         python_laws: Sequence[Callable[[HandState], Array]] = (),
+        before_tick: Callable[[int], None] | None = None,
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
@@ -127,6 +144,7 @@ class Loop:
         self._one: tuple[TickLog, FrameLog] | None = None
         self._slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
+        self._before_tick = before_tick
         if len(self._laws) != len(self._slots):
             raise SimError(
                 f"the field has {len(self._slots)} slots for laws in Python, {len(self._laws)} are given; "
@@ -147,14 +165,26 @@ class Loop:
             Rounded to whole figure updates.
         progress : callable
             Called with the simulated time after every block.
+
+        Raises
+        ------
+        SimError
+            If the device has fewer ticks in it: a replayed hand ends.
         """
         plant, every = self.servo.plant, self.servo.figure_ticks
         wanted = every * round(seconds / (plant.period * every))
+        left, first = ticks_of(self.servo.device), self._tick
+        if left is not None and first + wanted > left:
+            end, rest = (first + wanted) * plant.period, (left - first) * plant.period
+            raise SimError(
+                f"the replayed hand ends after {left} ticks ({left * plant.period:g} s), the run would end after "
+                f"{end:g} s; ask for {rest:g} s or less"
+            )
         ticks, frames = make_logs(self.servo, self._block)
-        first, begin = self._tick, time.perf_counter()
+        begin = time.perf_counter()
         while self._tick < first + wanted:
             n = min(self._block, first + wanted - self._tick)
-            if self._laws:
+            if self._laws or self._before_tick is not None:
                 self._run_with_laws(n, ticks, frames)
             else:
                 run_block(self.servo, self._tick, n, False, ticks, frames)
@@ -168,7 +198,7 @@ class Loop:
         if self._one is None:
             self._one = make_logs(self.servo, 1)
         ticks, frames = self._one
-        if self._laws:
+        if self._laws or self._before_tick is not None:
             self._run_with_laws(1, ticks, frames)
         else:
             run_block(self.servo, self._tick, 1, False, ticks, frames)
@@ -179,8 +209,10 @@ class Loop:
         servo, every = self.servo, self.servo.figure_ticks
         for k in range(n):
             tick, row = self._tick + k, k // every
-            read_phantom(servo.port, servo.hand, tick * servo.plant.period)
-            hand = HandState.of(servo.port.hand)
+            if self._before_tick is not None:
+                self._before_tick(tick)
+            read_device(servo.device, tick * servo.plant.period)
+            hand = HandState.of(servo.device.hand)
             for slot, law in zip(self._slots, self._laws, strict=True):
                 servo.field.memory[slot : slot + 6] = law(hand)
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
@@ -190,11 +222,15 @@ class Loop:
 
 def record_into(recorder: Recorder, servo: Servo, world: World) -> Observer:
     """An observer that appends every block to a recorder made with `groups`."""
-    root = int(world.model.joint(FIGURE + "root").qposadr[0])
+    names = groups(servo)["frames"].channels
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         recorder.append("ticks", tick_channels(ticks, n))
-        recorder.append("frames", frame_channels(frames, -(-n // servo.figure_ticks), root))
+        m = -(-n // servo.figure_ticks)
+        channels = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
+        if "joint_error" in names:
+            channels = frame_channels(frames, m, world.pose_at)
+        recorder.append("frames", {name: channels[name] for name in names})
 
     return observe
 
@@ -210,6 +246,7 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
         "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],
         "distance": trace[:, TRACE_DISTANCE], "river": trace[:, TRACE_RIVER],
         "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
+        "fault": ticks.fault[:n, 0], "fault_value": ticks.fault[:n, 1], "gaps": ticks.fault[:n, 2],
     }  # fmt: skip
 
 

@@ -3,12 +3,12 @@
 from numba import typeof, types
 
 from controllers.fields.law import Program
-from sim.body.drive import drive_unit
+from sim.body.drive import follow_units
 from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
 from sim.loop.loop import make_logs
 from sim.loop.servo import Servo, run_block
-from sim.reference.reference import poses_unit, update_unit
+from sim.reference.reference import NO_MAP, poses_unit
 
 
 def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
@@ -23,11 +23,11 @@ def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
     """
     ticks, frames = make_logs(servo, servo.figure_ticks)
     number, flag, reference = types.int64, types.boolean, servo.reference
+    maps = units_of_map(reference.kind, reference.params) if reference.kind != NO_MAP else ()
     return (
         Unit.of(run_block, typeof(servo), number, number, flag, typeof(ticks), typeof(frames)),
-        update_unit(reference),
-        drive_unit(servo.figure),
-        *units_of_map(reference.kind, reference.params),
+        *follow_units(servo.figure, reference),
+        *maps,
         *units_of_laws(program),
         poses_unit(),
     )

@@ -2,13 +2,14 @@
 
 Each tick of period T:
 
-1. `sense`: encoders → hand vector in H.
+1. `sense`: the device → hand vector in H; what cannot be a reading is latched as a fault.
 2. `evaluate`: the field's program → wrench, and where on the curve the hand is.
-3. `limit_force`: what the device may be asked for; `guard_energy`: how much of it the energy tank allows.
-4. `actuate`: τ = Jᵀ F + N → the Phantom's motors.
-5. Every `figure_ticks` ticks: `update_reference` (h and its derivatives along the hand's motion), and `drive`, which
-   sets the torques of the figure that follows it.
-6. For each physics step: the hand's force → external torques on the linkage; `mj_step`.
+3. `command_force`: what of it the device is commanded, within ceiling, energy tank and slew; nothing after a fault.
+4. `actuate`: the device's motors, τ = Jᵀ F + N.
+5. Every `figure_ticks` ticks: `follow`: h and its derivatives along the hand's motion, and what of a body follows it.
+6. `advance`: the world, with the hand's force on a simulated device.
+
+Device and body are chosen by type when the loop is compiled (`sim.devices.device`, `sim.body.drive`).
 
 The loop holds no Python object and not the GIL. The same loop replays recorded controls: steps 1–5 and the hand are
 then replaced by what they gave, so a run is repeated bit for bit.
@@ -24,18 +25,17 @@ from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import evaluate
-from controllers.kernel_call import call_as_given
-from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, guard_energy
-from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
-from sim.body.drive import BodyState, drive_unit
+from controllers.safety.command import command_force
+from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
+from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
+from controllers.safety.limiter import ForceLimiter, renew_limiter
+from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
-from sim.errors import SimError
-from sim.reference.reference import update_unit
+from sim.devices.device import DeviceState, actuate, advance, sense
+from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
-from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
-from sim.world.plant import Hand, Plant, advance
+from sim.world.plant import Plant
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -85,15 +85,14 @@ def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, 
 class Servo(NamedTuple):
     """All that the loop works on; the figure, or the robot in its place, is updated every `figure_ticks` ticks.
 
-    `argument` (7,) is what the haptic map is evaluated at: a view of the port's hand, where the stylus is, or that of
+    `argument` (7,) is what the haptic map is evaluated at: a view of the device's hand, where the stylus is, or that of
     a `controllers.walking.walker.Walker` that the field moves. `units` (2,) are the addresses of what updates the
     reference and of what drives the body: a change in one of them is not one of the loop.
     """
 
     plant: Plant
-    port: PhantomPort
+    device: DeviceState
     field: Field
-    hand: Hand
     reference: CompiledReference
     figure: BodyState
     figure_ticks: int
@@ -102,12 +101,13 @@ class Servo(NamedTuple):
 
     def linked(self, program: Program) -> "Servo":
         """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
-        field, reference = self.field, self.reference
+        reference = self.reference
+        if reference.kind != NO_MAP:
+            reference = reference._replace(units=map_units([(reference.kind, reference.params)]))
         return self._replace(
-            units=np.array([update_unit(reference).address(), drive_unit(self.figure).address()]),
-            field=field._replace(units=law_units(program)),
-            reference=reference._replace(units=map_units([(reference.kind, reference.params)])),
-        )
+            units=follow_addresses(self.figure, reference), field=self.field._replace(units=law_units(program)),
+            reference=reference,
+        )  # fmt: skip
 
 
 class TickLog(NamedTuple):
@@ -131,6 +131,8 @@ class TickLog(NamedTuple):
         The hand's torques at each physics step, shape (n, substeps, 3), or 6 (see `sim.world.plant.advance`).
     residual : Array
         Residual wrench at the figure's root, shape (n, 6).
+    fault : Array
+        Of the device: code of the fault that is latched, its value, and the number of gaps so far, shape (n, 3).
     """
 
     hand: Array
@@ -143,6 +145,7 @@ class TickLog(NamedTuple):
     ctrl: Array
     applied: Array
     residual: Array
+    fault: Array
 
 
 class FrameLog(NamedTuple):
@@ -153,9 +156,9 @@ class FrameLog(NamedTuple):
     t : Array
         Time [s], shape (m,).
     qpos : Array
-        Configuration of the world, shape (m, nq).
+        Configuration of the world, shape (m, nq); of a figure that is not in it the reference pose comes after that.
     reference : Array
-        The animation's pose, shape (m, 75).
+        The animation's pose, shape (m, 75); nothing where there is no figure.
     report : Array
         What the figure's control tells (see `sim.body.figure`), shape (m, 8).
     ground : Array
@@ -171,24 +174,14 @@ class FrameLog(NamedTuple):
 
 @njit(inline="always")  # a call would hand over all of the servo's arrays, number by number
 def field_force(servo: Servo) -> None:
-    """Evaluate and limit the field at the measured hand, within the tank's budget, and command the motors."""
-    field, hand = servo.field, servo.port.hand
-    feed_maps(servo.reference.units, field.maps, field.params, field.memory, hand)
-    evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
-    limit_force(field.limits, field.limiter, field.wrench, field.force)
-    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
-    guard_energy(field.budget, field.tank, p, v, field.force)
-    actuate(servo.port, field.force)
-
-
-@njit(inline="always")
-def move_figure(servo: Servo) -> None:
-    """Update the animation at the map's argument, and the torques that follow it."""
-    reference, units = servo.reference, servo.units
-    if units[0] == 0 or units[1] == 0:
-        raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (reference, servo.argument, servo.field.memory[:TRACE_SIZE]))
-    call_as_given(units[1], (servo.figure, reference.pose, reference.velocity, reference.acceleration))
+    """Evaluate the field at the measured hand, and command what of it is safe."""
+    field, device = servo.field, servo.device
+    feed_maps(servo.reference.units, field.maps, field.params, field.memory, device.hand)
+    evaluate(field.units, field.ops, field.params, field.memory, device.hand, field.wrench)
+    command_force(
+        field.limits, field.limiter, field.budget, field.tank, device.faults, device.hand, field.wrench, field.force
+    )
+    actuate(device, field.force)
 
 
 @entry_point
@@ -206,34 +199,49 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     ticks, frames : TickLog, FrameLog
         Written (or read, see `replay`) row by row.
     """
-    plant, port, every = servo.plant, servo.port, servo.figure_ticks
+    plant, device, every = servo.plant, servo.device, servo.figure_ticks
     for k in range(n):
         t = (first + k) * plant.period
         update_figure = (first + k) % every == 0
         if replay:
             plant.ctrl[:] = ticks.ctrl[k]
             servo.figure.applied[:] = ticks.residual[k]
+            device.hand[:] = ticks.hand[k]
         else:
-            # A tick whose hand Python has already been told of is not sensed twice.
-            if port.hand[HAND_TIME] != t or not has_sensed(port):
-                sense(port, t, servo.hand.arm.switch[0])
+            sense(device, t)
             field_force(servo)
             if update_figure:
-                move_figure(servo)
-            ticks.hand[k] = port.hand
+                trace = servo.field.memory[:TRACE_SIZE]
+                follow(servo.units, servo.figure, servo.reference, servo.argument, trace)
+            ticks.hand[k] = device.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force
             ticks.tank[k] = servo.field.tank[TANK_ENERGY : TANK_ENERGY + 2]
-            ticks.torque[k] = port.torque
+            ticks.torque[k] = device.torque
             ticks.trace[k] = servo.field.memory[:TRACE_SIZE]
             ticks.ctrl[k] = plant.ctrl
             ticks.residual[k] = servo.figure.applied
+            ticks.fault[k, 0] = device.faults[FAULT_CODE]
+            ticks.fault[k, 1] = device.faults[FAULT_VALUE]
+            ticks.fault[k, 2] = device.faults[FAULT_GAPS]
         if update_figure:
-            row = k // every
+            row, nq = k // every, plant.qpos.shape[0]
             frames.t[row] = t
-            frames.qpos[row] = plant.qpos
+            frames.qpos[row, :nq] = plant.qpos
+            if frames.qpos.shape[1] > nq:
+                frames.qpos[row, nq:] = servo.reference.pose
             frames.reference[row] = servo.reference.pose
             frames.report[row] = servo.figure.report
             frames.ground[row] = plant.ground
-        advance(plant, port, servo.hand, t, replay, ticks.applied[k])
-        ticks.user[k] = servo.hand.force
+        advance(device, plant, t, replay, ticks.applied[k])
+        ticks.user[k] = device.force
+
+
+def rearm_servo(servo: Servo) -> None:
+    """Forget a latched fault, on purpose and by name: the force is ramped in from zero, from the next tick on.
+
+    Memory of limiter and energy tank that was lost is taken for the worst: a hot device, an empty tank.
+    """
+    rearm(servo.device.faults)
+    renew_limiter(servo.field.limits, servo.field.limiter)
+    renew_tank(servo.field.tank)

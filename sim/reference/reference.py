@@ -246,3 +246,20 @@ def unlinked_reference(
         clip_seconds=clip_seconds, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
         before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip
+
+
+NO_MAP = -1
+"""Kind of the map of a reference that has none."""
+
+
+def no_reference(compiled: CompiledMap | None = None) -> CompiledReference:
+    """What a servo without a figure has for a reference, empty; `compiled` is a map that its field is told of."""
+    kind, params, memory = compiled or CompiledMap(NO_MAP, np.zeros(0), np.zeros(0))
+    return CompiledReference(
+        figure_model=0, smoothing=0.0, period=1.0, units=np.zeros(0, dtype=np.int64), kind=kind, params=params,
+        memory=memory, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
+        orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(0),
+        velocity=np.zeros(0), acceleration=np.zeros(0), transition=make_transition(0, 0, 0.0, np.zeros((0, LIMB))),
+        clip_seconds=0.0, settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7),
+        before=np.zeros(0), after=np.zeros(0), to_before=np.zeros(0), to_after=np.zeros(0),
+    )  # fmt: skip

@@ -8,28 +8,26 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from models.phantom.dynamics import gravity_torques
+from controllers.safety.faults import HELD, NO_SEQUENCE, elapsed, judge_reading
+from controllers.state import HAND_QUATERNION, HAND_SIZE
 from models.phantom.kinematics import (
     encoder_reading,
     forward_kinematics,
     gimbal_reading,
     jacobian,
-    joint_torques,
     stylus_axes,
     stylus_orientation,
-    vector_to_device_frame,
     vector_to_hand_frame,
 )
-from models.phantom.parameters import PREMIUM_1_5
 from models.scene import PHANTOM
 from sim.errors import SimError
+from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
 
 Array = npt.NDArray[np.float64]
 
 ARM_JOINTS = ("theta1", "theta2", "theta3")
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
 MOTORS = ("motor1", "motor2", "motor3")
-PEAK_TORQUE = PREMIUM_1_5.peak_torque
 
 
 class PhantomPort(NamedTuple):
@@ -51,6 +49,8 @@ class PhantomPort(NamedTuple):
         The hand vector of `controllers.state`: t, p, quaternion, v, ω, switch; shape (15,).
     torque : Array
         Last commanded joint torques [N m], shape (3,).
+    faults : Array
+        What was wrong with its readings and commands (`controllers.safety.faults`).
     """
 
     qpos: Array
@@ -67,6 +67,20 @@ class PhantomPort(NamedTuple):
     memory: Array
     hand: Array
     torque: Array
+    faults: Array
+
+
+def velocity_smoothing(cutoff: float, period: float) -> float:
+    """Share of the old velocity that a first-order filter of a corner frequency [Hz] keeps each period [s].
+
+    Raises
+    ------
+    SimError
+        If the cutoff is not positive and finite.
+    """
+    if not (math.isfinite(cutoff) and cutoff > 0.0):
+        raise SimError(f"the velocity filter's cutoff is {cutoff} Hz; it must be positive")
+    return math.exp(-2.0 * math.pi * cutoff * period)
 
 
 def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cutoff: float) -> PhantomPort:
@@ -86,8 +100,6 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
     SimError
         If the cutoff is not positive and finite.
     """
-    if not (math.isfinite(cutoff) and cutoff > 0.0):
-        raise SimError(f"the velocity filter's cutoff is {cutoff} Hz; it must be positive")
 
     def place(names: tuple[str, ...], kind: str) -> tuple[int, int, int]:
         table = {"q": model.jnt_qposadr, "v": model.jnt_dofadr}
@@ -97,56 +109,29 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
             a, b, c = (int(table[kind][model.joint(PHANTOM + name).id]) for name in names)
         return int(a), int(b), int(c)
 
+    hand = np.zeros(HAND_SIZE)
+    hand[HAND_QUATERNION] = 1.0
     return PhantomPort(
         qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl, applied=data.qfrc_applied,
         arm_q=place(ARM_JOINTS, "q"), arm_v=place(ARM_JOINTS, "v"), gimbal_q=place(GIMBAL_JOINTS, "q"),
         gimbal_v=place(GIMBAL_JOINTS, "v"), motor=place(MOTORS, "motor"), period=period,
-        smoothing=math.exp(-2.0 * math.pi * cutoff * period),
-        memory=np.zeros(13), hand=np.zeros(15), torque=np.zeros(3),
+        smoothing=velocity_smoothing(cutoff, period),
+        memory=np.zeros(MEMORY_SIZE), hand=hand, torque=np.zeros(3), faults=plausibility(period).fresh(),
     )  # fmt: skip
 
 
 @njit
 def sense(port: PhantomPort, t: float, switch: float) -> None:
-    r"""Fill `port.hand` with what the encoders tell at time t.
-
-    Joint rates are backward differences of the encoder angles through a first-order low-pass,
-    ω_k = s ω_{k−1} + (1 − s) (θ_k − θ_{k−1})/T; the tip's velocity is J(θ) θ̇, its angular velocity the change of the
-    stylus's orientation over the period through the same filter.
-    """
-    q, memory, hand = port.qpos, port.memory, port.hand
-    a, g = port.arm_q, port.gimbal_q
+    """Fill `port.hand` with what the encoders tell at time t (see `take_reading`)."""
+    q, a, g = port.qpos, port.arm_q, port.gimbal_q
     theta = encoder_reading((q[a[0]], q[a[1]], q[a[2]]))
     gimbal = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
-    orientation = stylus_orientation(theta, gimbal)
-    keep = port.smoothing
-    if memory[12] == 0.0:
-        memory[12] = 1.0
-        for i in range(3):
-            memory[i] = theta[i]
-        for i in range(4):
-            hand[4 + i] = orientation[i]
-    for i in range(3):
-        memory[6 + i] = keep * memory[6 + i] + (1.0 - keep) * (theta[i] - memory[i]) / port.period
-        memory[i] = theta[i]
-    rate = (memory[6], memory[7], memory[8])
-    j = jacobian(theta)
-    p_H = vector_to_hand_frame(forward_kinematics(theta))
-    v_H = vector_to_hand_frame(
-        (
-            j[0][0] * rate[0] + j[0][1] * rate[1] + j[0][2] * rate[2],
-            j[1][0] * rate[0] + j[1][1] * rate[1] + j[1][2] * rate[2],
-            j[2][0] * rate[0] + j[2][1] * rate[1] + j[2][2] * rate[2],
-        )
-    )
-    _turn_rate(hand, orientation, keep, port.period)
-    hand[0] = t
-    for i in range(3):
-        hand[1 + i] = p_H[i]
-        hand[8 + i] = v_H[i]
-    for i in range(4):
-        hand[4 + i] = orientation[i]
-    hand[14] = switch
+    # A simulated hand that holds on does not tremble; it presses the switch.
+    verdict = judge_reading(port.faults, theta, gimbal, port.memory, t, t, NO_SEQUENCE, switch > 0.0)
+    if verdict == HELD:
+        port.hand[0] = t
+    else:
+        take_reading(port.hand, port.memory, port.smoothing, elapsed(port.faults), theta, gimbal, t, switch, verdict)
 
 
 def sense_in_motion(port: PhantomPort) -> None:
@@ -172,25 +157,8 @@ def has_sensed(port: PhantomPort) -> bool:
 
 
 @njit
-def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
-    """Filter the angular velocity in H: 2 vec(q q_last*) / T, for the small turn of one period."""
-    w, x, y, z = hand[4], -hand[5], -hand[6], -hand[7]
-    scalar = q[0] * w - q[1] * x - q[2] * y - q[3] * z
-    sign = 2.0 / period if scalar >= 0.0 else -2.0 / period
-    turn = (
-        q[0] * x + q[1] * w + q[2] * z - q[3] * y,
-        q[0] * y - q[1] * z + q[2] * w + q[3] * x,
-        q[0] * z + q[1] * y - q[2] * x + q[3] * w,
-    )
-    for i in range(3):
-        hand[11 + i] = keep * hand[11 + i] + (1.0 - keep) * sign * turn[i]
-
-
-@njit
 def actuate(port: PhantomPort, force: Array) -> None:
-    """Turn a force on the hand into motor torques: τ = J(θ)ᵀ F + N(θ), within ± the peak torque.
-
-    N balances the linkage's own weight, so a commanded force of zero leaves the stylus floating.
+    """Turn a force on the hand into motor torques (see `motor_torques`).
 
     Parameters
     ----------
@@ -199,12 +167,16 @@ def actuate(port: PhantomPort, force: Array) -> None:
     force : Array
         In H [N], shape (3,).
     """
-    theta = (port.memory[0], port.memory[1], port.memory[2])
-    torque = joint_torques(theta, vector_to_device_frame((force[0], force[1], force[2])))
-    weight = gravity_torques(theta)
+    motor_torques(port.faults, port.memory, port.hand[0], force, port.torque)
     for i in range(3):
-        port.torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] + weight[i]))
         port.ctrl[port.motor[i]] = port.torque[i]
+
+
+@njit
+def let_go(port: PhantomPort) -> None:
+    """Switch the motors off."""
+    for i in range(3):
+        port.torque[i] = port.ctrl[port.motor[i]] = 0.0
 
 
 @njit

@@ -6,11 +6,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.safety.faults import is_silent
 from models.scene import PHANTOM
 from sim.compilation.native import mj_step
 from sim.users.arm import Arm, CompiledArm, hand_force
 from sim.users.fingers import turning_moment
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, true_motion, true_turn
+from sim.world.phantom_port import ARM_JOINTS, PhantomPort, let_go, true_motion, true_turn
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
 
@@ -89,6 +90,8 @@ def hand_torques(hand: Hand) -> int:
 def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
     """Step the physics from time t for one servo period.
 
+    Motors whose last command is too old are off, as a real device's are.
+
     Parameters
     ----------
     plant, port, hand
@@ -102,6 +105,8 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
         joints, τ = AᵀM; written or read, shape (substeps, `hand_torques`).
     """
     turning = applied.shape[1] > 3
+    if not replay and is_silent(port.faults, t):
+        let_go(port)
     for i in range(plant.substeps):
         if not replay:
             true_motion(port, hand.p, hand.v, hand.jacobian)
@@ -120,4 +125,11 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
             plant.applied[plant.arm_v[j]] = applied[i, j]
             if turning:
                 plant.applied[port.gimbal_v[j]] = applied[i, 3 + j]
+        mj_step(plant.model, plant.data)
+
+
+@njit
+def step(plant: Plant) -> None:
+    """Step the physics for one servo period, with no hand in it."""
+    for _ in range(plant.substeps):
         mj_step(plant.model, plant.data)

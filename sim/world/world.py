@@ -1,6 +1,7 @@
 """The world as it is stepped: the compiled model, its state, and how both are put where a run begins."""
 
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias, get_args
 
 import mujoco
 import numpy as np
@@ -15,10 +16,13 @@ from models.phantom.kinematics import (
     vector_to_device_frame,
     within_limits,
 )
-from models.scene import FIGURE, PHANTOM, SceneConfig, world_model
+from models.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world_model
 from sim.errors import SimError
 
 Array = npt.NDArray[np.float64]
+
+FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]
+"""How a world has the figure: stepped with the rest; as the pose h(p), evaluated and recorded; not at all."""
 
 
 @dataclass(frozen=True)
@@ -29,20 +33,33 @@ class World:
     ----------
     config : SceneConfig
         Stature, mass and the two rates.
+    kind : FigureKind
+        ``physical``: the figure is stepped with the Phantom. ``kinematic``: it is not in the physics, and is where the
+        animation has it. ``none``: there is no figure.
+
+    Attributes
+    ----------
+    figure : MjModel
+        The figure alone, whose tangent space animations live in.
 
     Raises
     ------
     ModelError
         If the rates do not divide, or stature or mass are outside their intervals.
+    SimError
+        If there is no such kind.
     """
 
     config: SceneConfig = field(default_factory=SceneConfig)
+    kind: FigureKind = "physical"
     model: mujoco.MjModel = field(init=False, repr=False)
     data: mujoco.MjData = field(init=False, repr=False)
     figure: mujoco.MjModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        model = world_model(self.config)
+        if self.kind not in get_args(FigureKind):
+            raise SimError(f"figure is {self.kind!r}; expected one of {', '.join(get_args(FigureKind))}")
+        model = world_model(self.config) if self.kind == "physical" else device_world_model(self.config)
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "data", mujoco.MjData(model))
         object.__setattr__(self, "figure", figure_model(self.config.stature, self.config.mass))
@@ -62,7 +79,7 @@ class World:
         p_H : Array
             Stylus tip in the hand frame [m], shape (3,).
         pose : Array
-            The figure's pose, shape (75,).
+            The figure's pose, shape (75,); unused where it is not in the physics.
         q_HS : Quat, optional
             Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
         v_H : Array, optional
@@ -76,16 +93,32 @@ class World:
             If the Phantom cannot reach the point.
         """
         place_stylus(self.model, self.data, p_H, q_HS, v_H)
-        root = self.model.joint(FIGURE + "root")
-        pose_at, velocity_at = int(root.qposadr[0]), int(root.dofadr[0])
-        self.data.qpos[pose_at : pose_at + N_POSE] = pose
-        if velocity is not None:
-            self.data.qvel[velocity_at : velocity_at + N_TANGENT] = velocity
+        if self.kind == "physical":
+            velocity_at = int(self.model.joint(FIGURE + "root").dofadr[0])
+            self.data.qpos[self.pose_at : self.pose_at + N_POSE] = pose
+            if velocity is not None:
+                self.data.qvel[velocity_at : velocity_at + N_TANGENT] = velocity
         mujoco.mj_forward(self.model, self.data)
 
     @property
+    def pose_at(self) -> int:
+        """Where the figure's pose begins in a recorded configuration: in the physics or not, behind the device's."""
+        if self.kind != "physical":
+            return int(self.model.nq)
+        return int(self.model.joint(FIGURE + "root").qposadr[0])
+
+    def full_model(self) -> mujoco.MjModel:
+        """The model that recorded configurations are of: with the figure if there is one, in the physics or not."""
+        return world_model(self.config) if self.kind == "kinematic" else self.model
+
+    @property
     def ground(self) -> Array:
-        """View of the constraint force on the root's linear degrees of freedom: the ground's push [N], shape (3,)."""
+        """View of the constraint force on the root's linear degrees of freedom: the ground's push [N], shape (3,).
+
+        Zero where no figure is in the physics.
+        """
+        if self.kind != "physical":
+            return np.zeros(3)
         root = int(self.model.joint(FIGURE + "root").dofadr[0])
         return self.data.qfrc_constraint[root : root + 3]
 

@@ -1,126 +1,211 @@
-"""What every device promises, whatever it is made of."""
+"""What every device promises the loop, on what the loop runs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from controllers.safety.faults import FAULT_CODE, Fault
 from controllers.state import HandState
-from experiments.config.part import to_dict
-from experiments.config.words import run_config
-from experiments.setups.wiring import wire
-from models.humanoid.skeleton import rest_pose
-from sim.devices.base import Device, DeviceError
-from sim.devices.replay import ReplayDevice
-from sim.devices.simulated import SimulatedPhantom
-from sim.loop.loop import Loop, groups, record_into
+from sim.devices.device import read_device
+from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange, exchange
+from sim.devices.replayed import recorded_hand, replayed_hand
+from sim.errors import SimError
+from sim.loop.loop import Loop, groups, record_into, tick_channels
+from sim.loop.servo import Servo, rearm_servo
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.users.arm import Arm
+from sim.users.intent import Push
 from sim.world.world import World
+from tests.sim.bare_servos import CUTOFF, Driver, bare_servo, device_world, follow_program, run, simulated
 
-TICKS = 40
-MakeDevice = Callable[[], Device]
+TICKS = 400
+ARM = Arm(pushes=(Push(0.05, 0.2, 1.5, (0.0, 0.0, 1.0)),))
+
+
+class Made(NamedTuple):
+    """A servo with a device, and what has to be called before each of its ticks."""
+
+    servo: Servo
+    world: World
+    before_tick: Callable[[int], None] | None = None
+
+    def ticks(self, n: int) -> dict[str, np.ndarray]:
+        blocks = []
+
+        def keep(ticks, frames, m):
+            blocks.append({name: channel.copy() for name, channel in tick_channels(ticks, m).items()})
+
+        Loop(self.servo, self.world, keep, before_tick=self.before_tick).run(n * self.servo.plant.period)
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recorded") / "run.h5"
-    config = run_config(clips=("cheer",), seconds=TICKS * 1e-3)
-    session = wire(config)
-    with Recorder(path, to_dict(config), config.seed, groups(session.servo), session.static()) as recorder:
-        Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(config.seconds)
-    return path
+def rows() -> np.ndarray:
+    world = device_world()
+    ticks, _ = run(bare_servo(world, simulated(world, ARM)), TICKS)
+    return ticks.hand
 
 
-@pytest.fixture(params=["simulated", "replay"])
-def make_device(request: pytest.FixtureRequest, recorded: Path) -> Iterator[MakeDevice]:
-    if request.param == "simulated":
+def driven(device: Exchange) -> Callable[[int], None]:
+    driver = Driver(device, ARM)
 
-        def simulated() -> Device:
-            world = World()
-            world.reset(np.array([0.02, 0.01, 0.0]), rest_pose())
-            return SimulatedPhantom(world, Arm(), cutoff=150.0)
+    def before_tick(tick: int) -> None:
+        if tick > 0:
+            driver.write()
+        driver.read()
 
-        yield simulated
-    else:
-        with Recording(recorded) as recording:
-            yield lambda: ReplayDevice(recording)
+    return before_tick
 
 
-def test_time_starts_at_zero_and_advances_by_the_period(make_device: MakeDevice) -> None:
-    with make_device() as device:
-        times: list[float] = []
-        for _ in range(5):
-            times.append(device.read().t)
-            device.write(np.zeros(3))
-    np.testing.assert_allclose(times, np.arange(5) * device.period, atol=1e-12)
+@pytest.fixture(params=["simulated", "replayed", "exchange"])
+def make(request: pytest.FixtureRequest, rows: np.ndarray) -> Callable[..., Made]:
+    def made(**parts) -> Made:
+        world = device_world()
+        if request.param == "simulated":
+            return Made(bare_servo(world, simulated(world, ARM), **parts), world)
+        if request.param == "replayed":
+            return Made(bare_servo(world, replayed_hand(rows, world), **parts), world)
+        device = exchange(world, CUTOFF)
+        return Made(bare_servo(world, device, **parts), world, driven(device))
+
+    return made
 
 
-def test_a_state_is_finite_with_a_unit_quaternion(make_device: MakeDevice) -> None:
-    with make_device() as device:
-        for _ in range(TICKS):
-            state = device.read()
-            assert np.isfinite(state.vector()).all()
-            assert np.linalg.norm(state.q) == pytest.approx(1.0, abs=1e-9)
-            device.write(np.zeros(3))
+def test_time_starts_at_zero_and_advances_by_the_period(make) -> None:
+    np.testing.assert_allclose(make().ticks(6)["t"], np.arange(6) * 1e-3, atol=1e-12)
 
 
-def test_reading_again_before_a_write_tells_the_same(make_device: MakeDevice) -> None:
-    with make_device() as device:
-        device.read()
-        device.write(np.array([0.5, 0.0, 0.0]))
-        first, second = device.read(), device.read()
-    np.testing.assert_array_equal(first.vector(), second.vector())
+def test_a_hand_is_finite_with_a_unit_quaternion(make) -> None:
+    ticks = make().ticks(TICKS)
+    assert all(np.isfinite(channel).all() for channel in ticks.values())
+    np.testing.assert_allclose(np.linalg.norm(ticks["quaternion"], axis=1), 1.0, atol=1e-9)
+    assert not ticks["fault"].any()
+    assert not ticks["gaps"].any()
 
 
-def test_velocity_is_the_rate_of_position(make_device: MakeDevice) -> None:
-    """The filter lags by a few milliseconds; over 30 ms of motion it has to agree with the distance covered."""
-    with make_device() as device:
-        states: list[HandState] = []
-        for _ in range(TICKS):
-            states.append(device.read())
-            device.write(np.array([0.3, 0.0, 0.2]))
-    covered = states[-1].p - states[0].p
-    integrated = np.sum([state.v for state in states], axis=0) * device.period
-    np.testing.assert_allclose(integrated, covered, atol=0.15 * np.linalg.norm(covered) + 1e-4)
+def test_reading_again_in_the_same_tick_tells_the_same(make) -> None:
+    made = make()
+    made.ticks(20)
+    if made.before_tick is not None:
+        made.before_tick(20)
+    device = made.servo.device
+    read_device(device, 0.02)
+    first = HandState.of(device.hand).vector()
+    read_device(device, 0.02)
+    np.testing.assert_array_equal(first, HandState.of(device.hand).vector())
 
 
-@pytest.mark.parametrize("force", [[0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0]])
-def test_a_force_that_is_not_three_finite_numbers_is_refused(make_device: MakeDevice, force: list[float]) -> None:
-    with make_device() as device:
-        device.read()
-        with pytest.raises(DeviceError, match="three finite numbers"):
-            device.write(np.array(force))
+def test_velocity_is_the_rate_of_position(make) -> None:
+    """The filter lags by a few milliseconds; over 0.3 s of motion it has to agree with the distance covered."""
+    ticks = make().ticks(TICKS)
+    covered = ticks["p"][-1] - ticks["p"][100]
+    integrated = np.sum(ticks["v"][100:-1], axis=0) * 1e-3
+    assert np.linalg.norm(covered) > 5e-3
+    np.testing.assert_allclose(integrated, covered, atol=0.1 * np.linalg.norm(covered))
 
 
-def test_a_closed_device_neither_reads_nor_writes_and_closes_twice(make_device: MakeDevice) -> None:
-    device = make_device()
-    device.close()
-    device.close()
-    with pytest.raises(DeviceError, match="closed"):
-        device.read()
-    with pytest.raises(DeviceError, match="closed"):
-        device.write(np.zeros(3))
+def test_a_force_that_is_not_finite_never_reaches_the_motors_and_is_latched(make) -> None:
+    program = follow_program()
+    made = make(program=program)
+    made.ticks(10)
+    program.params[:] = np.nan
+    ticks = made.ticks(10)
+    assert not ticks["force"].any()
+    assert not ticks["torque"].any()
+    assert not ticks["ctrl"].any()
+    assert (ticks["fault"] == Fault.FORCE_NOT_FINITE).all()
 
 
-def test_a_run_is_the_same_again(make_device: MakeDevice) -> None:
-    def trace() -> np.ndarray:
-        with make_device() as device:
-            rows = []
-            for _ in range(TICKS):
-                rows.append(device.read().vector())
-                device.write(np.array([0.2, -0.1, 0.1]))
-            return np.array(rows)
+def test_after_a_fault_the_motors_stay_off_until_the_servo_is_rearmed_and_the_force_comes_back_slowly(make) -> None:
+    made = make()
+    made.ticks(10)
+    made.servo.field.limiter[0] = np.nan
+    ticks = made.ticks(50)
+    assert (ticks["fault"] == Fault.LIMITER_NOT_FINITE).all()
+    assert not ticks["force"].any()
+    assert not ticks["torque"].any()
+    rearm_servo(made.servo)
+    again = made.ticks(200)
+    assert not again["fault"].any()
+    size = np.linalg.norm(again["force"], axis=1)
+    assert size[-1] > 0.02
+    assert np.abs(np.diff(size)).max() < 0.2
 
-    np.testing.assert_array_equal(trace(), trace())
+
+def test_a_run_is_the_same_again(make) -> None:
+    first, second = make().ticks(TICKS), make().ticks(TICKS)
+    for name, channel in first.items():
+        np.testing.assert_array_equal(channel, second[name], err_msg=name)
 
 
-def test_a_replay_ends_with_its_recording(recorded: Path) -> None:
-    with Recording(recorded) as recording, ReplayDevice(recording) as device:
-        for _ in range(TICKS):
-            device.read()
-            device.write(np.zeros(3))
-        with pytest.raises(DeviceError, match=f"ends after {TICKS} ticks"):
-            device.read()
+def test_what_is_recorded_can_be_replayed(make, tmp_path: Path) -> None:
+    made = make()
+    with Recorder(tmp_path / "run.h5", {}, 1, groups(made.servo), {}) as recorder:
+        loop = Loop(made.servo, made.world, record_into(recorder, made.servo, made.world), before_tick=made.before_tick)
+        loop.run(0.2)
+    with Recording(tmp_path / "run.h5") as recording:
+        world = device_world()
+        device = replayed_hand(recorded_hand(recording), world, 1.0 / recording.rates["ticks"])
+        again = Made(bare_servo(world, device), world).ticks(200)
+        np.testing.assert_array_equal(again["p"], recording.channel("ticks", "p")[:])
+
+
+def test_the_linkage_is_shown_where_the_hand_is(make) -> None:
+    made = make()
+    made.ticks(100)
+    tip = made.world.data.site("phantom/tip").xpos - made.world.data.body("phantom/base").xpos
+    np.testing.assert_allclose(tip, made.servo.device.hand[1:4], atol=5e-4)
+
+
+def test_a_replay_that_is_too_short_is_refused_before_it_runs(rows) -> None:
+    world = device_world()
+    made = Made(bare_servo(world, replayed_hand(rows, world)), world)
+    with pytest.raises(SimError, match=f"ends after {TICKS} ticks .* ask for 0.4 s or less"):
+        made.ticks(TICKS + 2)
+    made.ticks(TICKS)
+
+
+def test_a_replay_past_its_end_is_a_fault_and_the_hand_stays(rows) -> None:
+    world = device_world()
+    servo = bare_servo(world, replayed_hand(rows, world))
+    ticks, _ = run(servo, TICKS + 5)
+    np.testing.assert_array_equal(ticks.hand[-5:, 1:], np.tile(rows[-1, 1:], (5, 1)))
+    np.testing.assert_array_equal(ticks.fault[-6:, 0], [0.0, *[Fault.READINGS_ENDED] * 5])
+    assert servo.device.faults[FAULT_CODE] == Fault.READINGS_ENDED
+
+
+@pytest.mark.parametrize(
+    ("bad", "says"),
+    [(np.zeros((0, 15)), r"shape \(0, 15\)"), (np.zeros((3, 14)), r"shape \(3, 14\)"),
+     (np.array([[0.0] * 15, [np.nan] * 15]), "not finite in row 1")],
+)  # fmt: skip
+def test_rows_that_are_no_hand_are_refused(bad, says) -> None:
+    with pytest.raises(SimError, match=says):
+        replayed_hand(bad, device_world())
+
+
+def test_a_replay_at_another_rate_is_refused(rows) -> None:
+    with pytest.raises(SimError, match=r"every 0\.002 s"):
+        replayed_hand(rows, device_world(), 2e-3)
+
+
+def test_an_exchange_answers_each_reading_and_leaves_fault_and_torque() -> None:
+    world = device_world()
+    device = exchange(world, CUTOFF)
+    made = Made(bare_servo(world, device), world, driven(device))
+    made.ticks(20)
+    assert device.command[0] == device.reading[0] == 20.0
+    np.testing.assert_array_equal(device.command[COMMAND_TORQUE : COMMAND_TORQUE + 3], device.torque)
+    made.servo.field.limiter[0] = np.inf
+    made.ticks(2)
+    assert device.command[COMMAND_FAULT] == Fault.LIMITER_NOT_FINITE
+    assert not device.command[COMMAND_TORQUE : COMMAND_TORQUE + 3].any()
+
+
+def test_an_exchange_needs_arrays_of_its_layout() -> None:
+    with pytest.raises(SimError, match=r"expected \(9,\) of float64"):
+        exchange(device_world(), CUTOFF, reading=np.zeros(7))

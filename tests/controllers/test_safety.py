@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controllers.errors import ParameterError
-from controllers.safety.limiter import FAULT_NOT_FINITE, LIMITER_FAULT, ForceLimiter, limit_force
+from controllers.safety.faults import FORCE_NOT_FINITE
+from controllers.safety.limiter import LIMITER_FAULT, ForceLimiter, limit_force
 
 FAST = ForceLimiter(period=1e-3, slew=1e9)
 
@@ -63,7 +64,7 @@ def test_a_force_that_is_not_finite_is_latched_as_a_fault(bad):
     memory = FAST.fresh_memory()
     _limit(FAST, memory, [1.0, 0.0, 0.0])
     assert not _limit(FAST, memory, [0.0, bad, 0.0]).any()
-    assert memory[LIMITER_FAULT] == FAULT_NOT_FINITE
+    assert memory[LIMITER_FAULT] == FORCE_NOT_FINITE
     assert not _limit(FAST, memory, [1.0, 0.0, 0.0]).any()
     assert _limit(FAST, FAST.fresh_memory(), [1.0, 0.0, 0.0]).any()
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from experiments.config.run_config import Phantom
 from models.humanoid.skeleton import rest_pose
-from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
 from sim.users.arm import Arm, hand_force
 from sim.users.intent import Grab
 from sim.world.world import World
+from tests.sim.bare_servos import Stepped
 
 GRAB = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
 
@@ -79,11 +78,10 @@ def test_the_device_tells_of_the_switch() -> None:
     world = World()
     world.reset(np.array([0.03, 0.02, 0.02]), rest_pose())
     arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), seconds=0.03, hold=0.0),))
-    with SimulatedPhantom(world, arm, Phantom().cutoff) as phantom:
-        switches = []
-        for _ in range(80):
-            switches.append(phantom.read().switch)
-            phantom.write(np.zeros(3))
+    phantom, switches = Stepped(world, arm), []
+    for _ in range(80):
+        switches.append(phantom.read().switch)
+        phantom.write(np.zeros(3))
     pressed = np.flatnonzero(switches)
     # The switch is read at the beginning of the period after the one in which it was pressed.
     np.testing.assert_array_equal(pressed, np.arange(pressed[0], pressed[0] + 30))

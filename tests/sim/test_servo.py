@@ -15,13 +15,14 @@ from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, jacobian
 from models.scene import SceneConfig
-from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
 from sim.loop.loop import Loop, make_logs, tick_channels
 from sim.loop.servo import run_block
 from sim.users.arm import Arm
-from sim.world.phantom_port import PEAK_TORQUE, actuate, phantom_port, sense, true_motion
+from sim.world.encoders import PEAK_TORQUE
+from sim.world.phantom_port import actuate, phantom_port, sense, true_motion
 from sim.world.world import World, phantom_angles
+from tests.sim.bare_servos import Stepped
 
 CLIPS = ("cheer", "angry")
 CONFIG = run_config(clips=CLIPS, seconds=0.4, user="push", pushes=lap_pushes(0.0, 1.0))
@@ -94,10 +95,10 @@ def test_a_stylus_without_force_floats() -> None:
     world = World()
     start = np.array([0.03, 0.02, 0.02])
     world.reset(start, rest_pose())
-    with SimulatedPhantom(world, Arm(), 150.0) as phantom:
-        for _ in range(500):
-            state = phantom.read()
-            phantom.write(np.zeros(3))
+    phantom = Stepped(world)
+    for _ in range(500):
+        state = phantom.read()
+        phantom.write(np.zeros(3))
     assert np.linalg.norm(state.p - start) < 1e-4
 
 
@@ -132,20 +133,19 @@ def test_blocks_do_not_show(clips: tuple) -> None:
     np.testing.assert_array_equal(whole.world.data.qpos, pieces.world.data.qpos)
 
 
-def test_the_device_protocol_from_python_does_what_the_compiled_loop_does(clips: tuple) -> None:
+def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: tuple) -> None:
     """Read, evaluate, limit, write from Python: the same stylus, but for what the figure does to the solver."""
     compiled, stepped = session_of(clips), session_of(clips)
     ticks, _ = run_logged(compiled, 300)
     arm = Arm(pushes=CONFIG.user.pushes)
     field = stepped.servo.field
-    with SimulatedPhantom(stepped.world, arm, CONFIG.device.cutoff) as phantom:
-        path = []
-        for _ in range(300):
-            hand = phantom.read().vector()
-            evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
-            limit_force(field.limits, field.limiter, field.wrench, field.force)
-            phantom.write(field.force)
-            path.append(hand[1:4])
+    phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
+    for _ in range(300):
+        hand = phantom.read().vector()
+        evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
+        limit_force(field.limits, field.limiter, field.wrench, field.force)
+        phantom.write(field.force)
+        path.append(hand[1:4])
     np.testing.assert_allclose(np.array(path), ticks.hand[:, 1:4], atol=1e-4)
 
 

@@ -25,7 +25,6 @@ from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.reference.reference import poses_along
 from sim.users.arm import Arm
-from sim.world.plant import make_hand
 
 MODE = Stretch(seek=150.0, rubber=150.0, tube_damping=14.0, rubber_tube=0.008, bump=0.5)
 SECONDS = 4.3  # the first grab, and a little more
@@ -41,7 +40,7 @@ def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
     program, channels = field.program(), {"p": [], "switch": [], "distance": [], "force": []}
     shown: list[np.ndarray] = []
     compiled = session.servo.field.of(program)
-    servo = session.servo._replace(field=compiled, hand=make_hand(Arm(grabs=grabs)))
+    servo = session.servo._replace(field=compiled, device=session.servo.device.held_by(Arm(grabs=grabs)))
 
     def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
         for name, block in (("p", ticks.hand[:, 1:4]), ("switch", ticks.hand[:, 14]), ("distance", ticks.trace[:, 4])):

@@ -9,7 +9,6 @@ from experiments.config.words import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.scene import PHANTOM
-from sim.devices.simulated import SimulatedPhantom
 from sim.errors import SimError
 from sim.loop.loop import make_logs, tick_channels
 from sim.loop.servo import run_block
@@ -18,6 +17,7 @@ from sim.users.fingers import turning_moment, wanted_turn
 from sim.users.intent import Turn, turn_table
 from sim.world.phantom_port import phantom_port, true_turn
 from sim.world.world import World
+from tests.sim.bare_servos import Stepped
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 START = np.array([0.03, 0.02, 0.04])
@@ -78,8 +78,7 @@ def test_a_stylus_begins_as_it_is_put():
     world = World()
     q = np.roll(Rotation.from_rotvec([0.3, -0.8, 1.1]).as_quat(), 1)
     world.reset(START, rest_pose(), tuple(q))
-    with SimulatedPhantom(world, Arm(), 150.0) as phantom:
-        state = phantom.read()
+    state = Stepped(world).read()
     assert abs(state.q @ q) == pytest.approx(1.0, abs=1e-5)
     np.testing.assert_allclose(state.p, START, atol=5e-5)
 
@@ -88,14 +87,14 @@ def test_the_stylus_goes_where_the_hand_turns_it_and_its_tip_stays():
     world = World()
     world.reset(START, rest_pose(), UPRIGHT)
     errors, largest = [], 0.0
-    with SimulatedPhantom(world, Arm(turns=TURNS), 150.0) as phantom:
-        for k in range(700):
-            state = phantom.read()
-            target = Rotation.from_rotvec(wanted(TURNS, 1e-3 * k)[0])
-            errors.append((rotation(state.q) * target.inv()).magnitude())
-            largest = max(largest, rotation(state.q).magnitude())
-            assert np.linalg.norm(state.p - START) < 2e-4
-            phantom.write(np.zeros(3))
+    phantom = Stepped(world, Arm(turns=TURNS))
+    for k in range(700):
+        state = phantom.read()
+        target = Rotation.from_rotvec(wanted(TURNS, 1e-3 * k)[0])
+        errors.append((rotation(state.q) * target.inv()).magnitude())
+        largest = max(largest, rotation(state.q).magnitude())
+        assert np.linalg.norm(state.p - START) < 2e-4
+        phantom.write(np.zeros(3))
     assert largest > 0.6
     assert max(errors) < np.deg2rad(2.0)
     assert errors[-1] < np.deg2rad(0.2)

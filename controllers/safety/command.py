@@ -1,0 +1,67 @@
+"""From what a field asks for to what a device is commanded: ramp, ceiling, energy tank, slew, and the faults of these.
+
+The slew limit comes last, so that a tank that cuts a force is held to it as well: what the hand then gets beyond the
+tank's share, for some ticks, is booked as what it is, and a store that is overdrawn by it holds the next forces back.
+A fault is not held to it: it lets go at once.
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.safety.energy_tank import book_force, guard_energy
+from controllers.safety.faults import (
+    FAULT_CODE,
+    FORCE_NOT_FINITE,
+    LIMITER_NOT_FINITE,
+    TANK_NOT_FINITE,
+    first_not_finite,
+    latch,
+    ramp_in,
+)
+from controllers.safety.limiter import LIMITER_FAULT, LIMITER_FORCE, bound_force, slew_force
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+
+
+@njit
+def command_force(
+    limits: Array, limiter: Array, budget: Array, tank: Array, faults: Array, hand: Array, wrench: Array, force: Array
+) -> None:
+    """Force that a device is commanded at this tick; zero from a fault on.
+
+    Parameters
+    ----------
+    limits, limiter : Array
+        Of `controllers.safety.limiter`; the memory is updated.
+    budget, tank : Array
+        Of `controllers.safety.energy_tank`; likewise.
+    faults : Array
+        Of the device (`controllers.safety.faults`); what is not finite is latched.
+    hand : Array
+        The hand vector as measured.
+    wrench : Array
+        What the field asks for, shape (6,).
+    force : Array
+        Written [N], shape (3,).
+    """
+    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    t = hand[HAND_TIME]
+    sound = bound_force(limits, limiter, wrench, force)
+    if not sound:
+        code = limiter[LIMITER_FAULT]
+        if code == FORCE_NOT_FINITE:
+            latch(faults, FORCE_NOT_FINITE, t, first_not_finite(wrench[:3]))
+        else:
+            latch(faults, LIMITER_NOT_FINITE, t, first_not_finite(limiter))
+    ramp_in(faults, force)
+    if faults[FAULT_CODE] != 0.0:
+        force[0] = force[1] = force[2] = 0.0
+    # Before it is used: min(e_max, NaN) would be a full tank.
+    if not np.isfinite(np.sum(tank)):
+        latch(faults, TANK_NOT_FINITE, t, first_not_finite(tank))
+    guard_energy(budget, tank, p, v, force)
+    if faults[FAULT_CODE] == 0.0:
+        slew_force(limits, limiter, force)
+    else:
+        for i in range(3):
+            force[i] = limiter[LIMITER_FORCE + i] = 0.0
+    book_force(tank, force)

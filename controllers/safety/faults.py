@@ -1,0 +1,280 @@
+r"""Faults of a device and of what commands it: what cannot be a reading, and what is done about it.
+
+A fault is **latched**: from the tick in which it is seen the motors are off, until somebody calls `rearm`. Which it
+was, when, and what the value was stays in the device's `faults`, one array that the device's kernels, the loop and
+whoever drives the device read; it is recorded tick by tick.
+
+| fault | evidence |
+|---|---|
+| not finite | a reading, the field's force, or the memory of limiter or tank is NaN or infinite |
+| rate impossible | :math:`|\theta_k - \theta_{k-1}| > \omega_{max}\,\Delta t + 2\,\delta`, δ a count of the encoder |
+| stale | a device that numbers its readings has given no new one for longer than the silence |
+| frozen | no encoder counted for longer than `still`, under a torque over `still_load` times a joint's friction |
+| ended | a replayed hand has no more rows |
+
+A **gap** is no fault: when there is more than the silence between two readings, the servo did not run. Then the device
+let go by itself (`is_silent`), the gap is counted, and the force is ramped in again.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+
+class Fault(IntEnum):
+    """Why a device let go; `words` says it."""
+
+    NONE = 0
+    FORCE_NOT_FINITE = 1
+    LIMITER_NOT_FINITE = 2
+    TANK_NOT_FINITE = 3
+    READING_NOT_FINITE = 4
+    RATE_IMPOSSIBLE = 5
+    READING_STALE = 6
+    ENCODERS_FROZEN = 7
+    READINGS_ENDED = 8
+
+    def words(self, value: float) -> str:
+        """The fault in words, with its value."""
+        return _WORDS[self].format(value)
+
+
+_WORDS = {
+    Fault.NONE: "no fault",
+    Fault.FORCE_NOT_FINITE: "the field asked for a force of {:g} N",
+    Fault.LIMITER_NOT_FINITE: "the limiter's memory held {:g}",
+    Fault.TANK_NOT_FINITE: "the energy tank's memory held {:g}",
+    Fault.READING_NOT_FINITE: "the device read {:g}",
+    Fault.RATE_IMPOSSIBLE: "a joint was read to turn at {:.4g} rad/s, which it cannot",
+    Fault.READING_STALE: "the device gave no new reading for {:.3g} s",
+    Fault.ENCODERS_FROZEN: "no encoder counted for {:.3g} s under a torque that moves the stylus",
+    Fault.READINGS_ENDED: "the replayed hand had ended after {:.0f} ticks",
+}
+
+# numba freezes globals; a member of an enumeration would be looked up in each kernel.
+FORCE_NOT_FINITE, LIMITER_NOT_FINITE, TANK_NOT_FINITE = 1, 2, 3
+READING_NOT_FINITE, RATE_IMPOSSIBLE, READING_STALE, ENCODERS_FROZEN, READINGS_ENDED = 4, 5, 6, 7, 8
+
+# Layout of a device's `faults`: what is told, what is remembered, and the limits.
+FAULT_CODE, FAULT_TIME, FAULT_VALUE, FAULT_GAPS, FAULT_LAST_GAP, FAULT_RAMP = range(6)
+_STARTED, _CLOCK, _ELAPSED, _SEQUENCE, _FRESH, _STILL_SINCE, _LOAD, _COMMANDED = range(6, 14)
+_PERIOD, _RATE, _STEP, _SILENCE, _RAMP_TIME, _STILL, _STILL_LOAD, FAULT_SIZE = 14, 15, 18, 21, 22, 23, 24, 25
+
+NO_SEQUENCE = -1.0
+"""Number of a reading of a device that does not number them."""
+HELD, TAKEN, RESTARTED = 0, 1, 2
+"""What to do about a reading: keep the last one, take it, or take it and forget the speed."""
+
+_LATE = 1.5  # periods between two readings, from which on their true distance is taken for the speed
+
+
+@njit
+def latch(faults: Array, code: int, t: float, value: float) -> None:
+    """Latch a fault at time t [s]; the first stays."""
+    if faults[FAULT_CODE] == 0.0:
+        faults[FAULT_CODE], faults[FAULT_TIME], faults[FAULT_VALUE] = code, t, value
+
+
+@njit
+def first_not_finite(values: Array) -> float:
+    """The first of the values that is NaN or infinite; 0 if there is none."""
+    for value in values:
+        if not np.isfinite(value):
+            return value
+    return 0.0
+
+
+@njit
+def judge_reading(
+    faults: Array,
+    theta: tuple[float, float, float],
+    gimbal: tuple[float, float, float],
+    last: Array,
+    t: float,
+    clock: float,
+    sequence: float,
+    held: bool,
+) -> int:
+    """Judge the joint angles that a device tells, and latch what cannot be.
+
+    Parameters
+    ----------
+    faults : Array
+        Of the device; updated.
+    theta, gimbal : three floats each
+        As read [rad]. No motor acts on the gimbal, and a free one swings as it likes: it only has to be finite.
+    last : Array
+        Angles of the last reading taken [rad], shape (3,) or longer.
+    t : float
+        Time of the tick [s], for the latch.
+    clock : float
+        When the reading was made, by the device's own clock [s].
+    sequence : float
+        Number of the reading, or `NO_SEQUENCE`.
+    held : bool
+        Whether the stylus is known to be in a hand that can hold it without a count: not a real one, which trembles.
+
+    Returns
+    -------
+    int
+        `HELD`, `TAKEN` or `RESTARTED`; `elapsed` tells for what time the reading is.
+    """
+    if sequence >= 0.0:
+        if sequence == faults[_SEQUENCE]:
+            if np.isnan(faults[_FRESH]):
+                faults[_FRESH] = t
+            if faults[_STARTED] == 0.0:
+                faults[FAULT_RAMP] = 0.0
+            if t - faults[_FRESH] > faults[_SILENCE]:
+                latch(faults, READING_STALE, t, t - faults[_FRESH])
+            return HELD
+        faults[_SEQUENCE], faults[_FRESH] = sequence, t
+    for i in range(3):
+        if not np.isfinite(theta[i]):
+            latch(faults, READING_NOT_FINITE, t, theta[i])
+            return HELD
+        if not np.isfinite(gimbal[i]):
+            latch(faults, READING_NOT_FINITE, t, gimbal[i])
+            return HELD
+    if not np.isfinite(clock):
+        latch(faults, READING_NOT_FINITE, t, clock)
+        return HELD
+    period = faults[_PERIOD]
+    started = faults[_STARTED] != 0.0
+    elapsed = clock - faults[_CLOCK] if started else period
+    faults[_STARTED], faults[_CLOCK] = 1.0, clock
+    faults[_ELAPSED] = elapsed if elapsed > _LATE * period else period
+    verdict = TAKEN
+    if elapsed > faults[_SILENCE]:
+        faults[FAULT_GAPS] += 1.0
+        faults[FAULT_LAST_GAP], faults[FAULT_RAMP] = elapsed, 0.0
+        verdict = RESTARTED
+    moved = not started or verdict == RESTARTED
+    for i in range(3):
+        turn = abs(theta[i] - last[i])
+        moved = moved or turn > 0.0
+        if started and turn > faults[_RATE + i] * faults[_ELAPSED] + 2.0 * faults[_STEP + i]:
+            latch(faults, RATE_IMPOSSIBLE, t, turn / faults[_ELAPSED])
+            verdict = RESTARTED
+    if moved or held or faults[_LOAD] <= faults[_STILL_LOAD]:
+        faults[_STILL_SINCE] = clock
+    elif clock - faults[_STILL_SINCE] > faults[_STILL]:
+        latch(faults, ENCODERS_FROZEN, t, clock - faults[_STILL_SINCE])
+    return verdict
+
+
+@njit
+def ramp_in(faults: Array, force: Array) -> None:
+    """Scale a force (3,) by the share that is ramped in, in place, and raise the share by a period's."""
+    if faults[FAULT_RAMP] < 1.0:
+        for i in range(3):
+            force[i] *= faults[FAULT_RAMP]
+        faults[FAULT_RAMP] = min(1.0, faults[FAULT_RAMP] + faults[_PERIOD] / faults[_RAMP_TIME])
+
+
+@njit
+def elapsed(faults: Array) -> float:
+    """Time that the last reading's change of angle took [s]: the period, unless readings were left out."""
+    return faults[_ELAPSED]
+
+
+@njit
+def note_command(faults: Array, t: float, load: float) -> None:
+    """Remember what was commanded at time t [s]: `load`, the largest torque of a joint over its Coulomb friction."""
+    faults[_COMMANDED], faults[_LOAD] = t, load
+
+
+@njit
+def is_silent(faults: Array, t: float) -> bool:
+    """Whether the last command is older than the silence at time t [s], or there is a fault: then a device lets go."""
+    return faults[FAULT_CODE] != 0.0 or t - faults[_COMMANDED] > faults[_SILENCE]
+
+
+def rearm(faults: Array) -> None:
+    """Forget a latched fault: the force is ramped in from zero, from the next reading on. Gaps stay counted."""
+    faults[FAULT_CODE] = faults[FAULT_TIME] = faults[FAULT_VALUE] = faults[FAULT_RAMP] = 0.0
+    faults[_STARTED] = faults[_LOAD] = 0.0
+    faults[_FRESH] = faults[_COMMANDED] = np.nan
+
+
+@dataclass(frozen=True)
+class Plausibility:
+    r"""What readings of a device may be, and how it lets go.
+
+    Parameters
+    ----------
+    period : float
+        Servo period T [s].
+    rates : three floats
+        ω_max, fastest that each joint can turn [rad/s].
+    steps : three floats
+        δ, a count of each encoder [rad].
+    silence : float
+        Time without a reading or a command after which a device lets go [s]; at least two periods.
+    ramp : float
+        In which the force comes back after a gap or a fault [s]; of the order of a reaction time, so that a hand can
+        meet it.
+    still, still_load : float
+        Longest that no encoder counts [s] while a joint's torque is more than `still_load` times its Coulomb friction.
+        A free stylus then moves: at four times the friction, and the Premium's 0.04 N and 75 g at the tip, by a count
+        (0.03 mm) in 6 ms. One that is held trembles with the hand, at 8 to 12 Hz and by several counts: four periods of
+        that in half a second. A hand at rest on a device that asks for little may be as still as it likes.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not positive, or the silence is shorter than two periods.
+    """
+
+    period: float
+    rates: tuple[float, float, float]
+    steps: tuple[float, float, float]
+    silence: float
+    ramp: float = 0.25
+    still: float = 0.5
+    still_load: float = 4.0
+
+    def __post_init__(self) -> None:
+        for name in ("period", "silence", "ramp", "still", "still_load"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"{name} of a device's readings must be positive, got {getattr(self, name)}")
+        if not (min(self.rates) > 0.0 and min(self.steps) > 0.0):
+            raise ParameterError(f"rates {self.rates} and steps {self.steps} of a device's joints must be positive")
+        if self.silence < 2.0 * self.period:
+            raise ParameterError(f"a silence of {self.silence} s is shorter than two periods of {self.period} s")
+
+    def fresh(self, ramp: float = 1.0) -> Array:
+        """Faults of a device before its first reading: none; `ramp` is the share of the force it begins with."""
+        faults = np.zeros(FAULT_SIZE)
+        faults[FAULT_RAMP] = ramp
+        faults[_FRESH] = faults[_COMMANDED] = np.nan
+        faults[_PERIOD], faults[_RATE:_STEP], faults[_STEP:_SILENCE] = self.period, self.rates, self.steps
+        faults[_SILENCE], faults[_RAMP_TIME] = self.silence, self.ramp
+        faults[_STILL], faults[_STILL_LOAD] = self.still, self.still_load
+        return faults
+
+
+@dataclass(frozen=True)
+class LatchedFault:
+    """A fault that was latched: which, at what time [s], and what the value was."""
+
+    fault: Fault
+    t: float
+    value: float
+
+    def line(self) -> str:
+        """The fault in a sentence."""
+        return f"The device let go at {self.t:.3f} s: {self.fault.words(self.value)}."
+
+
+def latched(faults: Array) -> LatchedFault | None:
+    """The fault that a device's `faults` hold, if any."""
+    code = Fault(int(faults[FAULT_CODE]))
+    if code is Fault.NONE:
+        return None
+    return LatchedFault(code, float(faults[FAULT_TIME]), float(faults[FAULT_VALUE]))

@@ -1,0 +1,84 @@
+"""What a device is to the loop, chosen by type when the loop is compiled.
+
+A device is a NamedTuple with arrays `hand` (15,), `torque` (3,), `faults` and `force` (3,), and three kernels:
+
+- `sense(device, t)` fills `hand` at time t [s], and latches in `faults` what cannot be a reading;
+- `actuate(device, force)` commands a force on the hand [N], in H;
+- `advance(device, plant, t, replay, applied)` lets a servo period pass in the world.
+
+To add one: write it and its kernels in a file of its own, and name them here.
+"""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from numba.extending import overload
+
+from sim.compilation.compiled import entry_point
+from sim.devices.exchange import Exchange, actuate_exchange, advance_exchange, sense_exchange
+from sim.devices.replayed import ReplayedHand, actuate_replayed, advance_replayed, sense_replayed
+from sim.devices.simulated import SimulatedPhantom, actuate_simulated, advance_simulated, sense_simulated
+from sim.world.plant import Plant
+
+Array = npt.NDArray[np.float64]
+DeviceState: TypeAlias = SimulatedPhantom | ReplayedHand | Exchange
+
+_SENSE: dict[type, Any] = {
+    SimulatedPhantom: sense_simulated, ReplayedHand: sense_replayed, Exchange: sense_exchange,
+}  # fmt: skip
+_ACTUATE: dict[type, Any] = {
+    SimulatedPhantom: actuate_simulated, ReplayedHand: actuate_replayed, Exchange: actuate_exchange,
+}  # fmt: skip
+_ADVANCE: dict[type, Any] = {
+    SimulatedPhantom: advance_simulated, ReplayedHand: advance_replayed, Exchange: advance_exchange,
+}  # fmt: skip
+
+
+def sense(device: DeviceState, t: float) -> None:
+    """Fill the device's hand with what it tells at time t [s]."""
+    _SENSE[type(device)](device, t)
+
+
+def actuate(device: DeviceState, force: Array) -> None:
+    """Command a force on the hand [N], in H, shape (3,)."""
+    _ACTUATE[type(device)](device, force)
+
+
+def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: Array) -> None:
+    """Let one servo period pass in the world; the user's torques are written to `applied`, or read in a replay."""
+    _ADVANCE[type(device)](device, plant, t, replay, applied)
+
+
+# A function around the kernels would take all the arrays of a device once more, number by number.
+@overload(sense, strict=False)
+def _sense(device: Any, t: Any) -> Any:
+    return _SENSE[device.instance_class].py_func
+
+
+@overload(actuate, strict=False)
+def _actuate(device: Any, force: Any) -> Any:
+    return _ACTUATE[device.instance_class].py_func
+
+
+@overload(advance, strict=False)
+def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
+    return _ADVANCE[device.instance_class].py_func
+
+
+@entry_point
+def read_device(device: DeviceState, t: float) -> None:
+    """`sense`, from Python: before the loop's tick, which then does not sense again."""
+    sense(device, t)
+
+
+@entry_point
+def write_device(device: DeviceState, plant: Plant, t: float, force: Array, applied: Array) -> None:
+    """`actuate` and `advance`, from Python, where no servo runs; `applied` (substeps, columns) is written."""
+    actuate(device, force)
+    advance(device, plant, t, False, applied)
+
+
+def ticks_of(device: DeviceState) -> int | None:
+    """How many ticks a device has in it; None where that is not known beforehand."""
+    return len(device.rows) if isinstance(device, ReplayedHand) else None

@@ -1,0 +1,123 @@
+"""A recorded hand as a device: it moves as it did, whatever force it is given."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.safety.faults import READING_NOT_FINITE, READINGS_ENDED, first_not_finite, latch
+from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_VELOCITY
+from sim.errors import SimError
+from sim.recording.recording import Recording
+from sim.world.encoders import plausibility
+from sim.world.plant import Plant, step
+from sim.world.shown_phantom import ShownPhantom, show_hand, shown_phantom
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+
+_CHANNELS = ("t", "p", "quaternion", "v", "omega", "switch")
+
+
+class ReplayedHand(NamedTuple):
+    """A recorded hand as the loop holds it; force and torque are always zero, for it has no motors and no user.
+
+    Attributes
+    ----------
+    rows : Array
+        Hand vectors, one a tick, shape (n, 15).
+    period : float
+        Between two rows [s]; the loop's.
+    shown : ShownPhantom
+        The world's linkage, which goes where the hand was.
+    hand, torque, faults, force : Array
+        As of every device.
+    """
+
+    rows: Array
+    period: float
+    shown: ShownPhantom
+    hand: Array
+    torque: Array
+    faults: Array
+    force: Array
+
+    @property
+    def user_torques(self) -> int:
+        """Columns of zeros where a simulated hand's torques are recorded."""
+        return 3
+
+
+def recorded_hand(recording: Recording) -> Array:
+    """Hand vectors of a recording, shape (n, 15).
+
+    Raises
+    ------
+    SimError
+        If it holds no tick.
+    """
+    columns = [recording.channel("ticks", name)[:] for name in _CHANNELS]
+    return np.concatenate([column.reshape(len(column), -1) for column in columns], axis=1)
+
+
+def replayed_hand(rows: Array, world: World, period: float | None = None) -> ReplayedHand:
+    """The device of a recorded hand in a world.
+
+    Parameters
+    ----------
+    rows : Array
+        Hand vectors one servo period apart, shape (n, 15), such as `recorded_hand` gives.
+    world : World
+        Must outlive the device. Its figure follows the hand.
+    period : float, optional
+        At which the hand was recorded [s]; by default the world's servo period.
+
+    Raises
+    ------
+    SimError
+        If there are no rows, they are not hand vectors of finite numbers, or they are not a servo period apart.
+    """
+    wanted = world.config.servo_period
+    if rows.ndim != 2 or rows.shape[1] != HAND_SIZE or len(rows) == 0:
+        raise SimError(f"a recorded hand has shape {rows.shape}; expected (n, {HAND_SIZE}) with n ≥ 1")
+    if not np.all(np.isfinite(rows)):
+        raise SimError(f"the recorded hand is not finite in row {int(np.argmin(np.isfinite(rows).all(axis=1)))}")
+    if period is not None and abs(period - wanted) > 1e-9:
+        raise SimError(
+            f"the hand was recorded every {period:g} s, the servo runs every {wanted:g} s; expected the same"
+        )
+    hand = np.zeros(HAND_SIZE)
+    hand[HAND_QUATERNION] = 1.0
+    return ReplayedHand(
+        np.ascontiguousarray(rows), wanted, shown_phantom(world.model, world.data), hand, np.zeros(3),
+        plausibility(wanted).fresh(), np.zeros(3),
+    )  # fmt: skip
+
+
+@njit
+def sense_replayed(device: ReplayedHand, t: float) -> None:
+    """Take the row of time t; one after the last, or not finite, is a fault, and the hand stays where it was."""
+    hand, tick = device.hand, round(t / device.period)
+    if tick >= device.rows.shape[0]:
+        latch(device.faults, READINGS_ENDED, t, device.rows.shape[0])
+    elif not np.isfinite(np.sum(device.rows[tick])):
+        latch(device.faults, READING_NOT_FINITE, t, first_not_finite(device.rows[tick]))
+    else:
+        hand[:] = device.rows[tick]
+    hand[0] = t
+
+
+@njit
+def actuate_replayed(device: ReplayedHand, force: Array) -> None:
+    """Nothing: a recorded hand is not moved."""
+
+
+@njit
+def advance_replayed(device: ReplayedHand, plant: Plant, t: float, replay: bool, applied: Array) -> None:
+    """Show the linkage where the hand is, and step the physics."""
+    hand = device.hand
+    if not replay:
+        applied[:] = 0.0
+    show_hand(device.shown, hand[HAND_POSITION:HAND_QUATERNION], hand[HAND_QUATERNION:HAND_VELOCITY])
+    step(plant)

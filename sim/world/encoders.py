@@ -1,0 +1,178 @@
+r"""The Phantom's own arithmetic: from joint angles to a hand, and from a force on the hand to motor torques.
+
+The simulated device and a real one differ in where the angles come from and where the torques go, not in this.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.safety.faults import (
+    FAULT_CODE,
+    FORCE_NOT_FINITE,
+    RESTARTED,
+    Plausibility,
+    latch,
+    note_command,
+)
+from models.phantom.dynamics import gravity_torques, mass_matrix
+from models.phantom.kinematics import (
+    ENCODER_STEP,
+    forward_kinematics,
+    jacobian,
+    joint_torques,
+    stylus_orientation,
+    vector_to_device_frame,
+    vector_to_hand_frame,
+)
+from models.phantom.parameters import PREMIUM_1_5
+
+Array = npt.NDArray[np.float64]
+Angles = tuple[float, float, float]
+
+PEAK_TORQUE = PREMIUM_1_5.peak_torque
+FRICTION = PREMIUM_1_5.coulomb_friction
+MEMORY_SIZE = 13
+"""Last angles (6, the gimbal's unused) and filtered rates (6), 1 when initialised."""
+SILENT_PERIODS = 5
+"""Periods without reading or command after which the motors are off. At 1 kHz a hand of 0.5 m/s comes 2.5 mm by then,
+which is 1.3 N in a spring of 500 N/m; a bus or a system that is late by less is not worth a loss of force."""
+
+
+def top_rates() -> Angles:
+    r"""Fastest that the joints can turn [rad/s]: from stop to stop under the peak torque, :math:`\sqrt{2 P \Delta/M}`.
+
+    Without friction, and with the least inertia M_ii of the workspace, so no motor gets there; a hand that would take
+    the tip there (10 m/s and more) neither.
+    """
+    ranges = PREMIUM_1_5.limit
+    angles = np.stack(np.meshgrid(*(np.linspace(*ranges[i], 61) for i in (1, 2))), axis=-1).reshape(-1, 2)
+    least = np.min([np.diag(mass_matrix.py_func((0.0, *theta))) for theta in angles], axis=0)
+    first, second, third = (
+        math.sqrt(2.0 * peak * (high - low) / inertia)
+        for peak, (low, high), inertia in zip(PEAK_TORQUE, ranges, least, strict=True)
+    )
+    return first, second, third
+
+
+TOP_RATES = top_rates()
+
+
+def plausibility(period: float) -> Plausibility:
+    """What a Phantom's readings may be at a servo period [s]."""
+    return Plausibility(period, TOP_RATES, ENCODER_STEP, SILENT_PERIODS * period)
+
+
+@njit
+def take_reading(
+    hand: Array,
+    memory: Array,
+    keep: float,
+    period: float,
+    theta: Angles,
+    gimbal: Angles,
+    t: float,
+    switch: float,
+    verdict: int,
+) -> None:
+    r"""Fill a hand vector with what joint angles tell at time t.
+
+    Joint rates are backward differences of the encoder angles through a first-order low-pass,
+    ω_k = s ω_{k−1} + (1 − s) (θ_k − θ_{k−1})/T; the tip's velocity is J(θ) θ̇, its angular velocity the change of the
+    stylus's orientation over the period through the same filter.
+
+    Parameters
+    ----------
+    hand, memory : Array
+        The hand vector and the filter's memory, of `MEMORY_SIZE`; written.
+    keep, period : float
+        s, and T or the time since the last reading [s].
+    theta, gimbal : three floats each
+        [rad]
+    t, switch : float
+        Time [s], and 1 while the switch is pressed.
+    verdict : int
+        `RESTARTED` (of `controllers.safety.faults`) to forget the speed.
+    """
+    orientation = stylus_orientation(theta, gimbal)
+    if verdict == RESTARTED:
+        memory[6:13] = 0.0
+        hand[11:14] = 0.0
+    if memory[12] == 0.0:
+        memory[12] = 1.0
+        for i in range(3):
+            memory[i] = theta[i]
+        for i in range(4):
+            hand[4 + i] = orientation[i]
+    for i in range(3):
+        memory[6 + i] = keep * memory[6 + i] + (1.0 - keep) * (theta[i] - memory[i]) / period
+        memory[i] = theta[i]
+    rate = (memory[6], memory[7], memory[8])
+    j = jacobian(theta)
+    p_H = vector_to_hand_frame(forward_kinematics(theta))
+    v_H = vector_to_hand_frame(
+        (
+            j[0][0] * rate[0] + j[0][1] * rate[1] + j[0][2] * rate[2],
+            j[1][0] * rate[0] + j[1][1] * rate[1] + j[1][2] * rate[2],
+            j[2][0] * rate[0] + j[2][1] * rate[1] + j[2][2] * rate[2],
+        )
+    )
+    _turn_rate(hand, orientation, keep, period)
+    hand[0] = t
+    for i in range(3):
+        hand[1 + i] = p_H[i]
+        hand[8 + i] = v_H[i]
+    for i in range(4):
+        hand[4 + i] = orientation[i]
+    hand[14] = switch
+
+
+@njit
+def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
+    """Filter the angular velocity in H: 2 vec(q q_last*) / T, for the small turn of one period."""
+    w, x, y, z = hand[4], -hand[5], -hand[6], -hand[7]
+    scalar = q[0] * w - q[1] * x - q[2] * y - q[3] * z
+    sign = 2.0 / period if scalar >= 0.0 else -2.0 / period
+    turn = (
+        q[0] * x + q[1] * w + q[2] * z - q[3] * y,
+        q[0] * y - q[1] * z + q[2] * w + q[3] * x,
+        q[0] * z + q[1] * y - q[2] * x + q[3] * w,
+    )
+    for i in range(3):
+        hand[11 + i] = keep * hand[11 + i] + (1.0 - keep) * sign * turn[i]
+
+
+@njit
+def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: Array) -> None:
+    """Joint torques for a force on the hand: τ = J(θ)ᵀ F + N(θ), within ± the peak torque; zero from a fault on.
+
+    N balances the linkage's own weight, so a commanded force of zero leaves the stylus floating.
+
+    Parameters
+    ----------
+    faults : Array
+        Of the device; a force that is not finite is latched.
+    memory : Array
+        Of `take_reading`, for θ.
+    t : float
+        Time of the command [s].
+    force : Array
+        In H [N], shape (3,).
+    torque : Array
+        Written [N m], shape (3,).
+    """
+    theta = (memory[0], memory[1], memory[2])
+    wanted = joint_torques(theta, vector_to_device_frame((force[0], force[1], force[2])))
+    weight = gravity_torques(theta)
+    total = wanted[0] + wanted[1] + wanted[2]
+    if not np.isfinite(total):
+        latch(faults, FORCE_NOT_FINITE, t, force[0] + force[1] + force[2])
+    load = 0.0
+    for i in range(3):
+        load = max(load, abs(wanted[i]) / FRICTION[i])
+        # With NaN, min(P, max(−P, τ)) would be −P: nothing is cut that may not be trusted.
+        trusted = faults[FAULT_CODE] == 0.0
+        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], wanted[i] + weight[i])) if trusted else 0.0
+    note_command(faults, t, load)

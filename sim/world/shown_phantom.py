@@ -1,0 +1,60 @@
+"""The Phantom of a world put where a hand is that is not simulated: it is seen there, and no force moves it."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from models.phantom.kinematics import gimbal_angles, inverse_kinematics, vector_to_device_frame
+from models.scene import PHANTOM
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Angles = tuple[float, float, float]
+
+_JOINTS = ("theta1", "theta2", "theta3", "elbow", "twin", "gimbal1", "gimbal2", "gimbal3")
+
+
+class ShownPhantom(NamedTuple):
+    """Where the joints of the linkage stand in a world.
+
+    Attributes
+    ----------
+    qpos, qvel : Array
+        Views of the world's MjData.
+    places, rates : IntArray
+        Of θ1, θ2, θ3, elbow, twin and the gimbal's three in them, shape (8,).
+    """
+
+    qpos: Array
+    qvel: Array
+    places: IntArray
+    rates: IntArray
+
+
+def shown_phantom(model: mujoco.MjModel, data: mujoco.MjData) -> ShownPhantom:
+    """The linkage of a world, which must outlive it."""
+    joints = [model.joint(PHANTOM + name) for name in _JOINTS]
+    places, rates = ([int(address[0]) for address in column] for column in zip(
+        *((joint.qposadr, joint.dofadr) for joint in joints), strict=True
+    ))  # fmt: skip
+    return ShownPhantom(data.qpos, data.qvel, np.array(places), np.array(rates))
+
+
+@njit
+def show_angles(shown: ShownPhantom, theta: Angles, gimbal: Angles) -> None:
+    """Put the linkage at joint angles [rad], at rest."""
+    angles = (theta[0], theta[1], theta[2], theta[2] - theta[1], theta[1] - theta[2], gimbal[0], gimbal[1], gimbal[2])
+    for i in range(8):
+        shown.qpos[shown.places[i]] = angles[i]
+        shown.qvel[shown.rates[i]] = 0.0
+
+
+@njit
+def show_hand(shown: ShownPhantom, p: Array, q: Array) -> None:
+    """Put the stylus at a position in H [m], shape (3,), and orientation wxyz; out of reach it stays where it is."""
+    a, b, c, reachable = inverse_kinematics(vector_to_device_frame((p[0], p[1], p[2])))
+    if reachable:
+        show_angles(shown, (a, b, c), gimbal_angles((a, b, c), (q[0], q[1], q[2], q[3])))
