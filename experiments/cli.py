@@ -381,6 +381,12 @@ def _parsed(arguments: Sequence[str] | None) -> Command:
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
+        # A part that refuses a number says so itself.
+        cause: BaseException | None = ended
+        while cause is not None:
+            if isinstance(cause, ParameterError):
+                raise cause from None
+            cause = cause.__cause__ or cause.__context__
         lines = [line.strip("│ ") for line in said.getvalue().splitlines() if line.startswith("│")]
         first = " ".join(itertools.takewhile(lambda line: set(line) != {"─"}, lines))
         raise ParameterError(re.sub(r"^Error parsing \w+: ", "", first) or said.getvalue().strip()) from None
