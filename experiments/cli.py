@@ -39,7 +39,7 @@ Positional = tyro.conf.Positional
 class Run:
     """Run a hand, a field, a map and a figure, and write what happened into a folder."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     out: Path = Path("runs/run")
     """Folder to write."""
     overwrite: bool = False
@@ -117,7 +117,7 @@ class Track:
 class Certify:
     """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     run: Annotated[Path | None, tyro.conf.Positional] = None
     """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
     clip: str | None = None
