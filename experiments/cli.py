@@ -14,6 +14,7 @@ import re  # noqa: E402
 import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
 from dataclasses import dataclass, field  # noqa: E402
+from importlib.metadata import version  # noqa: E402
 from pathlib import Path  # noqa: E402
 from typing import Annotated  # noqa: E402
 
@@ -28,6 +29,7 @@ from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
+from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -320,10 +322,34 @@ class Bench:
         return 0
 
 
+@dataclass(frozen=True)
+class Clips:
+    """Name the embedded clips."""
+
+    json: bool = False
+    """Print them as JSON."""
+
+    def __call__(self) -> int:
+        """Name them."""
+        from models.mocap.library import embedded, embedded_names
+
+        found = [embedded(name) for name in embedded_names()]
+        if self.json:
+            print(
+                json_text([{"name": c.name, "seconds": c.duration, "closed": c.closes(), "fps": c.fps} for c in found])
+            )
+            return 0
+        for clip in found:
+            print(f"{clip.name:14} {clip.duration:5.2f} s  {'closed' if clip.closes() else 'open'}")
+        return 0
+
+
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Clips, tyro.conf.subcommand("clips")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
+    | Annotated[Prepare, tyro.conf.subcommand("prepare")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
     | Annotated[Lift, tyro.conf.subcommand("lift")]
@@ -350,8 +376,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        print(f"hvf {version('haptic-vector-fields')}")
+        return 0
     try:
-        return _parsed(arguments)()
+        return parsed(arguments)()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -366,7 +395,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 130
 
 
-def _parsed(arguments: Sequence[str] | None) -> Command:
+def parsed(arguments: Sequence[str] | None) -> Command:
     """The command that was typed.
 
     Raises

@@ -1,7 +1,7 @@
 """Laws of force and their algebra: what every field can do, built in, composed, or one's own."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -241,15 +241,37 @@ class Program(Law):
                 return int(row[2])
         raise ParameterError(f"{law!r} is no law of this field; it has {', '.join(map(repr, self.laws))}")
 
-    def description(self) -> dict[str, object]:
-        """What it is composed of: operations, and its laws with their parameters by name."""
-        stack: list[dict[str, object]] = []
+    def composition(self) -> Iterator[tuple[Law | Join, Array]]:
+        """Laws and operations in their order, as on a pocket calculator, with the numbers of the operations."""
         laws = iter(self.laws)
         for code, at, *_ in self.ops.tolist():
             if code >= 0:
-                stack.append(next(laws).description())
+                yield next(laws), np.zeros(0)
+            else:
+                join = Join(code)
+                yield join, self.params[at : at + {Join.ADD: 0, Join.LIMIT: 2}.get(join, WEIGHT_SIZE)]
+
+    def with_law(self, law: Law, other: Law) -> "Program":
+        """The same composition with another law in the place of one of its laws."""
+        stack: list[Program] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append((other if what is law else what).program())
                 continue
-            join, size = Join(code), {Join.ADD: 0, Join.LIMIT: 2}.get(Join(code), WEIGHT_SIZE)
-            taken, stack = stack[len(stack) - join.takes :], stack[: len(stack) - join.takes]
-            stack.append({join.name.lower(): taken, "parameters": self.params[at : at + size].tolist()})
+            last = stack.pop()
+            stack.append(
+                last.followed(what, list(numbers)) if what.takes == 1
+                else stack.pop().joined(last, what, list(numbers))
+            )  # fmt: skip
+        return stack[0]
+
+    def description(self) -> dict[str, object]:
+        """What it is composed of: operations, and its laws with their parameters by name."""
+        stack: list[dict[str, object]] = []
+        for what, numbers in self.composition():
+            if isinstance(what, Law):
+                stack.append(what.description())
+                continue
+            taken, stack = stack[len(stack) - what.takes :], stack[: len(stack) - what.takes]
+            stack.append({what.name.lower(): taken, "parameters": numbers.tolist()})
         return stack[0]

@@ -8,10 +8,12 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.law import Law
 from controllers.haptic_map.base import HapticMap
+from controllers.state import Array
 from experiments.setups.parts import Parts, Settings
+from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import P_WH
+from models.scene import FIGURE, P_WH
 from sim.body.figure import Figure
 from sim.loop.servo import Servo
 from sim.world.world import World
@@ -73,3 +75,12 @@ class Session:
             **self.parts.maps.static,
             **notes.static,
         }
+
+    @property
+    def figure_root(self) -> int:
+        """Where the figure's pose begins in a configuration of the world."""
+        return int(self.world.model.joint(FIGURE + "root").qposadr[0])
+
+    def figure_pose(self, qpos: Array) -> Array:
+        """The figure's part of a configuration of the world, shape (75,)."""
+        return qpos[self.figure_root : self.figure_root + N_POSE].copy()

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.errors import ModelError
-from models.humanoid.skeleton import N_POSE, Pose
+from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
 from models.mocap import quaternions
 
 Array = npt.NDArray[np.float64]
@@ -37,7 +37,7 @@ class PlanarDisplacement:
         return moved
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Clip:
     """A motion of the figure; frame k is at time k / fps.
 
@@ -83,6 +83,9 @@ class Clip:
     def n_frames(self) -> int:
         """Number of frames n."""
         return len(self.poses)
+
+    def __repr__(self) -> str:
+        return f"<clip {self.name!r}, {self.duration:.2f} s at {self.fps:g} frames per second>"
 
     @property
     def duration(self) -> float:
@@ -134,3 +137,13 @@ def pose_difference(start: Pose, end: Pose) -> Array:
     turns = quaternions.product(quaternions.conjugate(start[..., 3:].reshape(shape)), end[..., 3:].reshape(shape))
     rotation = quaternions.logarithm(turns).reshape(*start.shape[:-1], -1)
     return np.concatenate((end[..., :3] - start[..., :3], rotation), axis=-1)
+
+
+def global_rotations(poses: Array) -> Array:
+    """R_WS of the 18 segments from MuJoCo's qpos, shape (n, 75) → (n, 18, 4)."""
+    local = poses[:, 3:].reshape(len(poses), -1, 4)
+    world = local.copy()
+    for index, segment in enumerate(SEGMENTS):
+        if segment.parent >= 0:
+            world[:, index] = quaternions.product(world[:, segment.parent], local[:, index])
+    return world

@@ -124,6 +124,7 @@ class Loop:
         every = servo.figure_ticks
         self._block = every * max(1, round(block_seconds / servo.plant.period / every))
         self._tick = 0
+        self._one: tuple[TickLog, FrameLog] | None = None
         self._slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
         if len(self._laws) != len(self._slots):
@@ -161,6 +162,18 @@ class Loop:
             self._observe(ticks, frames, n)
             progress(self.time)
         return RunTimes(wanted * plant.period, time.perf_counter() - begin)
+
+    def step(self) -> tuple[TickLog, FrameLog]:
+        """Run one tick; the logs have its one row, and one of the figure's last update."""
+        if self._one is None:
+            self._one = make_logs(self.servo, 1)
+        ticks, frames = self._one
+        if self._laws:
+            self._run_with_laws(1, ticks, frames)
+        else:
+            run_block(self.servo, self._tick, 1, False, ticks, frames)
+        self._tick += 1
+        return ticks, frames
 
     def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
         servo, every = self.servo, self.servo.figure_ticks

@@ -16,12 +16,12 @@ from controllers.fields.leading import Gait, Leading, leading_wrench
 from controllers.state import HandState
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
+from experiments.certify.trial_simulation import Conditions, simulate
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
 from experiments.setups.lead import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted
-from experiments.studies.trial_simulation import Conditions, simulate
 from models.mocap.library import embedded
 
 DEVICE, CURVE = phantom_device(), s_curve()

@@ -1,0 +1,37 @@
+"""Laws of one's own on CasADi symbols, added to the law that drives along a curve."""
+
+from typing import Any
+
+import casadi
+
+from controllers.certificates.loop.device import Symbol, vector
+from controllers.certificates.loop.laws import Law
+from controllers.fields.function_law import FunctionLaw
+from controllers.state import HandState
+
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def with_added(base: Law, added: tuple[FunctionLaw, ...]) -> Law:
+    """A law with the forces of functions added, for a stylus that is upright and does not turn, its switch open.
+
+    Raises
+    ------
+    ControllerError
+        If a function cannot be evaluated on symbols, as when it branches on the hand.
+    """
+    if not added:
+        return base
+    # One that cannot be evaluated says so before anything is built.
+    _force(added, casadi.SX.sym("p", 3), casadi.SX.sym("v", 3))
+
+    def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
+        return base.force(p, v, piece, u, k_r, b_d, width) + _force(added, p, v)
+
+    return base._replace(force=force)
+
+
+def _force(added: tuple[FunctionLaw, ...], p: Symbol, v: Symbol) -> Symbol:
+    place, velocity, none = (p[0], p[1], p[2]), (v[0], v[1], v[2]), (0.0, 0.0, 0.0)
+    hand: Any = HandState(0.0, place, _UPRIGHT, velocity, none)  # pyright: ignore[reportArgumentType]
+    return sum((vector(law.expression(hand)[:3]) for law in added), vector((0.0, 0.0, 0.0)))

@@ -1,0 +1,95 @@
+"""A simulation at many values of its numbers, in parallel threads over the compiled loop."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass
+from dataclasses import replace as replaced
+from typing import Any, NamedTuple, cast
+
+from controllers.errors import ParameterError
+from controllers.fields.law import Law, Program
+from experiments.run_result import Run
+from experiments.simulation import Simulation
+
+
+class Swept(NamedTuple):
+    """One simulation of a sweep.
+
+    Attributes
+    ----------
+    values : dict
+        What was set, by path.
+    run : Run
+        What happened.
+    """
+
+    values: dict[str, Any]
+    run: Run
+
+
+def sweep(
+    sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float = 10.0, threads: int = 1
+) -> Iterator[Swept]:
+    """Run a simulation at every combination of values, and give the runs in their order.
+
+    Parameters
+    ----------
+    sim : Simulation
+        As it is else.
+    values : mapping of str to sequence
+        By path of a number: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a composed field a
+        name stands for that of the one law that has it; ``field.Follow.k_r`` says which.
+    seconds : float
+        Simulated time of each run [s].
+    threads : int
+        How many run at a time; the loop holds no lock.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such number, or several laws have it.
+    """
+    combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
+    simulations = [_with(sim, chosen) for chosen in combinations]
+
+    def run(simulation: Simulation) -> Run:
+        return simulation.run(seconds)
+
+    if simulations and threads > 1:
+        simulations[0].session(seconds)  # what has to be compiled is, once, before the threads begin
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        for chosen, made in zip(combinations, pool.map(run, simulations), strict=True):
+            yield Swept(chosen, made)
+
+
+def _with(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
+    for path, value in chosen.items():
+        sim = cast(Simulation, _set(sim, path.split("."), value, path))
+    return sim
+
+
+def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
+    """The same part with one number set, which may be deep in it."""
+    if isinstance(part, Program):
+        law = _owner(part, names, path)
+        rest = names if len(names) == 1 or type(law).__name__ != names[0] else names[1:]
+        return part.with_law(law, cast(Law, _set(law, rest, value, path)))
+    if not is_dataclass(part) or isinstance(part, type) or names[0] not in {f.name for f in fields(part)}:
+        known = [f.name for f in fields(part)] if is_dataclass(part) else []
+        raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {', '.join(known)}")
+    new = value if len(names) == 1 else _set(getattr(part, names[0]), names[1:], value, path)
+    return replaced(part, **{names[0]: new})
+
+
+def _owner(program: Program, names: Sequence[str], path: str) -> Law:
+    """The one law of a composed field that a path means."""
+    wanted = names[0]
+    found = [
+        law for law in program.laws
+        if (type(law).__name__ == wanted if len(names) > 1 else hasattr(law, wanted))
+    ]  # fmt: skip
+    if len(found) != 1:
+        laws = ", ".join(type(law).__name__ for law in program.laws)
+        raise ParameterError(f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}")
+    return found[0]

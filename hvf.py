@@ -1,0 +1,79 @@
+"""Haptic vector fields: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
+
+The public face: parts of a simulation, what can be done with it, and nothing of its own.
+
+    import hvf
+
+    walk, jump = hvf.clips("walk", "jump")
+    curve = hvf.circle(radius=0.0477, lap=4.0)
+    river = hvf.Follow(curve, k_r=300, b_d=8)
+    sim = hvf.Simulation(field=river, haptic_map=hvf.Cylindrical([walk, jump], around=curve))
+    run = sim.run(10.0)
+    print(run)
+"""
+
+from controllers.curves.trajectory import Trajectory
+from controllers.errors import ControllerError, ParameterError
+from controllers.fields.algebra import Weight
+from controllers.fields.bundle import RiverBundle
+from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
+from controllers.fields.higher_order import HigherOrder
+from controllers.fields.law import Law
+from controllers.fields.own_law import law
+from controllers.fields.river import River
+from controllers.fields.stretchy_tubes import StretchyTubes
+from controllers.haptic_map.base import HapticMap
+from controllers.safety.energy_tank import EnergyTank
+from controllers.state import HandState, Wrench
+from experiments.certify.certify_simulation import certify
+from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.public import circle, clips, load, version
+from experiments.run_result import Run
+from experiments.simulation import Composite, Cylindrical, Simulation, Tick, User
+from experiments.sweep import Swept, sweep
+from models.errors import ModelError
+from models.mocap.clip import Clip
+from sim.errors import SimError
+from sim.users.intent import Grab, Push, Turn
+
+__version__ = version()
+__all__ = [
+    "Bunny",
+    "Clip",
+    "Clock",
+    "Composite",
+    "ControllerError",
+    "Cylindrical",
+    "EnergyTank",
+    "Figure",
+    "Follow",
+    "Grab",
+    "HandState",
+    "HapticMap",
+    "HigherOrder",
+    "Law",
+    "ModelError",
+    "ParameterError",
+    "Phantom",
+    "Push",
+    "River",
+    "RiverBundle",
+    "Run",
+    "SimError",
+    "Simulation",
+    "StretchyTubes",
+    "Swept",
+    "Tick",
+    "Trajectory",
+    "Turn",
+    "User",
+    "Weight",
+    "Wrench",
+    "certify",
+    "circle",
+    "clips",
+    "law",
+    "load",
+    "sweep",
+]

@@ -1,0 +1,35 @@
+"""Every example runs as it stands, and prints what it promises."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+PRINTS = {
+    "follow": "largest force",
+    "own_law": "critical k_r",
+    "sweep_gains": "k_r = 400 N/m",
+    "step_by_step": "half way after",
+    "edited_motion": "edited.bvh: 3.0 s",
+    "own_hand": "mm from the river",
+}
+
+
+def test_every_example_is_told_what_it_prints() -> None:
+    assert {path.stem for path in EXAMPLES} == PRINTS.keys()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs(path: Path, tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, str(path)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert PRINTS[path.stem] in done.stdout
+    assert not list(tmp_path.iterdir())
