@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.curves.trajectory import Trajectory
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
@@ -163,12 +164,13 @@ def _live_page(session: Session) -> Page:
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     parts = session.parts
+
+    def keep_curve(curve: Trajectory) -> None:
+        save_curve(curve, out / CURVE_FILE)
+
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
-        of = Measuring(
-            recording, lambda: default_poses(session), parts.handled, session.servo.field.memory,
-            lambda curve: save_curve(curve, out / CURVE_FILE),
-        )  # fmt: skip
+        of = Measuring(recording, lambda: default_poses(session), parts.handled, session.servo.field.memory, keep_curve)
         return parts.summarise(summary, of)
 
 
