@@ -59,10 +59,10 @@ def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map
         # It fell as soon as it was performed: at full speed from the middle of a step.
         assert summary.figure.fell_at is None
         assert summary.performance is not None
-        # 1.6 to 2.3 cm in 48 runs: seeds, kernels of OpenBLAS, starts moved by 1 nm, maps by up to 10 µm.
+        # 1.6 to 2.3 cm in 51 runs: seeds, kernels of OpenBLAS, nudged starts and maps; 2.9 where a lift ends elsewhere.
         assert summary.performance.figure.root_error_max_cm < 5.0
         residuals.append(summary.performance.figure.residual_force_rms)
-    # 0.162 to 0.172 in those runs, 0.256 with one seed by AVX-512 kernels; a figure that hangs on its help takes 1.
+    # 0.162 to 0.172, 0.222 where a lift ends elsewhere, 0.256 on AVX-512; a figure that hangs on its help takes 1.
     assert np.median(residuals) < 0.4
 
 
