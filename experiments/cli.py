@@ -29,6 +29,7 @@ from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
+from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -348,6 +349,7 @@ Command = (
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Clips, tyro.conf.subcommand("clips")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
+    | Annotated[Prepare, tyro.conf.subcommand("prepare")]
     | Annotated[Track, tyro.conf.subcommand("track")]
     | Annotated[Certify, tyro.conf.subcommand("certify")]
     | Annotated[Lift, tyro.conf.subcommand("lift")]
@@ -378,7 +380,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf {version('haptic-vector-fields')}")
         return 0
     try:
-        return _parsed(arguments)()
+        return parsed(arguments)()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -393,7 +395,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 130
 
 
-def _parsed(arguments: Sequence[str] | None) -> Command:
+def parsed(arguments: Sequence[str] | None) -> Command:
     """The command that was typed.
 
     Raises

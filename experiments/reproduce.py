@@ -1,37 +1,49 @@
 """Whether a recorded run happens again, bit for bit, from its recorded configuration."""
 
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from llvmlite.binding import get_host_cpu_name
 
+from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
 from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from sim.errors import SimError
-from sim.loop.loop import Loop, tick_channels
+from sim.loop.loop import Loop, frame_channels, tick_channels
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recording import Recording
 
 
 class _Comparison:
-    """Compares the blocks of a run with a recording as they come; keeps the first difference."""
+    """Compares the blocks of a run with a recording as they come; keeps the first difference of each group."""
 
-    def __init__(self, recording: Recording):
-        self._recording = recording
-        self.rows = 0
-        self.difference: str | None = None
+    def __init__(self, recording: Recording, session: Session):
+        self._recording, self._root = recording, session.figure_root
+        self._every = session.servo.figure_ticks
+        self._rows = {"ticks": 0, "frames": 0}
+        self.differences: dict[str, str] = {}
 
     def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
-        for name, block in tick_channels(ticks, n).items():
-            recorded = self._recording.channel("ticks", name)[self.rows : self.rows + n]
-            same = np.equal(recorded, block[: len(recorded)]) | (np.isnan(recorded) & np.isnan(block[: len(recorded)]))
-            if self.difference is None and not np.all(same):
+        m = -(-n // self._every)
+        self._compare("ticks", tick_channels(ticks, n), n)
+        self._compare("frames", frame_channels(frames, m, self._root), m)
+
+    def _compare(self, group: str, blocks: Mapping[str, Array], n: int) -> None:
+        first = self._rows[group]
+        for name, block in blocks.items():
+            recorded = self._recording.channel(group, name)[first : first + n]
+            mine = block[: len(recorded)]
+            same = np.equal(recorded, mine) | (np.isnan(recorded) & np.isnan(mine))
+            if group not in self.differences and not np.all(same):
                 row = int(np.argmin(np.all(same.reshape(len(same), -1), axis=1)))
-                self.difference = f"{name} differs first at tick {self.rows + row}"
-        self.rows += n
+                self.differences[group] = f"{name} differs first at {group[:-1]} {first + row}"
+        self._rows[group] += n
 
 
 def _check_map(config: RunConfig, recording: Recording) -> None:
@@ -49,7 +61,7 @@ def _check_map(config: RunConfig, recording: Recording) -> None:
 
 
 def reproduce(folder: Path) -> int:
-    """Run a recording's configuration again, say whether every tick is the same, and return an exit code.
+    """Run a recording's configuration again, say whether every tick and frame is the same, and return an exit code.
 
     Raises
     ------
@@ -59,17 +71,28 @@ def reproduce(folder: Path) -> int:
         If a file cannot be read.
     """
     with Recording(folder / RECORDING) as recording:
-        for package, recorded in recording.versions.items():
-            if package != "python" and version(package) != recorded:
-                print(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+        _tell_what_is_other(recording.versions)
         config = config_of(recording)
         _check_map(config, recording)
         session = wire(config, clips_of(recording))
-        comparison = _Comparison(recording)
+        comparison = _Comparison(recording, session)
         recorded_ticks = len(recording.channel("ticks", "t"))
         Loop(session.servo, session.world, comparison).run(recorded_ticks * session.servo.plant.period)
-    if comparison.difference is not None:
-        print(f"not the same: {comparison.difference}")
+    if comparison.differences:
+        print(f"not the same: {'; '.join(comparison.differences.values())}")
         return 1
-    print(f"the same, bit for bit, over {recorded_ticks} ticks")
+    print(f"the same, bit for bit, over {recorded_ticks} ticks and what the figure did")
     return 0
+
+
+def _tell_what_is_other(versions: Mapping[str, str]) -> None:
+    """Say which packages, and whether the processor, are others than those of a recording."""
+    for package, recorded in versions.items():
+        if package == "processor":
+            here = get_host_cpu_name()
+            if here != recorded:
+                print(
+                    f"recorded on a processor {recorded}, this is {here}: libraries round otherwise, expect differences"
+                )
+        elif package != "python" and version(package) != recorded:
+            print(f"recorded with {package} {recorded}, now {version(package)}: expect differences")

@@ -10,7 +10,7 @@ from controllers.certificates.switching.switching_search import Course, Push
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
 from controllers.fields.program import evaluate
-from experiments.studies.trial_simulation import CLOSURE, trial_model
+from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
 from models.scene import PHANTOM
 from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense

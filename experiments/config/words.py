@@ -244,11 +244,11 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
         As `run_config`.
     """
     kept, left = words_of(config), set[str]()
-    kinds = str(words.get("mode", config.mode.kind)), str(words.get("map", kept.get("map", "")))
-    leads = (kinds[0] == "lead") != (config.mode.kind == "lead")
-    if kinds[0] != config.mode.kind:
+    mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
+    leads = (mode == "lead") != (config.mode.kind == "lead")
+    if mode != config.mode.kind:
         left |= _names(type(config.mode)).union(ADDED, *(_names(cls) for cls in ADDED.values()))
-    if leads or ("file" if kinds[1].endswith(MAP_SUFFIX) else kinds[1]) != config.map.kind:
+    if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
         left |= _names(type(config.map)) | _names(Circle) | {"map"}
     if leads:
         left |= {"user"}

@@ -15,7 +15,7 @@ from controllers.haptic_map.lifting.lift import Lifting, closes, lift
 from controllers.haptic_map.lifting.motion_features import Motion
 from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip
-from experiments.config.run_config import MAP_SUFFIX
+from experiments.config.maps import MAP_SUFFIX
 from experiments.files.map_files import save_map
 from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map

@@ -76,7 +76,11 @@ class Session:
             **notes.static,
         }
 
+    @property
+    def figure_root(self) -> int:
+        """Where the figure's pose begins in a configuration of the world."""
+        return int(self.world.model.joint(FIGURE + "root").qposadr[0])
+
     def figure_pose(self, qpos: Array) -> Array:
         """The figure's part of a configuration of the world, shape (75,)."""
-        root = int(self.world.model.joint(FIGURE + "root").qposadr[0])
-        return qpos[root : root + N_POSE].copy()
+        return qpos[self.figure_root : self.figure_root + N_POSE].copy()

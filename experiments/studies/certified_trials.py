@@ -19,8 +19,8 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
+from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
-from experiments.studies.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
 from sim.errors import SimError
 
 Array = npt.NDArray[np.float64]

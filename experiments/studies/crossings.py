@@ -20,11 +20,11 @@ from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
+from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
 from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, gains, law_of, river_time
 from experiments.studies.field_figures import SPEED, straight_river
-from experiments.studies.trial_simulation import trial_model
 from models.scene import PHANTOM, SceneConfig
 from sim.users.arm import Arm
 from sim.users.intent import Push

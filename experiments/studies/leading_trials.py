@@ -24,9 +24,9 @@ from controllers.fields.leading import Gait, Leading
 from controllers.state import HandState
 from controllers.walking.walked_path import STEP
 from experiments.certify.certified_device import phantom_device
+from experiments.certify.trial_simulation import LAP, Conditions, Trial
 from experiments.setups.lead import s_curve
 from experiments.studies.trial_onset import observed, predicted
-from experiments.studies.trial_simulation import LAP, Conditions, Trial
 from sim.users.arm import Arm
 
 Array = npt.NDArray[np.float64]

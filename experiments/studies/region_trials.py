@@ -21,8 +21,8 @@ from controllers.certificates.report import Verdict
 from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certify import certified_rivers
+from experiments.certify.trial_simulation import Conditions, Trial, hand_path
 from experiments.config.run_config import RunConfig
-from experiments.studies.trial_simulation import Conditions, Trial, hand_path
 
 Array = npt.NDArray[np.float64]
 

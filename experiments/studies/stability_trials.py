@@ -17,8 +17,8 @@ import tyro
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.stability import slowest_mode
+from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
-from experiments.studies.trial_simulation import Conditions, Trial, draw_trial
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness, slowest_mode
 from experiments.certify.certified_device import phantom_device
-from experiments.studies.trial_simulation import Conditions, Trial, simulate
+from experiments.certify.trial_simulation import Conditions, Trial, simulate
 
 Array = npt.NDArray[np.float64]
 

@@ -55,7 +55,7 @@ def lap_of(clip: Clip) -> Lap:
         return whole
     every = -(-clip.n_frames // _MOST_FRAMES)
     frames = np.arange(0, clip.n_frames, every)
-    likeness, headings = _likeness(clip, frames)
+    apart, headings = likeness(clip, frames)
     travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
     turn = np.abs(headings[:, None] - headings)
     later = frames[None, :] - frames[:, None]
@@ -67,13 +67,13 @@ def lap_of(clip: Clip) -> Lap:
         lap &= (between > 0) & (between < later)
     if not lap.any():
         return whole
-    i, j = np.unravel_index(int(np.argmin(np.where(lap, likeness, np.inf))), lap.shape)
+    i, j = np.unravel_index(int(np.argmin(np.where(lap, apart, np.inf))), lap.shape)
     first, last = int(frames[i]), int(frames[j])
     part = Clip(clip.poses[first : last + 1], clip.fps, clip.name)
-    return Lap(part, first / clip.fps, last / clip.fps, float(likeness[i, j]))
+    return Lap(part, first / clip.fps, last / clip.fps, float(apart[i, j]))
 
 
-def _likeness(clip: Clip, frames: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+def likeness(clip: Clip, frames: npt.NDArray[np.int64]) -> tuple[Array, Array]:
     """D of frames to each other [rad], shape (n, n), and headings, unwrapped, shape (n,)."""
     poses, velocities = clip.poses[frames], clip.velocities()[frames]
     heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])

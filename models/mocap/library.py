@@ -12,17 +12,28 @@ from models.mocap.readers.deepmimic import read_deepmimic
 from models.mocap.readers.motion_file import MotionFileError, numbered_lines
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.retarget import RetargetReport, retarget
+from models.mocap.retargeting.retarget import Hints, RetargetReport, retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 
 _CLIPS = files("models.mocap") / "clips"
 
 
 class Loaded(NamedTuple):
-    """A clip from a file, and what the file was taken for; no report where it is the figure's own."""
+    """A clip from a file.
+
+    Attributes
+    ----------
+    clip : Clip
+        The motion on the figure.
+    report : RetargetReport or None
+        What the file was taken for; None where it is the figure's own.
+    loops : bool or None
+        Whether it goes on from its last frame with its first one, where the file tells it.
+    """
 
     clip: Clip
     report: RetargetReport | None
+    loops: bool | None = None
 
 
 def embedded_names() -> tuple[str, ...]:
@@ -51,8 +62,15 @@ def load_clip(path: Path) -> Clip:
     return load(path).clip
 
 
-def load(path: Path) -> Loaded:
+def load(path: Path, hints: Hints | None = None) -> Loaded:
     """The motion in a file, on the figure, and a report: a file of `write_bvh` as it is, another skeleton retargeted.
+
+    Parameters
+    ----------
+    path : Path
+        BVH, AMC or DeepMimic.
+    hints : Hints or None
+        What a person knows of a foreign file better than its motion tells.
 
     Raises
     ------
@@ -66,7 +84,7 @@ def load(path: Path) -> Loaded:
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
         raise MotionFileError(path, 1, f"no joint is taken for the {roles} among {names}", "the skeleton of a human")
-    return Loaded(*retarget(motion, roles))
+    return Loaded(*retarget(motion, roles, hints or Hints()), motion.loops)
 
 
 def read_motion(path: Path) -> SourceMotion:

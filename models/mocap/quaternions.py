@@ -50,6 +50,12 @@ def logarithm(q: Array) -> Array:
     return scale * q[..., 1:]
 
 
+def velocities(q: Array, fps: float) -> Array:
+    """Angular velocities [rad/s] in the rotated frame, by central differences over n ≥ 2 frames, shape (n, 3)."""
+    steps = logarithm(product(conjugate(q[:-1]), q[1:])) * fps
+    return (np.vstack((steps[:1], steps)) + np.vstack((steps, steps[-1:]))) / 2.0
+
+
 def sign_continuous(q: Array) -> Array:
     """The same rotations, each quaternion in the hemisphere of the one before (axis 0 is time; the first has w ≥ 0)."""
     signs = np.ones(q.shape[:-1])

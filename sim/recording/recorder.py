@@ -19,6 +19,7 @@ from typing import Self
 import h5py
 import numpy as np
 import numpy.typing as npt
+from llvmlite.binding import get_host_cpu_name
 
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
 
@@ -116,7 +117,8 @@ def _write_header(
     file: h5py.File, config: Mapping[str, object], seed: int, static: Mapping[str, npt.ArrayLike | str]
 ) -> None:
     file["config"] = json.dumps(config)
-    file["versions"] = json.dumps({"python": platform.python_version()} | {p: version(p) for p in _PACKAGES})
+    made_by = {"python": platform.python_version(), "processor": get_host_cpu_name()}
+    file["versions"] = json.dumps(made_by | {p: version(p) for p in _PACKAGES})
     file["seed"] = seed
     node = file.create_group("static")
     for name, value in static.items():

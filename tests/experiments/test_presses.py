@@ -1,6 +1,7 @@
 """What a recording tells of each press of the switch, against what the field of the same run keeps in its memory."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,11 @@ from experiments.results import stretch_measures
 from experiments.results.phases import EditingSummary, PerformanceSummary, PressSummary
 from experiments.results.stretch_measures import press_summaries
 from experiments.results.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
-from experiments.setups.hands import hand_remarks, handled, user_arm
-from experiments.setups.stretch import edited_until, law, stretch_grabs
+from experiments.setups.hands import edited_until
+from experiments.setups.parts import Parts
+from experiments.setups.setups import map_parts, parts_of, resolved
+from experiments.setups.stretch import stretch_grabs
+from models.humanoid.skeleton import figure_model
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.users.arm import Arm, hand_force
@@ -25,12 +29,20 @@ from sim.users.intent import Grab
 MASS, PERIOD = 0.15, 1e-3
 CURVE = Trajectory.circle(0.0477, 4.0)
 EPSILON = 0.008
+# On cheer nobody flies: of clips that do, a hand that holds them is told.
+MAPS = map_parts(run_config(map="composite", clips=("cheer",)), figure_model())
 CHANNELS = {"t": (), "p": (3,), "user": (3,), "switch": (), "phase": (), "nearest": (3,), "distance": ()}
+
+
+def parts_with(mode: str = "follow", user: str = "", expressive: bool = False, **words: object) -> Parts:
+    config = resolved(run_config(mode, "composite", user, expressive=expressive, **words))
+    return parts_of(config, replace(MAPS, expressive=expressive))
 
 
 def recorded(path: Path, grabs: Sequence[Grab], seconds: float) -> tuple[StretchyTubes, np.ndarray, Recording]:
     """A hand on a mass in the field, recorded; returned with the field and its memory at the end."""
-    field, arm = law(run_config(mode="stretch"), CURVE, tuple(grabs)), Arm(grabs=grabs).compiled()
+    field, arm = parts_with("stretch", grabs=tuple(grabs)).field, Arm(grabs=grabs).compiled()
+    assert isinstance(field, StretchyTubes)
     program = field.program()
     params, memory, hand = program.params, program.fresh_memory(), np.zeros(HAND_SIZE)
     wrench, user, p, v = np.zeros(6), np.zeros(3), CURVE.point(0.0), np.zeros(3)
@@ -64,9 +76,9 @@ def test_the_default_tour_is_told_as_the_field_keeps_it(tmp_path: Path, monkeypa
         assert press_summaries(recording, CURVE, EPSILON) == presses
         assert [press.what for press in press_summaries(recording, CURVE, EPSILON, 6.0)] == ["held"]
     assert [press.what for press in presses] == ["held", "held", "undo", "redo", "pushed"]
-    starts = [grab.start + (grab.place is not None) * grab.reach for grab in grabs]
+    starts = [grab.at + (grab.place is not None) * grab.reach for grab in grabs]
     assert [press.start for press in presses] == pytest.approx(starts, abs=2e-3)
-    assert [press.seconds for press in presses] == pytest.approx([g.duration + g.hold for g in grabs], abs=2e-3)
+    assert [press.seconds for press in presses] == pytest.approx([g.seconds + g.hold for g in grabs], abs=2e-3)
     edits, bent = field.edits(memory), field.edited(memory)
     assert len(edits) == 3
     bending = [press for press in presses if press.lap is not None]
@@ -111,29 +123,32 @@ def test_a_press_that_the_run_ends_in_is_told(tmp_path: Path) -> None:
 def test_a_hand_bends_the_curve_before_it_pushes(mode: str, seconds: float) -> None:
     """A push during the tour would carry the click that undoes, and a held point faster than a body goes."""
     grabs = stretch_grabs(CURVE, EPSILON)
-    config = run_config(mode=mode, user="push", seconds=seconds, grabs=grabs)  # pyright: ignore[reportArgumentType]
-    starts = [push.start for push in user_arm(config, CURVE, grabs).pushes]
+    parts = parts_with(mode, "push", seconds=seconds, grabs=grabs)
+    starts = [push.at for push in parts.user.pushes]
     assert min(starts) > edited_until(grabs) + CURVE.duration
     assert len(starts) == (4 if seconds == 30.0 else 2)
-    assert handled(config) == tuple((grab.start, grab.end) for grab in grabs)
-    assert len(hand_remarks(config, CURVE)) == (1 if seconds == 8.0 else 0)
+    assert parts.handled == tuple((grab.at, grab.end) for grab in grabs)
+    assert len(parts.remarks) == (1 if seconds == 8.0 else 0)
+    assert parts_with(mode, "push", seconds=seconds).user.grabs == grabs, "what it does by default"
 
 
 def test_hands_that_push_in_other_modes_do_so_from_the_second_lap_on() -> None:
     for seconds in (3.0, 9.0, 20.0, 22.0):
-        config = run_config(user="push", seconds=seconds)
-        starts = [push.start for push in user_arm(config, CURVE, ()).pushes[::2]]
+        parts = parts_with(user="push", seconds=seconds)
+        starts = [push.at for push in parts.user.pushes[::2]]
         laps = range(1, max(2, int(seconds / 4.0)))
         assert starts == [4.0 * lap + 0.4 for lap in laps]
-        assert hand_remarks(config, CURVE) == ()
+        assert parts.remarks == ()
 
 
 def test_a_hand_that_traces_or_leads_never_pushes() -> None:
-    for config in (run_config(user="trace"), run_config(mode="lead")):
-        assert handled(config) == ((0.0, np.inf),)
-    assert handled(run_config()) == ()
-    assert "--expressive" in hand_remarks(run_config(user="turn"), CURVE)[0]
-    assert hand_remarks(run_config(user="turn", expressive=True), CURVE) == ()
+    led = run_config(mode="lead")
+    for parts in (parts_with(user="trace"), parts_of(led, map_parts(led, figure_model()))):
+        assert parts.handled == ((0.0, np.inf),)
+        assert len(parts.user.pushes) == 0
+    assert parts_with().handled == ()
+    assert "--expressive" in parts_with(user="turn").remarks[0]
+    assert parts_with(user="turn", expressive=True).remarks == ()
 
 
 def test_editing_and_performing_are_told_apart() -> None:

@@ -10,7 +10,7 @@ from controllers.fields.algebra import Weight
 from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.own_law import loop_with
 from sim.loop.loop import groups, record_into
 from sim.recording.recorder import Recorder
@@ -23,8 +23,8 @@ def wall(hand: HandState) -> np.ndarray:
 
 def main(out: Path) -> None:
     river = Follow(Trajectory.circle(0.0477, 4.0), k_r=300.0, b_d=4.0)
-    field = (river.program() + PythonLaw(wall).program().gated(Weight.speed(0.0, 0.01))).limited(6.0)
-    config = RunConfig(clips=("cheer", "angry"), seconds=1.0)
+    field = (river + PythonLaw(wall).gated(Weight.speed(0.0, 0.01))).limited(6.0)
+    config = run_config(clips=("cheer", "angry"), seconds=1.0)
     session, loop = loop_with(config, field, lambda ticks, frames, n: record(ticks, frames, n))
     out.mkdir(parents=True)
     with Recorder(out / "run.h5", {}, 1, groups(session.servo), {}) as recorder:

@@ -3,19 +3,19 @@
 ``python tests/golden/test_golden_fields.py`` writes the file anew, after a change of a law that is meant.
 """
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from experiments.setups.modes import law
 from numba import njit
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.program import evaluate
 from controllers.fields.river import River
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.setups.setups import map_parts, parts_of
+from models.humanoid.skeleton import figure_model
 
 GOLDEN = Path(__file__).with_name("fields.csv")
 CURVE = Trajectory.circle(0.0477, 4.0)
@@ -23,10 +23,13 @@ MODES = ("follow", "bunny", "rivers discrete", "rivers smooth", "rivers sum", "e
 
 
 # Written out, so that other defaults change no golden path.
-FLAGS = partial(
-    RunConfig, stiffness=300.0, damping=4.0, tube=0.25, bunny_width=0.02, bunny_attraction="point", bunny_pace="wait",
-    river_tube=0.015, reach=0.025,
-)  # fmt: skip
+WORDS = {
+    "follow": {"stiffness": 300.0, "damping": 4.0, "tube": 0.25},
+    "bunny": {
+        "stiffness": 300.0, "damping": 4.0, "bunny_width": 0.02, "bunny_attraction": "point", "bunny_pace": "wait",
+    },
+    "rivers": {"stiffness": 150.0, "damping": 16.0, "river_tube": 0.015},
+}  # fmt: skip
 
 
 @njit
@@ -49,7 +52,9 @@ def _field(mode):
         performed = performance(times, CURVE.point(times) * swell[:, None])
         return Edited(River(CURVE, 0.04), (performed,), (1.0,))
     name, _, crossing = mode.partition(" ")
-    return law(FLAGS(mode=name, crossing=crossing or "discrete"), CURVE)
+    words = WORDS[name] | ({"crossing": crossing} if crossing else {})
+    config = run_config(name, "composite", radius=0.0477, lap=4.0, reach=0.025, **words)
+    return parts_of(config, map_parts(config, figure_model())).field
 
 
 def _trajectory(mode):

@@ -10,20 +10,21 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.own_law import law
 from controllers.fields.python_law import PythonLaw
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.setups.own_law import loop_with
 from sim.errors import SimError
 from sim.loop.loop import Loop
 
-CONFIG = RunConfig(clips=("cheer", "angry"), seconds=0.2)
-FOLLOW = Follow(Trajectory.circle(CONFIG.radius, CONFIG.lap), CONFIG.stiffness, CONFIG.damping, CONFIG.tube)
+CONFIG = run_config(clips=("cheer", "angry"), seconds=0.2)
+AROUND, MODE = CONFIG.map.around, CONFIG.mode
+FOLLOW = Follow(Trajectory.circle(AROUND.radius, AROUND.lap), MODE.stiffness, MODE.damping, MODE.tube)
 
 
 def _run(program, seconds=0.2):
     logs = []
 
     def keep(ticks, frames, n):
-        m = -(-n // CONFIG.figure_ticks)
+        m = -(-n // session.servo.figure_ticks)
         logs.append([a[:n].copy() for a in ticks] + [a[:m].copy() for a in frames])
 
     session, loop = loop_with(CONFIG, program, keep)

@@ -102,7 +102,8 @@ def test_another_gain_is_told_apart(folder: Path, tmp_path: Path, capsys: pytest
     with h5py.File(altered / "run.h5", "r+") as file:
         config = json.loads(file["config"][()])
         del file["config"]
-        file["config"] = json.dumps(config | {"stiffness": 301.0})
+        config["mode"]["stiffness"] = 301.0
+        file["config"] = json.dumps(config)
     assert main(["reproduce", str(altered)]) == 1
     assert "differs first at tick" in capsys.readouterr().out
 

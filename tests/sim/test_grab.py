@@ -10,7 +10,7 @@ from sim.users.intent import Grab
 from sim.world.world import World
 from tests.sim.bare_servos import Stepped
 
-GRAB = Grab(1.0, (0.0, 0.02, 0.0), duration=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
+GRAB = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.2, place=(0.05, 0.0, 0.0), reach=0.4)
 
 
 class Hand:
@@ -46,7 +46,7 @@ def test_it_goes_to_the_place_presses_carries_holds_and_lets_go() -> None:
 
 
 def test_a_steady_one_moves_from_its_first_moment_to_its_last() -> None:
-    grab = Grab(1.0, (0.0, 0.02, 0.0), duration=0.5, hold=0.0, steady=True)
+    grab = Grab(1.0, (0.0, 0.02, 0.0), seconds=0.5, hold=0.0, steady=True)
     hand, damped = (Hand(Arm(stiffness=k, damping=b, grabs=(grab,))) for k, b in ((200.0, 0.0), (1e-9, 5.0)))
     for share in (0.0, 0.1, 0.5, 0.99):
         force, pressed = hand.at(1.0 + 0.5 * share)
@@ -66,7 +66,7 @@ def test_it_damps_towards_the_speed_that_it_wants() -> None:
 
 
 def test_without_a_place_it_presses_where_it_is() -> None:
-    hand = Hand(Arm(grabs=(Grab(0.5, (0.0, 0.0, 0.0), duration=0.2, hold=0.0),)))
+    hand = Hand(Arm(grabs=(Grab(0.5, (0.0, 0.0, 0.0), seconds=0.2, hold=0.0),)))
     assert hand.at(0.4) == (pytest.approx(np.zeros(3)), 0.0)
     force, pressed = hand.at(0.5)
     np.testing.assert_allclose(force, 0.0, atol=1e-12)
@@ -77,7 +77,7 @@ def test_without_a_place_it_presses_where_it_is() -> None:
 def test_the_device_tells_of_the_switch() -> None:
     world = World()
     world.reset(np.array([0.03, 0.02, 0.02]), rest_pose())
-    arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), duration=0.03, hold=0.0),))
+    arm = Arm(grabs=(Grab(0.02, (0.0, 0.0, 0.0), seconds=0.03, hold=0.0),))
     phantom, switches = Stepped(world, arm), []
     for _ in range(80):
         switches.append(phantom.read().switch)
@@ -91,11 +91,11 @@ def test_the_device_tells_of_the_switch() -> None:
 @pytest.mark.parametrize(
     "grab",
     [
-        {"start": -1.0, "carry": (0.0, 0.0, 0.0)},
-        {"start": 0.0, "carry": (0.0, np.nan, 0.0)},
-        {"start": 0.0, "carry": (0.0, 0.0, 0.0), "duration": 0.0},
-        {"start": 0.0, "carry": (0.0, 0.0, 0.0), "hold": -0.1},
-        {"start": 0.0, "carry": (0.0, 0.0, 0.0), "place": (0.0, 0.0, 0.0), "reach": 0.0},
+        {"at": -1.0, "carry": (0.0, 0.0, 0.0)},
+        {"at": 0.0, "carry": (0.0, np.nan, 0.0)},
+        {"at": 0.0, "carry": (0.0, 0.0, 0.0), "seconds": 0.0},
+        {"at": 0.0, "carry": (0.0, 0.0, 0.0), "hold": -0.1},
+        {"at": 0.0, "carry": (0.0, 0.0, 0.0), "place": (0.0, 0.0, 0.0), "reach": 0.0},
     ],
 )
 def test_a_grab_that_makes_no_sense_is_refused(grab: dict) -> None:

@@ -66,11 +66,11 @@ def test_a_push_at_a_place_waits_until_the_hand_comes_there() -> None:
 @pytest.mark.parametrize(
     "push",
     [
-        {"start": -1.0, "duration": 1.0, "peak": 1.0},
-        {"start": 0.0, "duration": 0.0, "peak": 1.0},
-        {"start": 0.0, "duration": 1.0, "peak": float("nan")},
-        {"start": 0.0, "duration": 1.0, "peak": 1.0, "direction": (0.0, 0.0, 0.0)},
-        {"start": 0.0, "duration": 1.0, "peak": 1.0, "place": (0.0, 0.0, 0.0), "radius": 0.0},
+        {"at": -1.0, "seconds": 1.0, "force": 1.0},
+        {"at": 0.0, "seconds": 0.0, "force": 1.0},
+        {"at": 0.0, "seconds": 1.0, "force": float("nan")},
+        {"at": 0.0, "seconds": 1.0, "force": 1.0, "direction": (0.0, 0.0, 0.0)},
+        {"at": 0.0, "seconds": 1.0, "force": 1.0, "place": (0.0, 0.0, 0.0), "radius": 0.0},
     ],
 )
 def test_a_push_that_makes_no_sense_is_refused(push: dict[str, float]) -> None:

@@ -137,9 +137,9 @@ def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: t
     """Read, evaluate, limit, write from Python: the same stylus, but for what the figure does to the solver."""
     compiled, stepped = session_of(clips), session_of(clips)
     ticks, _ = run_logged(compiled, 300)
-    arm = Arm(pushes=CONFIG.pushes)
+    arm = Arm(pushes=CONFIG.user.pushes)
     field = stepped.servo.field
-    phantom, path = Stepped(stepped.world, arm, CONFIG.cutoff), []
+    phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
     for _ in range(300):
         hand = phantom.read().vector()
         evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
@@ -155,7 +155,7 @@ def test_a_physics_step_that_does_not_divide_the_servo_period_is_refused() -> No
 
 
 def test_physics_and_servo_are_two_rates(clips: tuple) -> None:
-    config = run_config(clips=CLIPS, seconds=0.1, scene=SceneConfig(servo_period=2e-3, physics_step=5e-4))
+    config = run_config(clips=CLIPS, seconds=0.1, servo_period=2e-3, physics_step=5e-4)
     session = wire(config, clips)
     run_logged(session, 50)
     assert session.world.data.time == pytest.approx(0.1, abs=1e-9)

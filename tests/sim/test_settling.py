@@ -10,7 +10,8 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs, packed_legs
-from experiments.setups.stretch import edited_until, flight_remarks
+from experiments.setups.hands import edited_until
+from experiments.setups.stretch import flight_remarks
 from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
@@ -143,6 +144,6 @@ def test_a_figure_whose_flights_are_held_and_carried_stands(clips: tuple[str, ..
         errors.append(float(pose_errors(frames.qpos[:m, root : root + 75], frames.reference[:m])[1].max()))
 
     Loop(session.servo, session.world, keep).run(config.seconds)
-    assert config.seconds > edited_until(session.config.grabs) + 3.0
+    assert config.seconds > edited_until(session.config.user.grabs) + 3.0
     # It fell at 11.7 s with the jump and at 6.2 s with the four.
     assert max(errors) < 0.3

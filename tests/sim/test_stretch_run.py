@@ -1,7 +1,5 @@
 """The servo with STRETCHY TUBES: a simulated hand bends the curve, and the figure shows what is under it."""
 
-from types import SimpleNamespace
-
 import matplotlib.image
 import numpy as np
 import pytest
@@ -10,12 +8,13 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
+from experiments.config.modes import Stretch
 from experiments.config.words import run_config
 from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve
 from experiments.results.stretch_figure import draw_stretch
 from experiments.results.stretch_summary import stretch_summary
 from experiments.setups.session import Session
-from experiments.setups.stretch import law, stretch_grabs
+from experiments.setups.stretch import stretch_grabs, stretch_parts
 from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
 from models.mocap.clip import pose_difference
@@ -27,17 +26,17 @@ from sim.recording.recording import Recording
 from sim.reference.reference import poses_along
 from sim.users.arm import Arm
 
-FLAGS = SimpleNamespace(
-    mode="stretch", seek=150.0, rubber=150.0, rubber_tube=0.008, bump=0.5, stiffness=300.0, damping=4.0, tube=0.25
-)
+MODE = Stretch(seek=150.0, rubber=150.0, tube_damping=14.0, rubber_tube=0.008, bump=0.5)
 SECONDS = 4.3  # the first grab, and a little more
 
 
 def run() -> tuple[Session, StretchyTubes, dict[str, np.ndarray]]:
     config = run_config(clips=("cheer", "angry"), seconds=SECONDS)
     session = wire(config)
-    grabs = stretch_grabs(session.curve, FLAGS.rubber_tube)[:1]
-    field = law(FLAGS, session.curve, grabs)
+    grabs = stretch_grabs(session.curve, MODE.rubber_tube)[:1]
+    bending = run_config(mode="stretch", seconds=SECONDS, grabs=grabs)  # pyright: ignore[reportArgumentType]
+    field = stretch_parts(bending, MODE, session.parts.maps).field
+    assert isinstance(field, StretchyTubes)
     program, channels = field.program(), {"p": [], "switch": [], "distance": [], "force": []}
     shown: list[np.ndarray] = []
     compiled = session.servo.field.of(program)
@@ -81,7 +80,7 @@ def test_the_rubber_pulls_the_hand_back(ran) -> None:
     _, field, told = ran
     last = np.flatnonzero(told["switch"] > 0.0)[-1]
     away = told["p"][last] - field.curve.point(0.5)
-    np.testing.assert_allclose(told["force"][last], -FLAGS.rubber * away, atol=0.1)
+    np.testing.assert_allclose(told["force"][last], -MODE.rubber * away, atol=0.1)
 
 
 def test_the_figure_shows_the_animation_under_the_held_point(ran) -> None:

@@ -1,7 +1,6 @@
 """The energy tank of the servo: a field as it is meant does not feel it, a wrong or late one is held to its budget."""
 
 from collections import deque
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,14 +52,14 @@ def injected(p, force):
     ids=lambda changes: changes["mode"],
 )
 def test_a_field_as_it_is_meant_is_never_held_back(changes):
-    session, _, _, tank = run(None, config=replace(CONFIG, **changes))
+    session, _, _, tank = run(None, config=run_config(clips=CLIPS, seconds=1.0, **changes))
     assert np.all(tank[:, 1] == 1.0)
     assert tank[:, 0].min() > 0.5 * tank[0, 0] > 0.0
     assert session.servo.field.tank[TANK_ENERGY] == tank[-1, 0]
 
 
 def test_without_need_the_tank_changes_no_bit_of_a_force():
-    config = replace(CONFIG, user="push", pushes=lap_pushes(0.0, 1.0))
+    config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=lap_pushes(0.0, 1.0))
     session, p, force, _ = run(None, config=config, seconds=0.5)
     _, other_p, other_force, _ = run(session.field.program(), OPEN, 0.5, config)
     np.testing.assert_array_equal(force, other_force)
@@ -69,7 +68,7 @@ def test_without_need_the_tank_changes_no_bit_of_a_force():
 
 def test_what_a_hand_puts_into_a_spring_it_gets_back():
     """A push of 4 N stores more than the tank held at first could lose; the way back is not held back."""
-    config = replace(CONFIG, pushes=lap_pushes(0.0, 1.0, 4.0)[:1], user="push")
+    config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=lap_pushes(0.0, 1.0, 4.0)[:1])
     tank = EnergyTank(1e-3, power=0.012, capacity=2.0, initial=2e-3)
     _, p, force, held = run(wire(config, load_clips(CLIPS)[0]).field.program(), tank, 1.0, config)
     work = injected(p, force)
@@ -92,7 +91,7 @@ def late(ticks):
     def force(hand):
         past.append((hand.p, hand.v))
         p, v = past[0]
-        return -400.0 * (p - [CONFIG.radius, 0.0, 0.0]) - 4.0 * v
+        return -400.0 * (p - [CONFIG.map.around.radius, 0.0, 0.0]) - 4.0 * v
 
     return force
 
@@ -100,7 +99,7 @@ def late(ticks):
 @pytest.mark.parametrize("make", [lambda: wrong, lambda: late(25)], ids=["wrong sign", "late"])
 def test_a_wrong_law_gets_no_more_than_its_budget(make):
     tank = EnergyTank(1e-3, power=0.02, capacity=0.5, initial=0.02)
-    config = replace(CONFIG, user="push", pushes=(Push(0.0, 0.1, 2.0),))
+    config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=(Push(0.0, 0.1, 2.0),))
     _, p, force, held = run(PythonLaw(make()).program(), tank, 1.5, config)
     _, free_p, free_force, _ = run(PythonLaw(make()).program(), OPEN, 1.5, config)
     time = 1e-3 * np.arange(1, len(p))

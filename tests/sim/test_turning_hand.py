@@ -128,8 +128,8 @@ def test_a_run_with_turns_replays_bit_for_bit():
 @pytest.mark.parametrize(
     "turn",
     [
-        {"start": -1.0},
-        {"duration": 0.0},
+        {"at": -1.0},
+        {"seconds": 0.0},
         {"angle": np.nan},
         {"angle": 4.0},
         {"axis": (0.0, 0.0, 0.0)},
@@ -138,7 +138,7 @@ def test_a_run_with_turns_replays_bit_for_bit():
 )
 def test_a_turn_that_makes_no_sense_is_refused(turn):
     with pytest.raises(SimError):
-        Turn(**({"start": 0.0, "duration": 1.0, "angle": 0.5, "axis": (0.0, 0.0, 1.0)} | turn))
+        Turn(**({"at": 0.0, "seconds": 1.0, "angle": 0.5, "axis": (0.0, 0.0, 1.0)} | turn))
 
 
 def test_fingers_that_make_no_sense_are_refused():

@@ -22,7 +22,7 @@ Mask = npt.NDArray[np.bool_]
 
 _SHARE = 0.01  # ε: makes the forces unique, so that they share the load and depend continuously on the state
 _SLOPE = FRICTION / np.sqrt(2)  # the pyramid lies inside the cone
-_EDGES = np.array([(x * _SLOPE, y * _SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
+EDGES = np.array([(x * _SLOPE, y * _SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
 _N_SPHERES = len(FOOT_CONTACTS)
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
@@ -54,13 +54,13 @@ class Demand(NamedTuple):
     def columns(self) -> Array:
         """A: wrenches about the centre of mass of a unit force along every edge of every sphere, shape (m, 6, 32)."""
         arms = self.spheres - self.com[:, None] - (0.0, 0.0, CONTACT_RADIUS)
-        moments = np.cross(arms[:, :, None], _EDGES)
-        edges = np.broadcast_to(_EDGES, moments.shape)
+        moments = np.cross(arms[:, :, None], EDGES)
+        edges = np.broadcast_to(EDGES, moments.shape)
         return np.concatenate([edges, moments], axis=-1).reshape(len(arms), 4 * _N_SPHERES, 6).transpose(0, 2, 1)
 
     def torque_on(self, grip: Array) -> Array:
         """τ − Jᵀ f: torques of the joints while the floor pushes with `grip` (m, 32), shape (m, 51) [N m]."""
-        forces = grip.reshape(len(grip), _N_SPHERES, 4) @ _EDGES
+        forces = grip.reshape(len(grip), _N_SPHERES, 4) @ EDGES
         soles = self.spheres - (0.0, 0.0, CONTACT_RADIUS)
         torque = self.torque.copy()
         for leg, body in enumerate(_LEGS):

@@ -257,7 +257,8 @@ def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
 def _append(
     values: "array[float]", row: dict[str, list[float]], moving: dict[str, _Bone], path: Path, line: int
 ) -> None:
-    for name in moving:
-        if name not in row:
-            raise MotionFileError(path, line, f"frame without {quoted(name)}", "every moving bone in every frame")
-        values.extend(row[name])
+    """A frame's row: bones that it does not mention are not turned, but where the body is has to be said."""
+    if "root" in moving and "root" not in row:
+        raise MotionFileError(path, line, "frame without 'root'", "the root in every frame")
+    for name, bone in moving.items():
+        values.extend(row.get(name) or [0.0] * len(bone.freedoms))

@@ -94,7 +94,11 @@ def read_deepmimic(path: Path) -> SourceMotion:
     rotations = quaternions.sign_continuous(rotations / norms)
     translations, rotations, fps = _at_equal_steps(durations, translations, rotations, path)
     names, parents = tuple(joint.name for joint in joints), tuple(joint.parent for joint in joints)
-    return SourceMotion(path, names, parents, offsets, np.zeros_like(offsets), rotations, translations, fps, 1.0)
+    loop = document.get("Loop")
+    loops = loop == "wrap" if isinstance(loop, str) else None
+    return SourceMotion(
+        path, names, parents, offsets, np.zeros_like(offsets), rotations, translations, fps, 1.0, "+Y", loops
+    )
 
 
 def _parse(path: Path) -> tuple[str, dict[str, object]]:

@@ -38,6 +38,10 @@ class SourceMotion:
         Frames per second [1/s].
     unit : float or None
         The file's unit of length [m] where the format tells it.
+    up : str or None
+        The file's axis that points up, such as ``+Y``, where the format tells it.
+    loops : bool or None
+        Whether the motion goes on from its last frame with its first one, where the file tells it.
     """
 
     path: Path
@@ -49,6 +53,8 @@ class SourceMotion:
     translations: Array
     fps: float
     unit: float | None
+    up: str | None = None
+    loops: bool | None = None
 
     @property
     def n_frames(self) -> int:

@@ -1,7 +1,8 @@
 """Which joint of a foreign skeleton plays which part of the figure, found by its name and its place in the tree.
 
-Names known: CMU (ASF and both BVH conversions), Mixamo and HumanIK, SFU, Biovision, 3ds Max Biped, Xsens, DeepMimic,
-Daz and the figure's own. Pelvis, chest and abdomen go by many names, so they are taken by place: the pelvis is where
+Names known: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max Biped, Unreal,
+Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with sides before or
+after, namespaces and numbers. Pelvis, chest and abdomen go by many names, so they are taken by place: the pelvis is where
 the legs meet, the chest where the arms meet, the abdomen halfway between.
 """
 
@@ -12,11 +13,11 @@ from models.humanoid.skeleton import BODIES, SEGMENTS
 
 _SIDED = {
     "clavicle": ("clavicle", "collar", "collarbone", "shoulder"),
-    "upper_arm": ("upperarm", "uparm", "humerus", "shldr", "arm", "shoulder"),
-    "forearm": ("forearm", "lowerarm", "lowarm", "elbow", "radius"),
+    "upper_arm": ("upperarm", "uparm", "uarm", "humerus", "shldr", "arm", "shoulder"),
+    "forearm": ("forearm", "lowerarm", "lowarm", "farm", "elbow", "radius"),
     "hand": ("fingerbase", "hand"),
     "wrist": ("wrist", "hand"),
-    "thigh": ("upleg", "upperleg", "thigh", "femur", "hip"),
+    "thigh": ("upleg", "upperleg", "uleg", "thigh", "femur", "hip"),
     "shank": ("lowleg", "lowerleg", "shin", "calf", "tibia", "knee", "leg"),
     "foot": ("foot", "ankle"),
     "toe": ("toebase", "toe", "toes", "toe0", "forefoot", "ball"),
@@ -26,8 +27,9 @@ _CENTRAL = {
     "neck": ("neck", "neck1", "lowerneck"),
     "head": ("head",),
 }
-_PREFIX = re.compile(r"(mixamorig|character|bip|biped|valve|cc|base|j|def|org)\d*")
+_PREFIX = re.compile(r"(mixamorig|character|skeleton|actor|armature|rig|bip|biped|valve|cc|base|j|def|org)\d*")
 _WORDS = re.compile(r"[A-Z]?[a-z]+\d*|[A-Z]+(?![a-z])\d*|\d+")
+_HELPER = re.compile(r"twist|roll|helper|corrective|muscle|mesh|nub|end|ik|pole|ctrl|target|site|marker|tip")
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
 
 
@@ -95,8 +97,14 @@ def _base(name: str) -> tuple[str, str]:
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     bare = "".join(word for word in words if word not in _SIDES)
     known = {alias for aliases in _SIDED.values() for alias in aliases}
-    if not side and bare[:1] in ("l", "r") and bare[1:] in known:
-        return _SIDES[bare[0]], bare[1:]  # lfemur
+    if side and bare not in known:
+        # thigh.L.001, lThighBend, and the mirrored chains of some rigs
+        short = bare.rstrip("0123456789").removesuffix("bend")
+        bare = short if short in known else bare
+    if not side and bare[:1] in ("l", "r"):
+        for short in (bare[1:], bare[1:].removesuffix("bend")):
+            if short in known:
+                return _SIDES[bare[0]], short  # lfemur
     return side, bare
 
 
@@ -105,7 +113,9 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
     bases: dict[tuple[str, str], int] = {}
     leaves = set(range(len(joints))) - set(parents)
     for index in sorted(range(len(joints)), key=lambda joint: joint in leaves):
-        bases.setdefault(_base(joints[index]), index)
+        side, bare = _base(joints[index])
+        if not _HELPER.search(bare):
+            bases.setdefault((side, bare), index)
     found: dict[str, int] = {}
 
     def find(part: str, side: str, aliases: tuple[str, ...]) -> None:
@@ -118,6 +128,11 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
     for side in ("left", "right"):
         for part, aliases in _SIDED.items():
             find(f"{side}_{part}", side, aliases)
+        ankle, foot = bases.get((side, "ankle")), bases.get((side, "foot"))
+        if ankle is not None and foot is not None and ankle in _ancestry(foot, parents):
+            # SMPL's foot is the ball of the foot.
+            found[f"{side}_foot"] = ankle
+            found.setdefault(f"{side}_toe", foot)
         # A shoulder is the clavicle where the skeleton has an arm beside it, and the arm where it has not.
         if found.get(f"{side}_clavicle") == found.get(f"{side}_upper_arm"):
             found.pop(f"{side}_clavicle", None)

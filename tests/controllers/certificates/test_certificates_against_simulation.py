@@ -14,8 +14,8 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
+from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
 from experiments.studies.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
-from experiments.studies.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path, simulate
 from sim.users.arm import Arm
 
 pytestmark = pytest.mark.slow

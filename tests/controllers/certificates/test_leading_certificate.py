@@ -16,11 +16,12 @@ from controllers.fields.leading import Gait, Leading, leading_wrench
 from controllers.state import HandState
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
+from experiments.certify.trial_simulation import Conditions, simulate
+from experiments.config.modes import Lead
 from experiments.config.words import run_config
 from experiments.setups.lead import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted
-from experiments.studies.trial_simulation import Conditions, simulate
 from models.mocap.library import embedded
 
 DEVICE, CURVE = phantom_device(), s_curve()
@@ -120,7 +121,7 @@ def test_the_walker_as_state_moves_as_the_executed_one(regime, delay):
 
 
 def test_the_executed_law_gives_no_more_power_than_is_certified():
-    field = leading_field(run_config(mode="lead"), embedded("walk"))
+    field = leading_field(run_config(mode="lead"), Lead(), embedded("walk"))
     verdict = leading_energy(field)
     rng = np.random.default_rng(7)
     most = 0.0
@@ -152,8 +153,7 @@ def test_ahead_and_aside_the_force_has_no_potential():
 
 @pytest.mark.slow
 def test_led_figures_are_certified_and_one_with_little_damping_is_refuted():
-    config = run_config(mode="lead")
-    field = leading_field(config, embedded("walk"))
+    field = leading_field(run_config(mode="lead"), Lead(), embedded("walk"))
     assert leading_regimes(field)["_beyond"][0].turn > leading_regimes(field)["_aside"][0].turn > 0.5
     hands = type("Few", (), {"hands": lambda self: [NO_HAND, HandImpedance(0.1, 2.0, 0.0)]})()
     verdicts = certify_leading(field, CURVE, DEVICE, Sampling(1e-3), hands)  # pyright: ignore

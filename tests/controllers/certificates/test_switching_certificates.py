@@ -179,7 +179,7 @@ def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
     config = run_config(mode="rivers")
     main = certified_rivers(config)[""]
     curve, clock = main.curve, main.sampling
-    verdict = certify_rivers(config, main, HandRange(), 0.5, {"": curve})["switching"]
+    verdict = certify_rivers(config, config.mode, main, HandRange(), 0.5, {"": curve})["switching"]
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0

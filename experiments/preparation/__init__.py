@@ -1,0 +1,1 @@
+"""Captures made well-formed: the command, its report, and the door for runs."""

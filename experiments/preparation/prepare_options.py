@@ -1,0 +1,42 @@
+"""What ``hvf prepare`` is told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Prepare:
+    """Make a well-formed clip of anybody's capture: on the floor, looped or at rest, feasible on contact alone."""
+
+    source: Annotated[Path, tyro.conf.Positional]
+    """Motion file to read: BVH, AMC (with its ASF beside it) or DeepMimic."""
+    target: Annotated[Path, tyro.conf.Positional]
+    """BVH file to write."""
+    loop: str = "auto"
+    """How it goes on: auto, open, or START:END of the cycle in seconds."""
+    mirror: bool = False
+    """Exchange left and right."""
+    up: str | None = None
+    """The file's axis that points up, such as +Y, where the motion does not tell."""
+    rest_frame: int | None = None
+    """A frame in which the body stands upright with level feet, where the motion does not tell."""
+    report: Path | None = None
+    """Folder for a page that shows what was done."""
+    overwrite: bool = False
+    """Replace the target if it exists."""
+
+    def __call__(self) -> int:
+        """Prepare, and say how well-formed it is."""
+        from experiments.preparation.command import prepare_file, summary
+        from models.mocap.preparation.well_formed import well_formed
+        from models.mocap.retargeting.retarget import Hints
+
+        made = prepare_file(
+            self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
+            self.overwrite,
+        )  # fmt: skip
+        print(summary(made, well_formed(made.clip)))
+        return 0

@@ -1,0 +1,52 @@
+"""The door for runs: a foreign motion file as a well-formed clip, prepared once and kept."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.files.kept import kept_array
+from models.mocap.clip import Clip
+from models.mocap.library import load
+from models.mocap.preparation.prepare import prepared
+from sim.compilation.compiled import CACHE_FOLDER
+
+
+class PreparedClip(NamedTuple):
+    """A clip for a run.
+
+    Attributes
+    ----------
+    clip : Clip
+        Well-formed, or as the file has it where it is on the figure's own skeleton.
+    remarks : tuple of str
+        What the file was taken for and what was done with it, a line each.
+    """
+
+    clip: Clip
+    remarks: tuple[str, ...]
+
+
+def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
+    """The motion in a file, prepared; what `write_bvh` wrote is taken as it is, and so is everything if `raw`.
+
+    Prepared clips are kept under a hash of the captured poses and of the project's sources.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read, or contradicts itself.
+    """
+    loaded = load(path)
+    if raw or loaded.report is None:
+        return PreparedClip(loaded.clip, () if loaded.report is None else loaded.report.lines())
+
+    def find() -> npt.NDArray[np.float64]:
+        clip = prepared(path).clip
+        return np.vstack((np.full((1, clip.poses.shape[1]), clip.fps), clip.poses))
+
+    made_of = (loaded.clip.poses, np.array([loaded.clip.fps, -1.0 if loaded.loops is None else float(loaded.loops)]))
+    rows = kept_array(CACHE_FOLDER, "prepared", made_of, (-1, loaded.clip.poses.shape[1]), find)
+    clip = Clip(rows[1:], float(rows[0, 0]), loaded.clip.name)
+    return PreparedClip(clip, (*loaded.report.lines(), f"{path.name}: prepared; --raw takes the capture as it is"))

@@ -1,0 +1,220 @@
+r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
+
+A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). Each instant depends on six control
+points, so the normal equations are banded; those of a closed motion have a border of the last five control points.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import BSpline, CubicSpline
+from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+
+from models.humanoid.skeleton import N_TANGENT
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from models.mocap.preparation.poses import around, plus
+
+Array = npt.NDArray[np.float64]
+
+DEGREE = 5
+_STEP = 1e-3  # of the differences that give velocities [s]
+_MARGIN = 12  # frames beyond the ends of a closed clip that shape its spline
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """States of the changed motion at the sampled instants: MuJoCo's qpos, qvel, qacc."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+class Change:
+    """δ(t) over a clip: n_points control points of 57 numbers.
+
+    Parameters
+    ----------
+    clip : Clip
+        q_ref; closed, or open.
+    knot, step : float
+        About how far knots and sampled instants lie apart [s]; both are made to fit the clip.
+
+    Attributes
+    ----------
+    times : array, shape (m,)
+        Sampled instants [s].
+    basis : list of 4 arrays, shape (m, 6)
+        Weights of the six control points that an instant depends on, and their derivatives.
+    first : array of int, shape (m,)
+        Number of the first of them.
+    """
+
+    def __init__(self, clip: Clip, knot: float, step: float) -> None:
+        self.clip, self.closed = clip, clip.closes()
+        seconds = clip.duration
+        self.intervals = max(DEGREE + 2, round(seconds / knot))
+        each = max(2, round(seconds / self.intervals / step))
+        count = self.intervals * each
+        self.times = np.arange(count + (not self.closed)) * seconds / count
+        self.n_points = self.intervals if self.closed else self.intervals + DEGREE
+        spacing = seconds / self.intervals
+        knots = (np.arange(self.intervals + 2 * DEGREE + 1) - DEGREE) * spacing
+        self._spline = BSpline(knots, np.eye(self.intervals + DEGREE), DEGREE)
+        self.first = np.minimum((self.times / spacing + 1e-9).astype(int), self.intervals - 1)
+        at = np.minimum(self.times, seconds - 1e-12)
+        which = self.first[:, None] + np.arange(DEGREE + 1)
+        self.basis = [np.take_along_axis(self._spline(at, order), which, axis=1) for order in range(4)]
+        self.wrap = np.eye(N_TANGENT)
+        there = clip.displacement
+        if self.closed:
+            c, s = np.cos(there.yaw), np.sin(there.yaw)
+            self.wrap[:2, :2] = [[c, -s], [s, c]]
+            poses, first = around(clip, _MARGIN)
+            self._reference = CubicSpline((np.arange(len(poses)) - first) / clip.fps, poses)
+        else:
+            self._reference = CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses, bc_type="clamped")
+        self._end = seconds
+        self.border = DEGREE * N_TANGENT if self.closed else 0
+
+    def _reference_at(self, times: Array) -> Array:
+        poses = self._reference(times if self.closed else np.clip(times, 0.0, self._end))
+        turns = poses[:, 3:].reshape(len(poses), -1, 4)
+        poses[:, 3:] = (turns / np.linalg.norm(turns, axis=2, keepdims=True)).reshape(len(poses), -1)
+        return poses
+
+    def points(self, x: Array) -> Array:
+        """All control points, those that wrap included, shape (intervals + 5, 57)."""
+        if not self.closed:
+            return x
+        return np.vstack((x, x[:DEGREE] @ self.wrap.T))
+
+    def states(self, x: Array) -> State:
+        """The changed motion at the sampled instants."""
+        points = self.points(x)
+        which = self.first[:, None] + np.arange(DEGREE + 1)
+        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order], points[which]) for order in range(3))
+        moments = [
+            plus(self._reference_at(self.times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
+            for o in (-1.0, 0.0, 1.0)
+        ]
+        m = len(self.times)
+        turns = [pose[:, 3:].reshape(m, 18, 4) for pose in moments]
+
+        def between(a: Array, b: Array) -> Array:
+            return quaternions.logarithm(quaternions.product(quaternions.conjugate(a), b)).reshape(m, 54)
+
+        v, a = np.empty((m, N_TANGENT)), np.empty((m, N_TANGENT))
+        v[:, :3] = (moments[2][:, :3] - moments[0][:, :3]) / (2 * _STEP)
+        a[:, :3] = (moments[2][:, :3] - 2 * moments[1][:, :3] + moments[0][:, :3]) / _STEP**2
+        v[:, 3:] = between(turns[0], turns[2]) / (2 * _STEP)
+        a[:, 3:] = (between(turns[1], turns[2]) - between(turns[0], turns[1])) / _STEP**2
+        if not self.closed:
+            # Before and after the clip its ends are held: differences over them tell nothing.
+            v[0], a[0], v[-1], a[-1] = v[1], a[1], v[-2], a[-2]
+        return State(moments[1], v, a)
+
+    def changed(self, x: Array, fps: float) -> Clip:
+        """The clip with the change, closed as it was."""
+        n = round(self.clip.duration * fps)
+        times = np.arange(n + 1) * self._end / n
+        tangents = self._spline(np.minimum(times, self._end - 1e-12)) @ self.points(x)
+        poses = plus(self._reference_at(times), tangents)
+        if self.closed:
+            poses[-1] = self.clip.displacement.moved(poses[0])
+        return Clip(poses, n / self._end, self.clip.name)
+
+    def size(self, x: Array) -> Array:
+        """Δ at the sampled instants, shape (m, 57)."""
+        which = self.first[:, None] + np.arange(DEGREE + 1)
+        return np.einsum("mk,mkn->mn", self.basis[0], self.points(x)[which])
+
+
+class Normal:
+    """Normal equations of a change, H x = g: a band, and a border where the motion is closed.
+
+    Parameters
+    ----------
+    change : Change
+        Whose control points are unknown.
+    """
+
+    def __init__(self, change: Change) -> None:
+        n = N_TANGENT
+        self._change = change
+        self._inner = change.n_points * n - change.border
+        self._width = (DEGREE + 1) * n
+        self.band = np.zeros((self._width, self._inner))
+        self.side = np.zeros((self._inner, change.border))
+        self.corner = np.zeros((change.border, change.border))
+        self._rows, self._columns = np.tril_indices(self._width)
+
+    def copy(self) -> "Normal":
+        """The same, to be added to."""
+        twin = Normal(self._change)
+        twin.band, twin.side, twin.corner = self.band.copy(), self.side.copy(), self.corner.copy()
+        return twin
+
+    def add(self, interval: int, block: Array) -> None:
+        """Add a block (342, 342) that couples the six control points of a knot interval."""
+        n, change = N_TANGENT, self._change
+        if not change.closed or interval + DEGREE < change.n_points - DEGREE:
+            self.band[self._rows - self._columns, interval * n + self._columns] += block[self._rows, self._columns]
+            return
+        points = np.arange(interval, interval + DEGREE + 1)
+        wrapped = np.flatnonzero(points >= change.n_points)
+        block = block.copy()
+        for k in wrapped:
+            block[:, k * n : (k + 1) * n] = block[:, k * n : (k + 1) * n] @ change.wrap
+        for k in wrapped:
+            block[k * n : (k + 1) * n] = change.wrap.T @ block[k * n : (k + 1) * n]
+        points = points % change.n_points
+        edge = change.n_points - DEGREE
+        for i, a in enumerate(points):
+            for j, b in enumerate(points):
+                part = block[i * n : (i + 1) * n, j * n : (j + 1) * n]
+                if a >= edge and b >= edge:
+                    self.corner[(a - edge) * n : (a - edge + 1) * n, (b - edge) * n : (b - edge + 1) * n] += part
+                elif b >= edge:
+                    self.side[a * n : (a + 1) * n, (b - edge) * n : (b - edge + 1) * n] += part
+                elif a < edge and a >= b:
+                    rows, columns = np.indices((n, n))
+                    keep = (a - b) * n + rows - columns >= 0
+                    self.band[((a - b) * n + rows - columns)[keep], (b * n + columns)[keep]] += part[keep]
+
+    def gradient(self, parts: Array) -> Array:
+        """Sum of gradients (intervals, 342) by knot interval, as one vector."""
+        n, change = N_TANGENT, self._change
+        total = np.zeros((change.intervals + DEGREE, n))
+        for interval, part in enumerate(parts):
+            total[interval : interval + DEGREE + 1] += part.reshape(-1, n)
+        if change.closed:
+            total[:DEGREE] += total[change.intervals :] @ change.wrap
+            total = total[: change.intervals]
+        return total.ravel()
+
+    def times(self, x: Array) -> Array:
+        """H x."""
+        inner, border = x[: self._inner], x[self._inner :]
+        y = self.band[0] * inner
+        for d in range(1, self._width):
+            if d < len(inner):
+                row = self.band[d, : len(inner) - d]
+                y[d:] += row * inner[:-d]
+                y[:-d] += row * inner[d:]
+        return np.concatenate((y + self.side @ border, self.side.T @ inner + self.corner @ border))
+
+    def solve(self, g: Array, damping: float) -> Array:
+        """X of (H + damping diag H) x = g."""
+        band = self.band.copy()
+        band[0] = band[0] * (1.0 + damping) + 1e-9
+        factor = (cholesky_banded(band, lower=True, check_finite=False), True)
+        inner, border = g[: self._inner], g[self._inner :]
+        if not len(border):
+            return cho_solve_banded(factor, inner, check_finite=False)
+        done = cho_solve_banded(factor, np.column_stack((inner, self.side)), check_finite=False)
+        corner = self.corner + np.diag(damping * np.diag(self.corner) + 1e-9) - self.side.T @ done[:, 1:]
+        last = cho_solve(cho_factor(corner), border - self.side.T @ done[:, 0])
+        return np.concatenate((done[:, 0] - done[:, 1:] @ last, last))

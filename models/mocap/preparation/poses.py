@@ -1,0 +1,90 @@
+"""Poses as points of a manifold: carried along tangents, resampled, smoothed; where the soles are in them."""
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
+from models.mocap import quaternions
+from models.mocap.clip import Clip, PlanarDisplacement
+
+Array = npt.NDArray[np.float64]
+
+_PASSES = (
+    0.802  # a Butterworth filter of second order run both ways halves the power at this share of its corner (Winter)
+)
+
+
+def plus(poses: Array, tangents: Array) -> Array:
+    """Poses carried along tangents for a unit of time, (..., 75) and (..., 57) → (..., 75); mj_integratePos."""
+    carried = np.array(poses, dtype=np.float64)
+    carried[..., :3] += tangents[..., :3]
+    half = tangents[..., 3:].reshape(*tangents.shape[:-1], 18, 3) / 2.0
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    turn = np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1)
+    rotations = poses[..., 3:].reshape(*poses.shape[:-1], 18, 4)
+    carried[..., 3:] = quaternions.product(rotations, turn).reshape(*poses.shape[:-1], 72)
+    return carried
+
+
+def resampled(clip: Clip, fps: float) -> Clip:
+    """The same motion at another rate, through a cubic spline."""
+    if abs(clip.fps - fps) < 1e-6 or clip.n_frames < 2:
+        return clip
+    times = np.arange(int(np.floor(clip.duration * fps + 1e-9)) + 1) / fps
+    return Clip(CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses)(times), fps, clip.name)
+
+
+def smoothed(clip: Clip, corner: float) -> Clip:
+    """The motion without what is faster than a corner frequency [Hz]; a closed one goes on over its ends."""
+    if clip.n_frames < 8 or corner >= 0.4 * clip.fps:
+        return clip
+    sections = np.asarray(butter(2, corner / (clip.fps / 2.0) / _PASSES, output="sos"))
+    pad = min(round(clip.fps), clip.n_frames - 2)
+    if clip.closes():
+        poses, first = around(clip, pad)
+        smooth = sosfiltfilt(sections, poses, axis=0, padlen=0)[first : first + clip.n_frames]
+        smooth[-1] = clip.displacement.moved(smooth[0])
+    else:
+        smooth = sosfiltfilt(sections, clip.poses, axis=0, padlen=pad)
+    return Clip(smooth, clip.fps, clip.name)
+
+
+def around(clip: Clip, margin: int) -> tuple[Array, int]:
+    """Frames of a closed clip with `margin` of those before and after it, signs continuous, and where it begins."""
+    lap, there = clip.poses[:-1], clip.displacement
+    back = inverse(there)
+    rows, first = [clip.poses], 0
+    before, after = lap, clip.poses
+    while first < margin:
+        before = back.moved(before)
+        rows.insert(0, before)
+        first += len(lap)
+    while sum(map(len, rows)) < first + clip.n_frames + margin:
+        after = there.moved(after)
+        rows.append(after[1:])
+    poses = np.concatenate(rows)[first - margin : first + clip.n_frames + margin].copy()
+    turns = poses[:, 3:].reshape(len(poses), -1, 4)
+    poses[:, 3:] = quaternions.sign_continuous(turns).reshape(len(poses), -1)
+    return poses, margin
+
+
+def inverse(there: PlanarDisplacement) -> PlanarDisplacement:
+    """The move that undoes a move over the floor."""
+    c, s = np.cos(there.yaw), np.sin(there.yaw)
+    return PlanarDisplacement(-c * there.x - s * there.y, s * there.x - c * there.y, -there.yaw)
+
+
+def sole_points(poses: Array) -> Array:
+    """Centres of the 8 contact spheres of the feet in the world [m], shape (n, 8, 3)."""
+    model = figure_model()
+    data = mujoco.MjData(model)
+    spheres = [int(model.geom(name).id) for name in FOOT_CONTACTS]
+    points = np.empty((len(poses), len(spheres), 3))
+    for k, pose in enumerate(poses):
+        data.qpos = pose
+        mujoco.mj_kinematics(model, data)
+        points[k] = data.geom_xpos[spheres]
+    return points

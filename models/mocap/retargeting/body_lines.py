@@ -1,0 +1,144 @@
+"""Where a captured body is in every frame: joints by the part they play, and the lines between them.
+
+Everything here comes from positions during the motion, so it does not depend on how a rig is drawn: on its zero pose,
+on the frames of its joints, or on joints in between.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap import quaternions
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.skeleton_roles import Roles
+
+Array = npt.NDArray[np.float64]
+
+SIDES = ("left", "right")
+
+
+class BodyLines(NamedTuple):
+    """A body in n frames, in the file's axes and unit.
+
+    Attributes
+    ----------
+    hips, knees, ankles, shoulders, elbows, wrists, toes : array of shape (n, 2, 3)
+        Joints, left and right; NaN where the skeleton has none.
+    top : array of shape (n, 3)
+        Upper end of the trunk: the middle of the shoulders, or of what there is instead (head, chest).
+    has_arms : bool
+        Whether `top` is the middle of the shoulders.
+    leg : float
+        Length of thigh and shank, mean of both sides and median over time; of the thigh alone where ankles lack.
+    """
+
+    hips: Array
+    knees: Array
+    ankles: Array
+    shoulders: Array
+    elbows: Array
+    wrists: Array
+    toes: Array
+    top: Array
+    has_arms: bool
+    leg: float
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the hips, shape (n, 3)."""
+        return self.hips.mean(axis=1)
+
+    @property
+    def left(self) -> Array:
+        """From the right hip to the left one, shape (n, 3)."""
+        return self.hips[:, 0] - self.hips[:, 1]
+
+    @property
+    def trunk(self) -> Array:
+        """From the hips to the top, shape (n, 3)."""
+        return self.top - self.middle
+
+    @property
+    def lowest_joints(self) -> Array:
+        """Ankles, or knees where the skeleton ends there, shape (n, 2, 3)."""
+        return np.where(np.isnan(self.ankles), self.knees, self.ankles)
+
+    def knee_normals(self) -> Array:
+        """Thigh × shank, both of unit length: along the body's left when a knee is bent, shape (n, 2, 3)."""
+        return np.cross(unit(self.knees - self.hips), unit(self.ankles - self.knees))
+
+    def elbow_normals(self) -> Array:
+        """Upper arm × forearm, both of unit length, shape (n, 2, 3)."""
+        return np.cross(unit(self.elbows - self.shoulders), unit(self.wrists - self.elbows))
+
+
+def unit(vectors: Array) -> Array:
+    """The directions of vectors, shape (..., 3); NaN where there is none."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, np.nan)
+
+
+def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: Array) -> BodyLines:
+    """The lines of a body from the global positions (n, joints, 3) and rotations (n, joints, 4) of its joints.
+
+    Raises
+    ------
+    MotionFileError
+        If hips and trunk have no extent, or the legs no length.
+    """
+    nowhere = np.full((len(positions), 3), np.nan)
+
+    def paired(part: str, end: bool = False) -> Array:
+        table = roles.ends if end else roles.segments
+        names = [f"{side}_{part}" for side in SIDES]
+        return np.stack([positions[:, table[name]] if name in table else nowhere for name in names], axis=1)
+
+    def either(part: str, child: str) -> Array:
+        """Where a segment ends: at its end, else at the joint of the next segment."""
+        end = paired(part, end=True)
+        return np.where(np.isnan(end), paired(child), end)
+
+    shoulders = paired("upper_arm")
+    has_arms = not np.isnan(shoulders).any()
+    other = roles.segments.get("head", roles.segments.get("chest"))
+    hips, knees, ankles = paired("thigh"), either("thigh", "shank"), either("shank", "foot")
+    if has_arms:
+        top = shoulders.mean(axis=1)
+    elif other is not None:
+        top = positions[:, other]
+    else:
+        # Legs alone: their trunk is taken to go on straight.
+        top = hips.mean(axis=1) + (hips - knees).mean(axis=1)
+    toes = paired("foot", end=True)
+    for k, side in enumerate(SIDES):
+        joint = roles.ends.get(f"{side}_foot", roles.segments.get(f"{side}_foot"))
+        # A foot without toes may still have a tip, and toes of their own beyond the ball of the foot do not matter.
+        if np.isnan(toes[:, k]).any() and joint is not None and np.any(motion.tips[joint]):
+            toes[:, k] = positions[:, joint] + quaternions.rotated(rotations[:, joint], motion.tips[joint])
+    parts = [np.linalg.norm(knees - hips, axis=2)]
+    if not np.isnan(ankles).any():
+        parts.append(np.linalg.norm(ankles - knees, axis=2))
+    leg = float(np.median(np.sum(parts, axis=0).mean(axis=1)))
+    lines = BodyLines(hips, knees, ankles, shoulders, either("upper_arm", "forearm"), either("forearm", "hand"), toes,
+                      top, has_arms, leg)  # fmt: skip
+    extent = (lines.leg, *(float(np.median(np.linalg.norm(v, axis=1))) for v in (lines.left, lines.trunk)))
+    if extent[0] < 1e-9:
+        raise MotionFileError(motion.path, 0, "the legs have no length", "offsets of a human")
+    if min(extent) < 1e-3 * extent[0] or np.median(_sine(lines.left, lines.trunk)) < 0.3:
+        raise MotionFileError(motion.path, 0, "hips and spine do not span a body", "offsets of a human")
+    return lines
+
+
+def _sine(a: Array, b: Array) -> Array:
+    return np.linalg.norm(np.cross(unit(a), unit(b)), axis=1)
+
+
+def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
+    """A joint and all that hang on it: a body without what a program puts above or beside it."""
+    below = {top}
+    for joint, parent in enumerate(parents):
+        if parent in below:
+            below.add(joint)
+    return sorted(below)

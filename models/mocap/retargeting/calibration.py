@@ -1,0 +1,328 @@
+r"""How the frames of a rig's joints lie in the body: told by where joints are during the motion.
+
+A segment S of the figure is turned by a constant from the frame of its source joint J, R_S(t) = G_J(t) C_S, whatever
+the rig's zero pose is. As in the laboratory (Cappozzo et al. 1995, "anatomical frames"; Wu et al. 2002, 2005), C_S
+comes from frames T_S(t) built of positions alone:
+
+.. math:: C_S = \operatorname{mean}_t\, w(t)\, G_J(t)^{-1} T_S(t)
+
+- pelvis, abdomen, chest: the hip line, the shoulder line or both, and the trunk's line; w where trunk and thighs are
+  most nearly in line, for there the spine is straight;
+- upper and lower limbs: the bone, exactly, and for the turn about it the hinge, thigh × shank and upper arm × forearm
+  (w grows with the bend beyond 12°: a straight limb has no plane). Where a limb is never bent: its parent's axis;
+- feet: the floor's vertical while they stand, and ahead the toes;
+- the head is level on the average; clavicles and hands, of which not every rig shows a line, are on the average as
+  their parents.
+
+Re-drawing a rig (other joint frames G_J D, other zero pose) changes C_S to D⁻¹ C_S and R_S not at all.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
+from models.mocap import quaternions
+from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
+from models.mocap.retargeting.skeleton_roles import Roles
+
+Array = npt.NDArray[np.float64]
+
+_Z = np.array([0.0, 0.0, 1.0])
+_STRAIGHT = np.deg2rad(20.0)  # angle between trunk and thighs, beyond the least, at which a frame counts 0.6 as neutral
+_BEND = np.sin(np.deg2rad(12.0))  # limbs bent less have no plane: knees lie up to 12° beside the line of a straight leg
+_UNBENT = 0.01  # what a limb's parent counts beside its hinge: as much as a bend by 15°
+_STILL = 0.3  # legs per second, below which ankle and toes of a foot are at rest: walkers' feet pass at 3
+_TURNS = 1.5  # rad/s, above which a foot rolls over heel or toe: it does at 3 to 8 in a walk
+_PATIENCE = (1.0, 2.0, 4.0)  # times either, tried in turn: runners and 16 frames a second show no foot at rest
+_LOW = 0.05  # legs: an ankle that is so little above the lowest ones of the motion has its heel on the floor
+_ALIKE = np.deg2rad(5.0)  # soles that lie so much alike are the same stance: captured ones roll by 2 to 3° in it
+_UPRIGHT = np.cos(np.deg2rad(50.0))  # of a chest to the vertical, up to which a head can be level
+_ROUNDS = 5  # of laying the trunk line: each leaves a third of the angle, the pelvis being a third of the line
+_ANKLE = np.deg2rad(20.0)  # within which of the mean ankle a sole is likely to lie
+_POINTING = 0.3  # cosine between toes and sole, below which toes do not tell where a foot looks
+_LEAST = 3  # frames that tell how a sole lies
+
+
+class Calibration(NamedTuple):
+    """A body on the figure's segments, in the file's axes.
+
+    Attributes
+    ----------
+    segments : array of shape (n, 18, 4)
+        R_S of the figure's segments; of those without a source joint what they follow.
+    bend : float
+        Least angle between trunk and thighs [rad]: how straight the straightest frame was.
+    stances : tuple of int
+        Frames that told how the left and the right sole lie; 0 where none did.
+    """
+
+    segments: Array
+    bend: float
+    stances: tuple[int, int]
+
+
+def calibrate(
+    roles: Roles, parents: tuple[int, ...], lines: BodyLines, rotations: Array, up: Array, fps: float,
+    rest_frame: int | None = None,
+) -> Calibration:  # fmt: skip
+    """Turn the joints' global rotations (n, joints, 4) into those of the figure's segments, in the file's axes.
+
+    Parameters
+    ----------
+    roles : Roles
+        Which joint is what.
+    parents : tuple of int
+        Of the joints.
+    lines : BodyLines
+        Where the body is.
+    rotations : array of shape (n, joints, 4)
+        Global, from whatever zero pose.
+    up : array of shape (3,)
+        In the file's axes.
+    fps : float
+        Frames per second [1/s].
+    rest_frame : int or None
+        A frame in which the body stands upright with level feet; without one it is found.
+    """
+    n = len(rotations)
+    segments = np.empty((n, len(SEGMENTS), 4))
+    trunk, thighs = unit(lines.trunk), unit(unit(lines.knees - lines.hips).sum(axis=1))
+    bend = np.arccos(np.clip(-np.sum(trunk * thighs, axis=1), -1.0, 1.0))
+    least = float(np.nanmin(bend))
+    straight = np.exp(-(((np.nan_to_num(bend, nan=np.pi) - least) / _STRAIGHT) ** 2) / 2.0)
+    if rest_frame is not None:
+        straight = np.zeros(n)
+        straight[rest_frame] = 1.0
+
+    def put(body: str, turned: Array) -> None:
+        segments[:, BODIES.index(body)] = turned
+
+    def of(body: str) -> Array:
+        return segments[:, BODIES.index(body)]
+
+    def joint(body: str) -> Array | None:
+        """Rotations of what carries a segment: of the last joint before its end, for twist joints may lie between."""
+        index = roles.segments.get(body)
+        if index is None:
+            return None
+        end = roles.ends.get(body)
+        if end is not None and body != "foot" and index in _ancestry(parents[end], parents):
+            index = parents[end]
+        return rotations[:, index]
+
+    hips = unit(lines.left)
+    shoulders = unit(lines.shoulders[:, 0] - lines.shoulders[:, 1]) if lines.has_arms else hips
+    own_trunk = _own_trunk(lines.has_arms)
+    for body, left in (("pelvis", hips), ("abdomen", unit(hips + shoulders)), ("chest", shoulders)):
+        source = joint(body)
+        if source is None:
+            put(body, of("pelvis"))
+            continue
+        wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
+        turned = _carried(source, wanted, straight)
+        if body == "pelvis":
+            # Rigs with hip joints of their own, beside the pelvis, turn the hip line in it.
+            turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
+        put(body, turned)
+    if "abdomen" not in roles.segments:
+        put("abdomen", quaternions.slerped(of("pelvis"), of("chest"), 0.5))
+    for body in ("left_clavicle", "right_clavicle"):
+        source = joint(body)
+        put(body, of("chest") if source is None else _carried(source, of("chest"), straight))
+    source = joint("head")
+    put("head", of("chest") if source is None else _head(source, of("chest"), up, straight))
+    if lines.has_arms:
+        clavicled = {"left_clavicle", "right_clavicle"} <= roles.segments.keys()
+        _set_lines(segments, trunk, shoulders, clavicled)
+    counts: list[int] = []
+    for k, side in enumerate(SIDES):
+        sign = 1.0 - 2.0 * k
+        elbow = -sign * lines.elbow_normals()[:, k]
+        arm = ((f"{side}_clavicle", f"{side}_upper_arm", lines.shoulders, lines.elbows),
+               (f"{side}_upper_arm", f"{side}_forearm", lines.elbows, lines.wrists))  # fmt: skip
+        for parent, body, start, end in arm:
+            put(body, _limb(joint(body), (end - start)[:, k], elbow, of(parent), (1, sign), 2))
+        hand = joint(f"{side}_hand")
+        everywhere = np.ones(n)
+        put(
+            f"{side}_hand", of(f"{side}_forearm") if hand is None else _carried(hand, of(f"{side}_forearm"), everywhere)
+        )
+        knee = lines.knee_normals()[:, k]
+        leg = (("pelvis", f"{side}_thigh", lines.hips, lines.knees),
+               (f"{side}_thigh", f"{side}_shank", lines.knees, lines.ankles))  # fmt: skip
+        for parent, body, start, end in leg:
+            put(body, _limb(joint(body), (end - start)[:, k], knee, of(parent), (2, -1.0), 1))
+        foot = joint(f"{side}_foot")
+        if foot is None:
+            put(f"{side}_foot", of(f"{side}_shank"))
+            counts.append(0)
+            continue
+        flat = _flat(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
+        sole, used = _foot(foot, (lines.toes - lines.ankles)[:, k], of(f"{side}_shank"), up, flat, straight)
+        put(f"{side}_foot", sole)
+        counts.append(used)
+    return Calibration(segments, least, (counts[0], counts[1]))
+
+
+def _own_trunk(has_arms: bool) -> Array:
+    """Frame of the figure's own trunk line at rest, as `_frames` makes it of a source's."""
+    model = figure_model()
+    top = model.body("abdomen").pos + model.body("chest").pos
+    top = top + (model.body("left_clavicle").pos + model.body("left_upper_arm").pos if has_arms else 0.0)
+    return _frames(np.array([[0.0, 1.0, 0.0]]), unit(np.array([[top[0], 0.0, top[2]]])))[0]
+
+
+def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
+    """R of the head: level on the average of the frames in which the body is upright, looking where the chest does.
+
+    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). Somebody who never is upright looks ahead.
+    """
+    upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
+    if upright.sum() < 1e-6:
+        return _carried(source, chest, straight)
+    left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
+    left = unit(left - (left @ up)[:, None] * up)
+    level = _frames(left, np.broadcast_to(up, left.shape))
+    return _carried(source, level, upright)
+
+
+def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
+    """Lay the figure's trunk and shoulder lines on the source's: its spine is not jointed where the source's is.
+
+    Abdomen and chest, with all they carry but the arms, turn as one by some degrees, then the
+    clavicles, where the source has them.
+    """
+    model = figure_model()
+    abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
+    sides = [BODIES.index(f"{side}_clavicle") for side in SIDES]
+    carried = [BODIES.index(body) for body in ("abdomen", "chest", "head")] + sides
+    for _ in range(_ROUNDS):
+        ends = [
+            quaternions.rotated(segments[:, 2], model.body(BODIES[clavicle]).pos)
+            + quaternions.rotated(segments[:, clavicle], model.body(f"{side}_upper_arm").pos)
+            for side, clavicle in zip(SIDES, sides, strict=True)
+        ]
+        own = quaternions.rotated(segments[:, 0], abdomen) + quaternions.rotated(segments[:, 1], chest)
+        own = unit(own + (ends[0] + ends[1]) / 2.0)
+        turn = _arcs(own, np.where(np.isnan(trunk), own, trunk))
+        segments[:, carried] = quaternions.product(turn[:, None], segments[:, carried])
+        if not clavicled:
+            continue
+        own = quaternions.rotated(turn, unit(ends[0] - ends[1]))
+        turn = _arcs(own, np.where(np.isnan(shoulders), own, shoulders))
+        segments[:, sides] = quaternions.product(turn[:, None], segments[:, sides])
+
+
+def _frames(left: Array, along: Array) -> Array:
+    """Rotations that turn y into `left` and z as nearly as possible into `along`, shape (n, 4)."""
+    x = unit(np.cross(left, along))
+    matrices = np.stack((x, left, np.cross(x, left)), axis=-1)
+    # Where the two are parallel there is no frame; what stands in has no weight, for such a trunk is not straight.
+    matrices[np.isnan(matrices).any(axis=(1, 2))] = np.eye(3)
+    return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
+
+
+def _carried(source: Array, wanted: Array, weights: Array) -> Array:
+    """G C with C the mean of G⁻¹ T (Markley et al. 2007: the mean that minimises the chordal distance)."""
+    offsets = Rotation.from_quat(quaternions.product(quaternions.conjugate(source), wanted), scalar_first=True)
+    constant = np.asarray(offsets.mean(weights).as_quat(scalar_first=True))
+    return quaternions.product(source, constant)
+
+
+def _limb(
+    source: Array | None, bone: Array, hinge: Array, parent: Array, along: tuple[int, float], across: int
+) -> Array:
+    """R of a limb's segment: axis `along` on its bone in every frame, axis `across` on its hinge on the average."""
+    axis, sign = along
+    if np.isnan(bone).any():
+        return parent if source is None else _carried(source, parent, np.ones(len(parent)))
+    bone = unit(bone)
+    straight = quaternions.product(_arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
+    unbent = quaternions.rotated(straight, np.eye(3)[across])
+    sine = np.linalg.norm(hinge, axis=1, keepdims=True)
+    evidence = np.nan_to_num(hinge * np.maximum(sine - _BEND, 0.0)) + _UNBENT * unbent
+    if source is None:
+        return straight
+    back = quaternions.conjugate(source)
+    long = unit(quaternions.rotated(back, bone).mean(axis=0))
+    lateral = quaternions.rotated(back, evidence).sum(axis=0)
+    lateral = unit(lateral - long * (lateral @ long))
+    columns = np.empty((3, 3))
+    columns[:, axis], columns[:, across] = sign * long, lateral
+    third = 3 - axis - across
+    columns[:, third] = np.cross(columns[:, (third + 1) % 3], columns[:, (third + 2) % 3])
+    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
+    # Files that stretch bones, or bend them at joints in between, turn them beside their joints.
+    return quaternions.product(_arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)
+
+
+def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
+    """Frames in which a foot stands on heel and toes: at rest, and its ankle as low as any gets."""
+    n = len(source)
+    if n == 1:
+        return np.array([0])
+    places = [lines.lowest_joints[:, k]]
+    if not np.isnan(lines.toes[:, k]).any():
+        places.append(lines.toes[:, k])
+    turning = np.linalg.norm(quaternions.velocities(source, fps), axis=1)
+    passing = np.max([np.linalg.norm(np.gradient(place, axis=0), axis=1) for place in places], axis=0) * fps / lines.leg
+    heights = lines.lowest_joints @ up
+    low = heights[:, k] < np.quantile(heights.min(axis=1), 0.05) + _LOW * lines.leg
+    for factor in _PATIENCE:
+        flat = np.flatnonzero(low & (passing < factor * _STILL) & (turning < factor * _TURNS))
+        if len(flat) >= _LEAST:
+            return flat
+    return np.zeros(0, dtype=np.intp)
+
+
+def _foot(
+    source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
+) -> tuple[Array, int]:  # fmt: skip
+    """R of a foot: sole level where it stands, looking where its toes do; and how many frames told.
+
+    Where no frame tells, the sole lies as with an ankle at rest on the average.
+    """
+    back = quaternions.conjugate(source)
+    resting = _carried(source, shank, straight)
+    vertical = quaternions.rotated(back[flat], up)
+    alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
+    neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
+    # In captures whose feet roll with spread legs the sole lies in two ways: the one nearer to a level ankle is right.
+    likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
+    told = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
+    if told.sum() < min(_LEAST, len(source)):
+        normal = neutral
+        told = np.zeros(0, dtype=bool)
+    else:
+        normal = unit(vertical[told].mean(axis=0))
+    x = normal
+    if not np.isnan(toes).any():
+        ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
+        x = ahead - normal * (ahead @ normal)
+    if np.linalg.norm(x) < _POINTING or np.isnan(toes).any():
+        # Without toes, or with toes drawn below the ankle, a foot looks where its shank does.
+        ahead = quaternions.rotated(back, quaternions.rotated(resting, np.array([1.0, 0.0, 0.0])))[0]
+        x = ahead - normal * (ahead @ normal)
+    x = unit(x)
+    columns = np.column_stack((x, np.cross(normal, x), normal))
+    turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
+    return turned, int(told.sum())
+
+
+def _arcs(u: Array, v: Array) -> Array:
+    """The smallest rotations that turn unit vectors u into v, (n, 3) → (n, 4); opposite ones about any axis."""
+    q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
+    length = np.linalg.norm(q, axis=1, keepdims=True)
+    aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
+    q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def _ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
+    chain = [joint]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return chain

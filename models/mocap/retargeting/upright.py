@@ -1,0 +1,110 @@
+r"""Which axis of a file points up, and whether left is left: told by what the body does, with a confidence.
+
+Of the file's six axes that one points up along which the body stands, which it does not climb, and over whose lowest
+joints its weight is:
+
+.. math:: s(u) = \overline{\hat b \cdot u} - \sigma(\min_j p_j \cdot u)/l - 2\,\overline{d(u)}/l + \beta(u)
+
+b from the feet to the trunk's upper end; σ the spread (5 to 95 %) of the lowest joint's height; d how far the middle of
+hips and shoulders is outside of the hull of the joints nearest to the floor, seen along u; l the length of the legs;
+β = 0.1 for +Y and +Z, the only ones that programs write.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.body_lines import BodyLines, unit
+
+Array = npt.NDArray[np.float64]
+
+AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
+_CUSTOM = 0.1  # β
+_CERTAIN = (
+    0.25  # least lead of the best axis over the next; over the files of ../shared/mocap the least is said in docs
+)
+_BEARING = 0.12  # joints within this share of a leg of the lowest one may bear load: an ankle is so high over its toes
+_SAMPLES = 200  # frames that are looked at
+_DIRECTIONS = 16  # in which the hull of the bearing joints is bounded
+_SURE = 0.15  # sine of the mean bend of knees, cosine of the toes: what tells left from right
+
+
+class Up(NamedTuple):
+    """What is up.
+
+    Attributes
+    ----------
+    axis : array of shape (3,)
+        Unit vector in the file's axes.
+    confidence : float
+        Lead of its score over the next axis'; infinite where the format or a person says it.
+    """
+
+    axis: Array
+    confidence: float
+
+
+def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
+    """The file's axis that points up: as said, as the format has it, else as the body's joints (n, m, 3) tell.
+
+    Raises
+    ------
+    MotionFileError
+        If the motion does not tell.
+    """
+    if (name := said or motion.up) is not None:
+        return Up(np.array(AXES[name], dtype=np.float64), np.inf)
+    frames = np.unique(np.linspace(0, motion.n_frames - 1, _SAMPLES).round().astype(int))
+    scores = {name: _score(name, lines, positions, frames) for name in AXES}
+    best, second = sorted(scores, key=lambda name: -scores[name])[:2]
+    lead = scores[best] - scores[second]
+    if lead < _CERTAIN:
+        raise MotionFileError(
+            motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
+        )
+    return Up(np.array(AXES[best], dtype=np.float64), lead)
+
+
+def _score(name: str, lines: BodyLines, positions: Array, frames: npt.NDArray[np.int64]) -> float:
+    up = np.array(AXES[name], dtype=np.float64)
+    body = unit(lines.top - lines.lowest_joints.mean(axis=1))[frames]
+    heights = positions[frames] @ up
+    lowest = heights.min(axis=1)
+    spread = float(np.subtract(*np.quantile(lowest, (0.95, 0.05)))) / lines.leg
+    bearing = heights < lowest[:, None] + _BEARING * lines.leg
+    first, second = np.roll(up, 1), np.roll(up, 2)
+    middle = (lines.middle + lines.top)[frames] / 2.0
+    outside = np.zeros(len(frames))
+    for angle in np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS:
+        along = np.cos(angle) * first + np.sin(angle) * second
+        furthest = np.where(bearing, positions[frames] @ along, -np.inf).max(axis=1)
+        outside = np.maximum(outside, middle @ along - furthest)
+    balance = float(outside.mean()) / lines.leg
+    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CUSTOM * (name in ("+Y", "+Z"))
+
+
+def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
+    """Refuse a body whose left is not on its left: toes and knees tell what is ahead, hips and trunk what is left.
+
+    Raises
+    ------
+    MotionFileError
+        If toes and knees say that the body is mirrored, or one says so and the other does not know.
+    """
+    left = unit(lines.left)
+    ahead = unit(np.cross(left, unit(lines.trunk)))
+    toes = unit(lines.toes - lines.ankles) @ ahead[:, :, None]
+    knees = lines.knee_normals() @ left[:, :, None]
+    signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
+    clear = [np.sign(s) for s in signs if abs(s) > _SURE]
+    if clear and sum(clear) < 0:
+        raise MotionFileError(
+            motion.path, 0, "the body is mirrored: toes and knees point back", "left and right as the names say"
+        )
+    if clear and sum(clear) == 0:
+        raise MotionFileError(
+            motion.path, 0, "toes and knees point opposite ways", "a body that bends its knees forwards"
+        )
