@@ -312,7 +312,7 @@ def test_no_fault_of_a_hand_that_holds_still() -> None:
     cases = (
         (Arm(), follow_program(0.0, 0.0)),
         (Arm(1000.0, 10.0, path, 10.0), follow_program(1.0, 0.0)),
-        (Arm(1000.0, 10.0, grabs=(Grab(0.0, (0.0, 0.0, 0.0), duration=0.1, hold=3.0),)), follow_program(60.0, 0.0)),
+        (Arm(1000.0, 10.0, grabs=(Grab(0.0, (0.0, 0.0, 0.0), seconds=0.1, hold=3.0),)), follow_program(60.0, 0.0)),
     )
     still = []
     for arm, program in cases:
