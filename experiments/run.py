@@ -177,6 +177,8 @@ def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
 def write_animations(out: Path, session: Session) -> None:
     """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
     with Recording(out / RECORDING) as recording:
+        if "reference" not in recording.groups["frames"]:
+            return  # without a figure there is none
         reference = recording.channel("frames", "reference")
         on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from experiments.results.changes import river_changes
+from experiments.results.faults import fault_lines
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import (
     AnimationSummary,
@@ -58,14 +59,19 @@ def summarise(
         When the hand does something else than push: it grabs, traces, leads.
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
-    return RunSummary(path, animation, figure, tank, speed, warnings, changes=river_changes(recording))
+    return RunSummary(
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording)
+    )
 
 
 def measured(
     recording: Recording, default_poses: Callable[[Array, Array, Array], Array], span: Span,
     handled: Sequence[Span] = (),
-) -> tuple[PathSummary, AnimationSummary, FigureSummary, TankSummary]:  # fmt: skip
-    """Measure the part of a run between two times; the other arguments are those of `summarise`."""
+) -> tuple[PathSummary, AnimationSummary | None, FigureSummary | None, TankSummary]:  # fmt: skip
+    """Measure the part of a run between two times; the other arguments are those of `summarise`.
+
+    There is no animation without a figure, and no figure that is not in the physics.
+    """
     path, animation, figure = (
         PathMeasure(recording, span[0], handled),
         AnimationMeasure(span[0]),
@@ -81,12 +87,15 @@ def measured(
         ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
         frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
         pushed = path.add(ticks)
-        default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
-        animation.add(frames, default, pushed[::per_frame])
-        figure.add(frames)
+        if "reference" in frames:
+            default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
+            animation.add(frames, default, pushed[::per_frame])
+        if "joint_error" in frames:
+            figure.add(frames)
         least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
         tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
-    return path.summary(), animation.summary(), figure.summary(), tank
+    shown, physical = (name in recording.groups["frames"] for name in ("reference", "joint_error"))
+    return path.summary(), animation.summary() if shown else None, figure.summary() if physical else None, tank
 
 
 def trace_summary(recording: Recording) -> TraceSummary:

@@ -71,17 +71,22 @@ class EditingSummary:
     until: float | None
     presses: tuple[PressSummary, ...]
     pushes: tuple[PushSummary, ...]
-    animation: AnimationSummary
-    figure: FigureSummary
+    animation: AnimationSummary | None
+    figure: FigureSummary | None
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
         done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
-        changed = max(self.animation.pushed_deg, self.animation.unpushed_deg)
+        shown, told = self.animation, list[str]()
+        if shown is not None:
+            changed = max(shown.pushed_deg, shown.unpushed_deg)
+            told = [
+                f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."
+            ]
         return [
             f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
             *pushes_line(self.pushes),
-            f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}.",
+            *told,
             *(
                 []
                 if self.until is None or self.seconds >= self.until
@@ -108,18 +113,22 @@ class PerformanceSummary:
     start: float
     seconds: float
     path: PathSummary
-    animation: AnimationSummary
-    figure: FigureSummary
+    animation: AnimationSummary | None
+    figure: FigureSummary | None
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
-        alone, pushed, bent = self.path.deviation_rms_mm, self.animation.pushed_deg, self.animation.unpushed_deg
+        alone, shown, told = self.path.deviation_rms_mm, self.animation, list[str]()
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
-        by = f"{pushed:.1f}° a joint where it was pushed, {bent:.1f}° elsewhere" if self.path.pushes else f"{bent:.1f}°"
+        if shown is not None:
+            by = f"{shown.unpushed_deg:.1f}°"
+            if self.path.pushes:
+                by = f"{shown.pushed_deg:.1f}° a joint where it was pushed, {shown.unpushed_deg:.1f}° elsewhere"
+            told = [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
         return [
             f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
             *pushes_line(self.path.pushes),
-            f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}.",
+            *told,
         ]
 
 
@@ -128,10 +137,10 @@ def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
     return [f"Pushes: {'; '.join(push.line() for push in pushes)}."] if pushes else []
 
 
-def _residual(figure: FigureSummary) -> str:
+def _residual(figure: FigureSummary | None) -> str:
     """What is said of the residual, unless the figure fell: that is said of the whole run."""
     return (
         ""
-        if figure.fell_at is not None
+        if figure is None or figure.fell_at is not None
         else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"
     )

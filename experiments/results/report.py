@@ -91,7 +91,9 @@ def write_report(
         _PAGE.format(
             title=html.escape(title),
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
-            replay=html.escape(replay_html(recording, model, target)),
+            replay=html.escape(
+                replay_html(recording, model, target) if "reference" in recording.groups["frames"] else ""
+            ),
             replayed=replayed,
             curves=_curves(recording, tube),
             push=PUSH,

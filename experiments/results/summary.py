@@ -24,6 +24,9 @@ class RunSummary:
     ----------
     path, animation, figure, tank, speed
         Of the whole run.
+        No animation without a figure, and none of a figure that is not in the physics.
+    faults : tuple of str
+        Of the device, a sentence each.
     warnings : dict of str to int
         MuJoCo's, and how often.
     stretch : StretchSummary or None
@@ -39,11 +42,12 @@ class RunSummary:
     """
 
     path: PathSummary
-    animation: AnimationSummary
-    figure: FigureSummary
+    animation: AnimationSummary | None
+    figure: FigureSummary | None
     tank: TankSummary
     speed: SpeedSummary
     warnings: dict[str, int]
+    faults: tuple[str, ...] = ()
     stretch: StretchSummary | None = None
     changes: tuple[RiverChange, ...] = ()
     lead: LeadSummary | None = None
@@ -59,14 +63,17 @@ class RunSummary:
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
         return [
+            *self.faults,
+            *(
+                []
+                if figure is None or figure.fell_at is None
+                else [f"The physical figure fell at {figure.fell_at:.1f} s."]
+            ),
             *bent,
             *changed,
             *([held] if self.tank.scaled_ticks else []),
             *self._of_the_hand(),
-            ("" if figure.fell_at is None else f"The physical figure fell at {figure.fell_at:.1f} s. Until then: ")
-            + f"The physical figure followed within {figure.joint_error_rms_deg:.2f}° RMS at the joints and "
-            f"{figure.root_error_rms_cm:.2f} cm at the root; residual force {100 * figure.residual_force_rms:.1f} % "
-            f"of body weight RMS, feet on the ground {100 * figure.grounded:.0f} % of stance.",
+            *([] if figure is None else [figure.line()]),
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
             f"MuJoCo's warnings: {warned}.",
         ]
@@ -82,6 +89,8 @@ class RunSummary:
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"
         pushes = "; ".join(push.line() for push in path.pushes)
         worked = self.trace.line() if self.trace else f"Pushes: {pushes}." if pushes else "The hand did not push."
+        if animation is None:
+            return [f"The stylus ran {path.laps:.2f} laps, {left}.", worked]
         by = f"{max(animation.pushed_deg, animation.unpushed_deg):.2f}° a joint"
         if pushes:
             by = f"{animation.pushed_deg:.1f}° a joint where it was pushed, {animation.unpushed_deg:.2f}° elsewhere"

@@ -153,6 +153,15 @@ class FigureSummary:
     grounded: float
     ground_force_mean: float
 
+    def line(self) -> str:
+        """How it followed, in a sentence; until it fell, if it did."""
+        return (
+            ("" if self.fell_at is None else "Until it fell: ")
+            + f"The physical figure followed within {self.joint_error_rms_deg:.2f}° RMS at the joints and "
+            f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
+            f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance."
+        )
+
 
 @dataclass(frozen=True)
 class SpeedSummary:

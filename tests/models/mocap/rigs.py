@@ -91,7 +91,7 @@ def random_rig(rng: np.random.Generator) -> Rig:
 
 
 def _joints(rig):
-    """(name, carrying body, parent's name, place in the parent's frame) of every joint; the body of extras is that of their parent."""
+    """(name, carrying body, parent, place in the parent's frame) of every joint; extras have their parent's body."""
     sides, centre, limbs = FAMILIES[rig.family]
     centre, limbs, sides = centre.split(), limbs.split(), sides.split()
     model = figure_model()
@@ -147,7 +147,7 @@ def _joints(rig):
 def _zero_turns(rig, rows, rng):
     """D of every joint: R D is how its frame stands, R being its segment's rotation from the figure's rest."""
     children = {}
-    for name, _, parent, at in rows:
+    for _, _, parent, at in rows:
         if parent is not None and np.linalg.norm(at) > 1e-6:
             children.setdefault(parent, at)
     turns = {}
