@@ -6,8 +6,9 @@ import time
 import weakref
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 
@@ -20,9 +21,6 @@ from experiments.run import write_animations
 from experiments.setups.session import Session
 from models.errors import ModelError
 from sim.recording.recording import Recording
-
-if TYPE_CHECKING:
-    import pandas
 
 
 class Channels(Mapping[str, Array]):
@@ -118,10 +116,9 @@ class Run:
         write_report_of(self.folder)
         return self.folder / REPORT
 
-    def frame(self) -> "pandas.DataFrame":
-        """The ticks as a table, a column a number; pandas has to be installed."""
-        import pandas
-
+    def frame(self) -> Any:
+        """The ticks as a table of pandas, which has to be installed, a column a number."""
+        pandas = import_module("pandas")
         columns: dict[str, Any] = {}
         for name, values in self.ticks.items():
             rows = values.reshape(len(values), -1)

@@ -75,6 +75,8 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
 
 def _river(sim: Simulation, delay: float) -> tuple[River, tuple[str, ...]]:
     parts, assumed = _parts_of(sim.field)
+    if parts.added:
+        assumed += ("the critical gain is one by which the whole field is scaled, laws of one's own included",)
     law, curve = parts.leading, parts.leading.curve
     if isinstance(law, Follow):
         base, width = FOLLOW_LAW, law.epsilon
@@ -82,7 +84,9 @@ def _river(sim: Simulation, delay: float) -> tuple[River, tuple[str, ...]]:
         # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
         base, width = (BUNNY_LAW, law.delta) if law.attraction == "point" else (FOLLOW_LAW, float("inf"))
     sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
-    return River(with_added(base, parts.added), law.k_r, law.b_d, width, curve, phantom_device(), sampling), assumed
+    return River(
+        with_added(base, parts.added, law.k_r), law.k_r, law.b_d, width, curve, phantom_device(), sampling
+    ), assumed
 
 
 def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:

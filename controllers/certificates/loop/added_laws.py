@@ -6,27 +6,42 @@ import casadi
 
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.laws import Law
+from controllers.errors import ControllerError
 from controllers.fields.function_law import FunctionLaw
 from controllers.state import HandState
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def with_added(base: Law, added: tuple[FunctionLaw, ...]) -> Law:
+def with_added(base: Law, added: tuple[FunctionLaw, ...], k_r: float) -> Law:
     """A law with the forces of functions added, for a stylus that is upright and does not turn, its switch open.
+
+    A law is linear in its gains: what is added goes with its stiffness, F + (k/k_r) Σ F_i, which is the field itself at
+    the gains that it has, and the whole of it scaled where a critical gain is looked for.
+
+    Parameters
+    ----------
+    base : Law
+        That drives along the curve.
+    added : tuple of FunctionLaw
+        What is added.
+    k_r : float
+        Stiffness that the field has [N/m].
 
     Raises
     ------
     ControllerError
-        If a function cannot be evaluated on symbols, as when it branches on the hand.
+        If the stiffness is zero, or a function cannot be evaluated on symbols, as when it branches on the hand.
     """
     if not added:
         return base
+    if k_r <= 0.0:
+        raise ControllerError("a certificate of laws of one's own needs a stiffness k_r above zero beside them")
     # One that cannot be evaluated says so before anything is built.
     _force(added, casadi.SX.sym("p", 3), casadi.SX.sym("v", 3))
 
-    def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
-        return base.force(p, v, piece, u, k_r, b_d, width) + _force(added, p, v)
+    def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
+        return base.force(p, v, piece, u, k, b_d, width) + k / k_r * _force(added, p, v)
 
     return base._replace(force=force)
 
