@@ -91,7 +91,7 @@ def random_rig(rng: np.random.Generator) -> Rig:
 
 
 def _joints(rig):
-    """(name, carrying body, parent's name, place in the parent's frame) of every joint; the body of extras is that of their parent."""
+    """Name, carrying body, parent's name and place in its frame, of every joint."""
     sides, centre, limbs = FAMILIES[rig.family]
     centre, limbs, sides = centre.split(), limbs.split(), sides.split()
     model = figure_model()
