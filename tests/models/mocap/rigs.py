@@ -147,7 +147,7 @@ def _joints(rig):
 def _zero_turns(rig, rows, rng):
     """D of every joint: R D is how its frame stands, R being its segment's rotation from the figure's rest."""
     children = {}
-    for name, _, parent, at in rows:
+    for _name, _, parent, at in rows:
         if parent is not None and np.linalg.norm(at) > 1e-6:
             children.setdefault(parent, at)
     turns = {}
