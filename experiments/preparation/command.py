@@ -64,7 +64,9 @@ def summary(made: Prepared, measures: WellFormed) -> str:
     """One line for the terminal."""
     whole = made.looped.kind == "cycle"
     part = f"cycle {made.looped.start:.2f} to {made.looped.end:.2f} s" if whole else made.looped.kind
-    faults = measures.faults()
+    faults = list(measures.faults())
+    if not made.near:
+        faults.insert(0, "no feasible motion is near it, so dynamics and feet are as captured")
     return (
         f"{made.clip.name}: {part}, {made.clip.duration:.2f} s; "
         f"contact lacks {100 * measures.residual:.1f} % of weight; "

@@ -108,8 +108,8 @@ def read_motion(path: Path) -> SourceMotion:
     raise MotionFileError(path, 1, "not a motion file", "BVH, AMC (with its ASF beside it) or DeepMimic JSON")
 
 
-def convert(source: Path, target: Path, overwrite: bool = False) -> Loaded:
-    """Read any motion file and write it as BVH on the figure's 57 channels.
+def convert(source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None) -> Loaded:
+    """Read any motion file and write it as BVH on the figure's 57 channels: calibrated and on the floor, no more.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def convert(source: Path, target: Path, overwrite: bool = False) -> Loaded:
         raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
-    loaded = load(source)
+    loaded = load(source, hints)
     try:
         write_bvh(loaded.clip, target)
     except OSError as error:

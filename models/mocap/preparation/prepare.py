@@ -15,6 +15,7 @@ from models.mocap.retargeting.retarget import Hints, RetargetReport
 
 FPS = 120.0  # of prepared clips [1/s], CMU's: slower captures gain what the change adds
 _CORNER = 8.0  # low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
+_TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which it is another motion: the nearest feasible one is far
 _LONGEST = 120.0  # [s]: the Jacobian of a minute takes 0.6 GB
 
 
@@ -35,6 +36,9 @@ class Prepared(NamedTuple):
         What that took.
     seconds : float
         Processor time [s].
+    near : bool
+        Whether a feasible motion is near. If not, as where flights are not ballistic at the file's rate, `clip` is the
+        capture looped and smoothed, and the measures say what it lacks.
     """
 
     clip: Clip
@@ -43,6 +47,7 @@ class Prepared(NamedTuple):
     looped: Looped
     feasible: Feasible
     seconds: float
+    near: bool
 
 
 def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints | None = None) -> Prepared:
@@ -76,5 +81,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     cycle = looped(resampled(captured, FPS), loop, loaded.loops)
     smooth = smoothed(cycle.clip, _CORNER)
     made = feasible(smooth, stances(cycle.clip, smooth), fps=FPS)
-    clip = Clip(made.clip.poses, made.clip.fps, captured.name)
-    return Prepared(clip, captured, loaded.report, cycle, made, process_time() - began)
+    near = made.turned < _TURNED and made.moved < _MOVED
+    taken = made.clip if near else smooth
+    clip = Clip(taken.poses, taken.fps, captured.name)
+    return Prepared(clip, captured, loaded.report, cycle, made, process_time() - began, near)

@@ -91,7 +91,7 @@ def random_rig(rng: np.random.Generator) -> Rig:
 
 
 def _joints(rig):
-    """(name, carrying body, parent, place in the parent's frame) of every joint; extras have their parent's body."""
+    """Name, carrying body, parent's name and place in its frame, of every joint."""
     sides, centre, limbs = FAMILIES[rig.family]
     centre, limbs, sides = centre.split(), limbs.split(), sides.split()
     model = figure_model()
@@ -147,7 +147,7 @@ def _joints(rig):
 def _zero_turns(rig, rows, rng):
     """D of every joint: R D is how its frame stands, R being its segment's rotation from the figure's rest."""
     children = {}
-    for _, _, parent, at in rows:
+    for _name, _, parent, at in rows:
         if parent is not None and np.linalg.norm(at) > 1e-6:
             children.setdefault(parent, at)
     turns = {}

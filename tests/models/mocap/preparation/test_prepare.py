@@ -36,7 +36,7 @@ def test_a_closed_clip_is_left_as_it_is(walks):
 
 
 def test_what_does_not_repeat_rests_at_both_ends(walks):
-    part = Clip(walks[1].poses[: walks[0].n_frames // 5], 120.0, "part")
+    part = Clip(walks[1].poses[: walks[0].n_frames // 6], 120.0, "part")
     found = looped(part)
     assert found.kind == "open"
     speeds = np.abs(found.clip.velocities())
