@@ -62,32 +62,38 @@ class EditingSummary:
     presses : tuple of PressSummary
     pushes : tuple of PushSummary
         Of a hand that does not reach for the curve, hold it or carry it.
-    animation : AnimationSummary
-        Against the animation of the curve that was given at the same phase.
-    figure : FigureSummary
+    animation : AnimationSummary or None
+        Against the animation of the curve that was given at the same phase, if there is a figure.
+    figure : FigureSummary or None
+        If it is in the physics.
     """
 
     seconds: float
     until: float | None
     presses: tuple[PressSummary, ...]
     pushes: tuple[PushSummary, ...]
-    animation: AnimationSummary
-    figure: FigureSummary
+    animation: AnimationSummary | None
+    figure: FigureSummary | None
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
         done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
-        changed = max(self.animation.pushed_deg, self.animation.unpushed_deg)
         return [
             f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
             *pushes_line(self.pushes),
-            f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}.",
+            *self._of_the_animation(),
             *(
                 []
                 if self.until is None or self.seconds >= self.until
                 else [f"It was to be performed from {self.until:.1f} s on, but the run ended before."]
             ),
         ]
+
+    def _of_the_animation(self) -> list[str]:
+        if self.animation is None:
+            return []
+        changed = max(self.animation.pushed_deg, self.animation.unpushed_deg)
+        return [f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."]
 
 
 @dataclass(frozen=True)
@@ -100,27 +106,34 @@ class PerformanceSummary:
         [s]
     path : PathSummary
         Of the stylus against the bent curve.
-    animation : AnimationSummary
-        Against the animation of the curve that was given at the same phase.
-    figure : FigureSummary
+    animation : AnimationSummary or None
+        Against the animation of the curve that was given at the same phase, if there is a figure.
+    figure : FigureSummary or None
+        If it is in the physics.
     """
 
     start: float
     seconds: float
     path: PathSummary
-    animation: AnimationSummary
-    figure: FigureSummary
+    animation: AnimationSummary | None
+    figure: FigureSummary | None
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
-        alone, pushed, bent = self.path.deviation_rms_mm, self.animation.pushed_deg, self.animation.unpushed_deg
+        alone = self.path.deviation_rms_mm
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
-        by = f"{pushed:.1f}° a joint where it was pushed, {bent:.1f}° elsewhere" if self.path.pushes else f"{bent:.1f}°"
         return [
             f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
             *pushes_line(self.path.pushes),
-            f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}.",
+            *self._of_the_animation(),
         ]
+
+    def _of_the_animation(self) -> list[str]:
+        if self.animation is None:
+            return []
+        pushed, bent = self.animation.pushed_deg, self.animation.unpushed_deg
+        by = f"{pushed:.1f}° a joint where it was pushed, {bent:.1f}° elsewhere" if self.path.pushes else f"{bent:.1f}°"
+        return [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
 
 
 def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
@@ -128,10 +141,10 @@ def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
     return [f"Pushes: {'; '.join(push.line() for push in pushes)}."] if pushes else []
 
 
-def _residual(figure: FigureSummary) -> str:
-    """What is said of the residual, unless the figure fell: that is said of the whole run."""
+def _residual(figure: FigureSummary | None) -> str:
+    """What is said of the residual, unless the figure fell, which is said of the whole run, or is only shown."""
     return (
         ""
-        if figure.fell_at is not None
+        if figure is None or figure.fell_at is not None
         else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"
     )

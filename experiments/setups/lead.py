@@ -187,7 +187,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     notes = Notes(0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
-        lead = lead_summary(of.recording, field, of.memory, config.scene, summary.figure.fell_at)
+        lead = lead_summary(of.recording, field, of.memory, config.scene, summary.fell_at)
         return replace(summary, lead=lead)
 
     return Parts(

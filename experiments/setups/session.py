@@ -14,7 +14,7 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import FIGURE, P_WH
-from sim.body.figure import Figure
+from sim.body.bodies import Body
 from sim.loop.servo import Servo
 from sim.world.world import World
 
@@ -25,7 +25,7 @@ class Session:
 
     parts: Parts
     world: World
-    figure: Figure
+    figure: Body
     servo: Servo
     remarks: tuple[str, ...]
 
@@ -68,7 +68,8 @@ class Session:
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
             "motor_peak": np.array(PREMIUM_1_5.peak_torque),
-            "body_weight": self.figure.state.weight,
+            "figure": self.world.kind,
+            "body_weight": self.figure.weight,
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),

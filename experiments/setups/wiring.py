@@ -16,15 +16,22 @@ from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of, resolved
 from experiments.setups.stylus import UPRIGHT, stylus_path
+from models.humanoid.skeleton import rest_pose
 from models.mocap.clip import Clip
-from models.scene import FIGURE
-from sim.body.figure import Figure
+from sim.body.bodies import Body, make_body
 from sim.compilation.units import Unit
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.map_derivative import derivative_unit, map_derivative
-from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along, unlinked_reference
+from sim.reference.reference import (
+    along_unit,
+    begin_in_motion,
+    check_reference,
+    no_reference,
+    poses_along,
+    unlinked_reference,
+)
 from sim.reference.settling import stood, stood_unit
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
@@ -116,7 +123,7 @@ def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
-def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
+def _servo(parts: Parts, world: World) -> tuple[Servo, Body]:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
     compiled, walker = parts.maps.whole_map.compiled(), None
@@ -128,7 +135,7 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
         # The field moves the walker, the map shows it.
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
-    figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
+    body = make_body(world, parts.gains)
     device = simulated_phantom(port, parts.user)
     servo = Servo(
         plant=make_plant(world),
@@ -137,32 +144,41 @@ def _servo(parts: Parts, world: World) -> tuple[Servo, Figure]:
         reference=unlinked_reference(
             world.figure, compiled, period * ticks, config.figure.smoothing, config.figure.blend, legs,
             parts.held_seconds,
-        ),
-        figure=figure.state,
+        ) if world.kind != "none" else no_reference(compiled if program.map_feeds else None),
+        figure=body.state,
         figure_ticks=ticks,
         argument=device.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
-    return servo, figure
+    return servo, body
 
 
 def _begin(parts: Parts, servo: Servo, world: World) -> None:
     """Put stylus and figure where the run begins."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), moves)
+    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
+    orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
+    if world.kind == "none":
+        world.reset(begin.point, rest_pose(), orientation, begin.velocity if moves else None)
+        _know_velocity(servo, moves)
+        return
     argument = stylus_path(begin.point[None]) if parts.walker is None else servo.argument[None]
     poses = np.empty((1, whole_map.nq))
     poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
     if parts.bends:
         stood(packed_legs(world.figure), poses[0])
-    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
-    orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
     if not moves:
         world.reset(begin.point, poses[0], orientation)
         return
     world.reset(begin.point, poses[0], orientation, begin.velocity, _velocity(whole_map, argument[0], begin))
     begin_in_motion(reference, np.array(begin))
-    assert isinstance(servo.device, SimulatedPhantom)
-    sense_in_motion(servo.device.port)
+    _know_velocity(servo, moves)
+
+
+def _know_velocity(servo: Servo, moves: bool) -> None:
+    """Let a simulated device that begins in motion know its velocity."""
+    if moves and isinstance(servo.device, SimulatedPhantom):
+        sense_in_motion(servo.device.port)
 
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:
