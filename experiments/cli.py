@@ -41,7 +41,7 @@ Positional = tyro.conf.Positional
 class Run:
     """Run a hand, a field, a map and a figure, and write what happened into a folder."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     out: Path = Path("runs/run")
     """Folder to write."""
     overwrite: bool = False
@@ -119,7 +119,7 @@ class Track:
 class Certify:
     """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]
+    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     run: Annotated[Path | None, tyro.conf.Positional] = None
     """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
     clip: str | None = None
@@ -410,6 +410,12 @@ def parsed(arguments: Sequence[str] | None) -> Command:
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
+        # A part that refuses a number says so itself.
+        cause: BaseException | None = ended
+        while cause is not None:
+            if isinstance(cause, ParameterError):
+                raise cause from None
+            cause = cause.__cause__ or cause.__context__
         lines = [line.strip("│ ") for line in said.getvalue().splitlines() if line.startswith("│")]
         first = " ".join(itertools.takewhile(lambda line: set(line) != {"─"}, lines))
         raise ParameterError(re.sub(r"^Error parsing \w+: ", "", first) or said.getvalue().strip()) from None

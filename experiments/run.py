@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.curves.trajectory import Trajectory
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
@@ -163,20 +164,21 @@ def _live_page(session: Session) -> Page:
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     parts = session.parts
+
+    def keep_curve(curve: Trajectory) -> None:
+        save_curve(curve, out / CURVE_FILE)
+
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
-        of = Measuring(
-            recording, lambda: default_poses(session), parts.handled, session.servo.field.memory,
-            lambda curve: save_curve(curve, out / CURVE_FILE),
-        )  # fmt: skip
+        of = Measuring(recording, lambda: default_poses(session), parts.handled, session.servo.field.memory, keep_curve)
         return parts.summarise(summary, of)
 
 
 def write_animations(out: Path, session: Session) -> None:
-    """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step; if any."""
-    if session.world.kind == "none":
-        return
+    """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
     with Recording(out / RECORDING) as recording:
+        if "reference" not in recording.groups["frames"]:
+            return  # without a figure there is none
         reference = recording.channel("frames", "reference")
         on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))

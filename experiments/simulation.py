@@ -202,7 +202,7 @@ class Simulation:
         ModelError, ControllerError, SimError
             If its parts do not fit together.
         """
-        world, console = World(self.scene), Console(stderr=True)
+        world, console = World(self.scene, self.figure.kind), Console(stderr=True)
         maps = self.haptic_map.parts(world)
         return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
 
@@ -213,7 +213,8 @@ class Simulation:
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(
             config=self, maps=maps, field=self.field, program=program, course=maps.curve,
-            user=self.user.arm(seconds), tank=tank, notes=Notes(maps.reach), gains=maps.gains,
+            user=self.user.arm(seconds), tank=tank, gains=maps.gains,
+            notes=Notes(type(self.field).__name__.upper(), maps.reach),
             argument_at=lambda nearest, phases: stylus_path(nearest),
             handled=((0.0, np.inf),) if self.user.traces is not None else handled,
         )  # fmt: skip

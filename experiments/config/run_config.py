@@ -11,6 +11,7 @@ from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
+from sim.world.world import FigureKind
 
 
 @part
@@ -43,6 +44,9 @@ class Figure:
 
     Parameters
     ----------
+    kind : {"physical", "kinematic", "none"}
+        In the physics, with torques and contacts; the animation itself, evaluated and recorded, which is faster; or the
+        device alone, for tuning.
     stature : float
         [m]
     mass : float
@@ -56,6 +60,7 @@ class Figure:
         Time in which one clip goes over into another [s].
     """
 
+    kind: FigureKind = "physical"
     stature: float = above(0.0, default=DEFAULT_STATURE, unit="m")
     mass: float = above(0.0, default=DEFAULT_MASS, unit="kg")
     smoothing: float = above(0.0, default=6.0, unit="Hz")

@@ -77,7 +77,9 @@ def _plain(hint: Any) -> Any:
 VOCABULARY = _vocabulary()
 
 
-def run_config(mode: str = "follow", map: str = "", user: str = "", **words: object) -> RunConfig:
+def run_config(
+    mode: str = "follow", map: str = "", user: str = "", figure: str = "physical", **words: object
+) -> RunConfig:
     """A run in words, as the command line takes them.
 
     Parameters
@@ -88,6 +90,8 @@ def run_config(mode: str = "follow", map: str = "", user: str = "", **words: obj
         Kind of one of `experiments.config.maps`, or a map's file (.npz); by default "cylindrical".
     user : str
         What the hand does; by default it is relaxed.
+    figure : str
+        Kind of the figure: physical, kinematic or none.
     **words
         Fields of the parts by name, and `seconds`, `seed`, `pushes`, `turns`, `grabs`.
 
@@ -122,7 +126,8 @@ def run_config(mode: str = "follow", map: str = "", user: str = "", **words: obj
         mode=mode_part,  # pyright: ignore[reportArgumentType]
         map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
         user=User(does=user or "relaxed", **taken.of(User)),  # pyright: ignore[reportArgumentType]
-        figure=Figure(**taken.of(Figure)), device=Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
+        figure=Figure(kind=figure, **taken.of(Figure)),  # pyright: ignore[reportArgumentType]
+        device=Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
         **taken.of(RunConfig, ("seconds", "seed")),
     )  # fmt: skip
     taken.check_empty()
@@ -208,6 +213,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
     yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + ".", "")
+    yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)
     yield option("seed", int | None, top["seed"] + " Default: 1.", None)
     for name in _SWITCHES:
@@ -258,7 +264,12 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
 
 def words_of(config: RunConfig) -> dict[str, object]:
     """A configuration in words: the inverse of `run_config`."""
-    words: dict[str, object] = {"seconds": config.seconds, "seed": config.seed, "mode": config.mode.kind}
+    words: dict[str, object] = {
+        "seconds": config.seconds,
+        "seed": config.seed,
+        "mode": config.mode.kind,
+        "figure": config.figure.kind,
+    }
     led = config.mode.kind == "lead"
     if not led:
         words |= {"map": config.map.kind, "user": config.user.does}

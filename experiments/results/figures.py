@@ -64,9 +64,10 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
         "deviation": deviation_figure,
         "forces": forces_figure,
         "torques": torques_figure,
+        "figure": tracking_figure,
     }
-    if "joint_error" in recording.groups["frames"]:
-        drawings["figure"] = tracking_figure
+    if "joint_error" not in recording.groups["frames"]:
+        del drawings["figure"]  # there was none in the physics
     for name, draw in drawings.items():
         with mpl.rc_context(STYLE):
             drawing = draw(recording)

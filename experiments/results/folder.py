@@ -2,14 +2,19 @@
 
 import shutil
 from pathlib import Path
+from typing import cast
+
+import mujoco
 
 from controllers.errors import ParameterError
 from experiments.config.part import from_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.curve_files import CURVE_FILE
 from models.mocap.clip import Clip
+from models.scene import SceneConfig
 from sim.errors import SimError
 from sim.recording.recording import Recording
+from sim.world.world import FigureKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES = "edited.bvh", "default.bvh", "figures"
@@ -50,3 +55,10 @@ def clips_of(recording: Recording) -> tuple[Clip, ...]:
     names = recording.texts["clip_names"].split("\n")
     rates = recording.array("clip_fps")
     return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
+
+
+def world_of(recording: Recording) -> mujoco.MjModel:
+    """The model that a recording's configurations are of: with the figure if there was one."""
+    stature, mass, servo_period, physics_step = (float(number) for number in recording.array("scene"))
+    kind = cast(FigureKind, recording.texts["figure"])
+    return World(SceneConfig(stature, mass, servo_period, physics_step), kind).full_model()

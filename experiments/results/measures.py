@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from controllers.safety.faults import Fault
 from experiments.results.changes import river_changes
+from experiments.results.faults import fault_lines
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import (
     AnimationSummary,
-    FaultSummary,
     FigureSummary,
     PathSummary,
     PushSummary,
@@ -61,7 +60,7 @@ def summarise(
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
-        path, animation, figure, tank, speed, warnings, changes=river_changes(recording), fault=fault_summary(recording)
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording)
     )
 
 
@@ -71,12 +70,13 @@ def measured(
 ) -> tuple[PathSummary, AnimationSummary | None, FigureSummary | None, TankSummary]:  # fmt: skip
     """Measure the part of a run between two times; the other arguments are those of `summarise`.
 
-    A run without a figure has no animation, and one that only shows it nothing that follows it.
+    There is no animation without a figure, and no figure that is not in the physics.
     """
-    channels = recording.groups["frames"]
-    path = PathMeasure(recording, span[0], handled)
-    animation = AnimationMeasure(span[0]) if "reference" in channels else None
-    figure = FigureMeasure(recording) if "joint_error" in channels else None
+    path, animation, figure = (
+        PathMeasure(recording, span[0], handled),
+        AnimationMeasure(span[0]),
+        FigureMeasure(recording),
+    )
     tank = TankSummary(math.inf, 0)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
     rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
@@ -87,35 +87,15 @@ def measured(
         ticks = {name: channel[rows] for name, channel in recording.groups["ticks"].items() if name in _TICKS}
         frames = {name: channel[start:stop] for name, channel in recording.groups["frames"].items() if name in _FRAMES}
         pushed = path.add(ticks)
-        if animation is not None:
+        if "reference" in frames:
             default = default_poses(*(ticks[name][::per_frame] for name in ("nearest", "phase", "river")))
             animation.add(frames, default, pushed[::per_frame])
-        if figure is not None:
+        if "joint_error" in frames:
             figure.add(frames)
         least = min(tank.least_mj, 1e3 * float(ticks["tank"].min()))
         tank = TankSummary(least, tank.scaled_ticks + int(np.sum(ticks["tank_scale"] < 1.0)))
-    changed, followed = animation and animation.summary(), figure and figure.summary()
-    return path.summary(), changed, followed, tank
-
-
-def fault_summary(recording: Recording) -> FaultSummary | None:
-    """What made the device let go, and gaps; None if there was nothing, or a recording tells nothing of it."""
-    ticks = recording.groups["ticks"]
-    if "fault" not in ticks:
-        return None
-    gaps, first, value, at = 0, Fault.NONE, 0.0, None
-    for start in range(0, len(ticks["t"]), BLOCK_ROWS):
-        rows = slice(start, start + BLOCK_ROWS)
-        codes = ticks["fault"][rows]
-        gaps = int(ticks["gaps"][rows][-1])
-        if at is None and np.any(codes):
-            k = int(np.argmax(codes != 0.0))
-            first, value = Fault(int(codes[k])), float(ticks["fault_value"][start + k])
-            at = float(ticks["t"][start + k])
-    if at is None and gaps == 0:
-        return None
-    words = first.words(value)
-    return FaultSummary(first.name.lower(), at, value if math.isfinite(value) else None, words, gaps)
+    shown, physical = (name in recording.groups["frames"] for name in ("reference", "joint_error"))
+    return path.summary(), animation.summary() if shown else None, figure.summary() if physical else None, tank
 
 
 def trace_summary(recording: Recording) -> TraceSummary:

@@ -62,10 +62,9 @@ class EditingSummary:
     presses : tuple of PressSummary
     pushes : tuple of PushSummary
         Of a hand that does not reach for the curve, hold it or carry it.
-    animation : AnimationSummary or None
-        Against the animation of the curve that was given at the same phase, if there is a figure.
-    figure : FigureSummary or None
-        If it is in the physics.
+    animation : AnimationSummary
+        Against the animation of the curve that was given at the same phase.
+    figure : FigureSummary
     """
 
     seconds: float
@@ -78,22 +77,22 @@ class EditingSummary:
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
         done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
+        shown, told = self.animation, list[str]()
+        if shown is not None:
+            changed = max(shown.pushed_deg, shown.unpushed_deg)
+            told = [
+                f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."
+            ]
         return [
             f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
             *pushes_line(self.pushes),
-            *self._of_the_animation(),
+            *told,
             *(
                 []
                 if self.until is None or self.seconds >= self.until
                 else [f"It was to be performed from {self.until:.1f} s on, but the run ended before."]
             ),
         ]
-
-    def _of_the_animation(self) -> list[str]:
-        if self.animation is None:
-            return []
-        changed = max(self.animation.pushed_deg, self.animation.unpushed_deg)
-        return [f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."]
 
 
 @dataclass(frozen=True)
@@ -106,10 +105,9 @@ class PerformanceSummary:
         [s]
     path : PathSummary
         Of the stylus against the bent curve.
-    animation : AnimationSummary or None
-        Against the animation of the curve that was given at the same phase, if there is a figure.
-    figure : FigureSummary or None
-        If it is in the physics.
+    animation : AnimationSummary
+        Against the animation of the curve that was given at the same phase.
+    figure : FigureSummary
     """
 
     start: float
@@ -120,20 +118,18 @@ class PerformanceSummary:
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
-        alone = self.path.deviation_rms_mm
+        alone, shown, told = self.path.deviation_rms_mm, self.animation, list[str]()
         left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
+        if shown is not None:
+            by = f"{shown.unpushed_deg:.1f}°"
+            if self.path.pushes:
+                by = f"{shown.pushed_deg:.1f}° a joint where it was pushed, {shown.unpushed_deg:.1f}° elsewhere"
+            told = [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
         return [
             f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
             *pushes_line(self.path.pushes),
-            *self._of_the_animation(),
+            *told,
         ]
-
-    def _of_the_animation(self) -> list[str]:
-        if self.animation is None:
-            return []
-        pushed, bent = self.animation.pushed_deg, self.animation.unpushed_deg
-        by = f"{pushed:.1f}° a joint where it was pushed, {bent:.1f}° elsewhere" if self.path.pushes else f"{bent:.1f}°"
-        return [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
 
 
 def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
@@ -142,7 +138,7 @@ def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
 
 
 def _residual(figure: FigureSummary | None) -> str:
-    """What is said of the residual, unless the figure fell, which is said of the whole run, or is only shown."""
+    """What is said of the residual, unless the figure fell: that is said of the whole run."""
     return (
         ""
         if figure is None or figure.fell_at is not None

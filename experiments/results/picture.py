@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from experiments.results.folder import RECORDING, config_of
+from experiments.results.folder import RECORDING, world_of
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import PlanarDisplacement
-from models.scene import FIGURE, P_WH, PHANTOM, world_model
+from models.scene import FIGURE, P_WH, PHANTOM
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import rgb
@@ -87,7 +87,7 @@ class _Stage:
 def draw_picture(folder: Path, target: Path) -> None:
     """Render the picture of a run into a PNG file (headless: with ``MUJOCO_GL=egl`` or ``osmesa``)."""
     with Recording(folder / RECORDING) as recording:
-        model = world_model(config_of(recording).scene)
+        model = world_of(recording)
         model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
         model.vis.quality.offsamples = 8
         left = round(DEVICE_SHARE * WIDTH)

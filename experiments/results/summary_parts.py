@@ -99,38 +99,6 @@ class TraceSummary:
 
 
 @dataclass(frozen=True)
-class FaultSummary:
-    """What made the device let go.
-
-    Attributes
-    ----------
-    fault : str
-        Name of the first fault that was latched (see `controllers.safety.faults.Fault`).
-    t : float or None
-        When [s]; None if none was.
-    value : float or None
-        What was read then, in its own unit; None if it was no number.
-    words : str
-        The fault in words.
-    gaps : int
-        How often the servo had not run for so long that the force was ramped in again.
-    """
-
-    fault: str
-    t: float | None
-    value: float | None
-    words: str
-    gaps: int
-
-    def lines(self) -> list[str]:
-        """What happened, a sentence each."""
-        let_go = [] if self.t is None else [f"The device let go at {self.t:.3f} s: {self.words}."]
-        times = "once" if self.gaps == 1 else f"{self.gaps} times"
-        away = [f"The servo was away {times}, and the force was ramped in again."] if self.gaps else []
-        return let_go + away
-
-
-@dataclass(frozen=True)
 class TankSummary:
     """How much of its budget of energy the field needed.
 
@@ -184,6 +152,15 @@ class FigureSummary:
     saturated: float
     grounded: float
     ground_force_mean: float
+
+    def line(self) -> str:
+        """How it followed, in a sentence; until it fell, if it did."""
+        return (
+            ("" if self.fell_at is None else "Until it fell: ")
+            + f"The physical figure followed within {self.joint_error_rms_deg:.2f}° RMS at the joints and "
+            f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
+            f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance."
+        )
 
 
 @dataclass(frozen=True)

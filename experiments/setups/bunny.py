@@ -23,7 +23,9 @@ def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:
     power = river_power(mode.damping, pace) + pace * min(mode.stiffness * width * np.exp(-0.5), force)
     # ∫ k s exp(−s²/2δ²) ds = k δ² is what a spring of reach √2 δ holds.
     springs = ((mode.stiffness, np.sqrt(2.0) * width),)
-    return fixed_curve_parts(config, mode, maps, FixedField(law, course, power, springs, Notes(maps.reach), urged))
+    return fixed_curve_parts(
+        config, mode, maps, FixedField(law, course, power, springs, Notes("BUNNY", maps.reach), urged)
+    )
 
 
 def bunny_laws(mode: Bunny) -> dict[str, CertifiedLaw]:

@@ -16,7 +16,7 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     course = maps.course(mode.damping)
     law, urged = governed(mode.governor, FollowLaw(course, mode.stiffness, mode.damping, mode.tube), course, maps)
     power, springs = river_power(mode.damping, fastest(course)), ((mode.stiffness, mode.tube),)
-    field = FixedField(law, course, power, springs, Notes(maps.reach), urged, mode.tube)
+    field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
     return fixed_curve_parts(config, mode, maps, field)
 
 

@@ -184,10 +184,12 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START, limiter)
     gait = field.gait
     static = {"lead_scale": field.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
-    notes = Notes(0.0, "", "the figure's path", "leads", static)
+    notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
-        lead = lead_summary(of.recording, field, of.memory, config.scene, summary.fell_at)
+        lead = lead_summary(
+            of.recording, field, of.memory, config.scene, None if summary.figure is None else summary.figure.fell_at
+        )
         return replace(summary, lead=lead)
 
     return Parts(

@@ -167,6 +167,8 @@ class Notes:
 
     Attributes
     ----------
+    title : str
+        Of the page: the mode.
     tube_radius : float
         Of what is drawn about the curve [m]; 0 for nothing.
     tube_name : str
@@ -179,6 +181,7 @@ class Notes:
         What the recording keeps besides.
     """
 
+    title: str
     tube_radius: float
     tube_name: str = "map's domain"
     distance_from: str = "the curve"

@@ -47,7 +47,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
     power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
     springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
-    notes = Notes(mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
+    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
     field = FixedField(law, course, power, springs, notes, urged, pushes=pushes)
     return fixed_curve_parts(config, mode, maps, field)

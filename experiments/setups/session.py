@@ -14,7 +14,6 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import FIGURE, P_WH
-from sim.body.bodies import Body
 from sim.loop.servo import Servo
 from sim.world.world import World
 
@@ -25,7 +24,6 @@ class Session:
 
     parts: Parts
     world: World
-    figure: Body
     servo: Servo
     remarks: tuple[str, ...]
 
@@ -57,6 +55,7 @@ class Session:
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """What the recording keeps beside the channels."""
         phases, notes = np.linspace(self.curve.start, self.curve.end, 241), self.parts.notes
+        scene = self.world.config
         return {
             "curve": self.curve.point(phases),
             "curve_span": np.array([self.curve.start, self.curve.end]),
@@ -68,14 +67,22 @@ class Session:
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
             "motor_peak": np.array(PREMIUM_1_5.peak_torque),
+            "body_weight": self.weight,
+            "scene": np.array([scene.stature, scene.mass, scene.servo_period, scene.physics_step]),
             "figure": self.world.kind,
-            "body_weight": self.figure.weight,
+            "title": f"{notes.title} over {', '.join(clip.name for clip in self.clips)}",
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),
             **self.parts.maps.static,
             **notes.static,
         }
+
+    @property
+    def weight(self) -> float:
+        """Of the figure [N]."""
+        figure = self.world.figure
+        return float(figure.body_subtreemass[1]) * float(np.linalg.norm(figure.opt.gravity))
 
     @property
     def figure_root(self) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
@@ -18,7 +18,10 @@ from experiments.setups.setups import map_parts, parts_of, resolved
 from experiments.setups.stylus import UPRIGHT, stylus_path
 from models.humanoid.skeleton import rest_pose
 from models.mocap.clip import Clip
-from sim.body.bodies import Body, make_body
+from models.scene import FIGURE
+from sim.body.drive import BodyState
+from sim.body.figure import Figure
+from sim.body.unsimulated import kinematic_figure, no_figure
 from sim.compilation.units import Unit
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.run_units import run_units
@@ -32,6 +35,7 @@ from sim.reference.reference import (
     poses_along,
     unlinked_reference,
 )
+from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
@@ -65,7 +69,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         least = 2.0 * config.clock.servo_period * ticks_of(config)
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     check_rates(config)
-    world = World(config.scene)
+    world = World(config.scene, config.figure.kind)
     return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
 
 
@@ -89,14 +93,13 @@ def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts]
         As `wire`.
     """
     draft = parts_of(maps)
-    ready(_units(draft, _servo(draft, world)[0]))
-    # Whatever takes compiled code to find is found when everything has been checked.
-    refined = maps.refine()
+    ready(_units(draft, _servo(draft, world)))
+    # Whatever takes compiled code to find is found when everything has been checked, and if anybody is to show it.
+    refined = maps.refine() if world.kind != "none" else maps
     parts = draft if refined is maps else parts_of(refined)
-    servo, figure = _servo(parts, world)
-    servo = servo.linked(parts.program)
+    servo = _servo(parts, world).linked(parts.program)
     _begin(parts, servo, world)
-    return Session(parts, world, figure, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
+    return Session(parts, world, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
 
 def check_rates(settings: Settings) -> None:
@@ -123,62 +126,70 @@ def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
-def _servo(parts: Parts, world: World) -> tuple[Servo, Body]:
+def _servo(parts: Parts, world: World) -> Servo:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
     compiled, walker = parts.maps.whole_map.compiled(), None
-    period, ticks = config.clock.servo_period, ticks_of(config)
-    limiter, legs = ForceLimiter(period), packed_legs(world.figure)
+    period = config.clock.servo_period
     port = phantom_port(world.model, world.data, period, config.device.cutoff)
-    field = unlinked_field(program, limiter, parts.tank)
+    field = unlinked_field(program, ForceLimiter(period), parts.tank)
     if parts.walker is not None:
         # The field moves the walker, the map shows it.
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
-    body = make_body(world, parts.gains)
     device = simulated_phantom(port, parts.user)
-    servo = Servo(
-        plant=make_plant(world),
-        device=device,
-        field=field,
-        reference=unlinked_reference(
-            world.figure, compiled, period * ticks, config.figure.smoothing, config.figure.blend, legs,
-            parts.held_seconds,
-        ) if world.kind != "none" else no_reference(compiled if program.map_feeds else None),
-        figure=body.state,
-        figure_ticks=ticks,
-        argument=device.hand[1:8] if walker is None else walker.argument,
+    body, reference = _BODIES[world.kind](parts, world, compiled)
+    return Servo(
+        plant=make_plant(world), device=device, field=field, reference=reference, figure=body,
+        figure_ticks=ticks_of(config), argument=device.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
-    return servo, body
+
+
+def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
+    figure, period = parts.config.figure, parts.config.clock.servo_period * ticks_of(parts.config)
+    legs = packed_legs(world.figure)
+    return unlinked_reference(
+        world.figure, compiled, period, figure.smoothing, figure.blend, legs, parts.held_seconds
+    )  # fmt: skip
+
+
+def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+    figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
+    return figure.state, _reference(parts, world, compiled)
+
+
+def _kinematic(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+    return kinematic_figure(), _reference(parts, world, compiled)
+
+
+def _none(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
+    return no_figure(), no_reference(compiled if parts.program.map_feeds else None)
+
+
+_BODIES = {"physical": _physical, "kinematic": _kinematic, "none": _none}
 
 
 def _begin(parts: Parts, servo: Servo, world: World) -> None:
     """Put stylus and figure where the run begins."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), moves)
-    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
-    orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
     if world.kind == "none":
-        world.reset(begin.point, rest_pose(), orientation, begin.velocity if moves else None)
-        _know_velocity(servo, moves)
+        world.reset(begin.point, rest_pose())
         return
     argument = stylus_path(begin.point[None]) if parts.walker is None else servo.argument[None]
     poses = np.empty((1, whole_map.nq))
     poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
     if parts.bends:
         stood(packed_legs(world.figure), poses[0])
+    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
+    orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
     if not moves:
         world.reset(begin.point, poses[0], orientation)
         return
     world.reset(begin.point, poses[0], orientation, begin.velocity, _velocity(whole_map, argument[0], begin))
     begin_in_motion(reference, np.array(begin))
-    _know_velocity(servo, moves)
-
-
-def _know_velocity(servo: Servo, moves: bool) -> None:
-    """Let a simulated device that begins in motion know its velocity."""
-    if moves and isinstance(servo.device, SimulatedPhantom):
-        sense_in_motion(servo.device.port)
+    assert isinstance(servo.device, SimulatedPhantom)
+    sense_in_motion(servo.device.port)
 
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:

@@ -9,19 +9,17 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.law import Program
-from controllers.fields.program import evaluate
+from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import Array, HandState, IntArray
+from controllers.state import Array, HandState
 
 
 @njit
-def _ticks(
-    ops: IntArray, params: Array, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array
-) -> float:
+def _ticks(compiled: Compiled, memory: Array, limits: Array, limiter: Array, hands: Array, force: Array) -> float:
     wrench, total = np.zeros(6), 0.0
     for i in range(hands.shape[0]):
-        evaluate(ops, params, memory, hands[i], wrench)
+        evaluate(compiled.units, compiled.ops, compiled.params, memory, hands[i], wrench)
         limit_force(limits, limiter, wrench, force)
         total += force[0]
     return total
@@ -46,10 +44,10 @@ def heaviest_field() -> tuple[Program, Array]:
 def tick_microseconds(program: Program, hands: Array) -> float:
     """Mean processor time of a tick of a field with the safety limiter [µs], the best of five laps of hands."""
     limiter, memory, best = ForceLimiter(1e-3), program.fresh_memory(), np.inf
-    heat = limiter.fresh_memory()
+    compiled, heat = program.compiled(), limiter.fresh_memory()
     for lap in range(6):
         rows = hands[:2] if lap == 0 else hands
         begin = time.thread_time()
-        _ticks(program.ops, program.params, memory, limiter.limits(), heat, rows, np.zeros(3))
+        _ticks(compiled, memory, limiter.limits(), heat, rows, np.zeros(3))
         best = best if lap == 0 else min(best, time.thread_time() - begin)
     return 1e6 * best / len(hands)

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from controllers.rotations import logarithm, multiply, rotate
 from experiments.config.words import run_config
 from experiments.results.figures import AXES, STYLE
-from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.run import run
 from experiments.setups.stylus import stylus_path
 from experiments.setups.wiring import wire
@@ -112,7 +112,7 @@ def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
 
 
 def _figure_poses(recording: Recording) -> Array:
-    root = int(world_model(config_of(recording).scene).joint(FIGURE + "root").qposadr[0])
+    root = int(world_of(recording).joint(FIGURE + "root").qposadr[0])
     return recording.channel("frames", "qpos")[:][:, root : root + N_POSE]
 
 

@@ -86,11 +86,6 @@ class Figure:
         object.__setattr__(self, "twin_data", mujoco.MjData(self.twin))
         object.__setattr__(self, "state", self._state())
 
-    @property
-    def weight(self) -> float:
-        """Body weight [N]."""
-        return self.state.weight
-
     def update(self, q_r: Array, v_r: Array, a_r: Array) -> None:
         """Set torques and residual for a reference, once; loops call the kernel `figure_torque` instead.
 

@@ -72,7 +72,7 @@ def test_a_mass_moves_in_each_mode_as_it_ever_did(mode):
     rows = np.loadtxt(GOLDEN, delimiter=",", skiprows=1)
     golden = rows[:, 3 * MODES.index(mode) : 3 * MODES.index(mode) + 3]
     path = _trajectory(mode)
-    # Rounding differs from machine to machine, and a field that attracts does not let it grow.
+    # Rounding differs from machine to machine, and a field that attracts does not let it grow: 1 nm becomes 2.
     np.testing.assert_allclose(path, golden, atol=1e-8)
     assert np.ptp(path, axis=0).max() > 0.05
 

@@ -39,6 +39,7 @@ def _run() -> dict[str, list]:
 
 def test_the_hand_leads_and_the_figure_follows_as_they_did() -> None:
     golden, now = np.array(json.loads(GOLDEN.read_text(encoding="utf-8"))["ways"]), np.array(_run()["ways"])
+    # A start moved by 1 nm moves the hand by 1 nm and the figure's way by 4 nm.
     np.testing.assert_allclose(now[:, :3], golden[:, :3], atol=1e-8)
     np.testing.assert_allclose(now[:, 3], golden[:, 3], atol=1e-6)
     # Along the S and back again.

@@ -59,10 +59,10 @@ def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map
         # It fell as soon as it was performed: at full speed from the middle of a step.
         assert summary.figure.fell_at is None
         assert summary.performance is not None
-        # 1.6 to 2.3 cm in 48 runs: seeds, kernels of OpenBLAS, starts moved by 1 nm, maps by up to 10 µm.
+        # 1.6 to 2.3 cm in 51 runs: seeds, kernels of OpenBLAS, nudged starts and maps; 2.9 where a lift ends elsewhere.
         assert summary.performance.figure.root_error_max_cm < 5.0
         residuals.append(summary.performance.figure.residual_force_rms)
-    # 0.162 to 0.172 in those runs, 0.256 with one seed by AVX-512 kernels; a figure that hangs on its help takes 1.
+    # 0.162 to 0.172, 0.222 where a lift ends elsewhere, 0.256 on AVX-512; a figure that hangs on its help takes 1.
     assert np.median(residuals) < 0.4
 
 
@@ -96,7 +96,8 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     assert summary.figure.fell_at is None
     assert summary.figure.root_error_max_cm < 5.0
     assert summary.figure.residual_in_flight_max == 0.0
-    assert summary.figure.residual_force_rms < 0.15
+    # 0.122 to 0.134 by seed and kernels of OpenBLAS, up to 0.141 where a lift ends elsewhere.
+    assert summary.figure.residual_force_rms < 0.18
     # The change itself takes help, walking and running hardly any.
     force = np.linalg.norm(residual[:, :3], axis=1) / weight
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)

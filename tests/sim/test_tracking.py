@@ -29,7 +29,8 @@ def test_a_feasible_motion_needs_no_help():
     assert result.joint_error < 1.0
     assert result.root_error_max < 0.005
     assert result.residual_force_max < 0.01
-    assert result.grounded > 0.999
+    # 1 or 0.9992 by a start moved by 1 nm: one update of 1250, and three may be.
+    assert result.grounded > 0.997
     assert result.flight_seconds == 0.0
     assert result.warnings == 0
 

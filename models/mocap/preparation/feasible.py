@@ -38,8 +38,8 @@ Array = npt.NDArray[np.float64]
 
 _MARGIN = 0.02  # to the joints' limits [rad]
 _STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
-_KNOT, _STEP = 0.08, 0.02  # of the change and of the instants [s]; 50 and 12.5 ms cost twice as much for a point less
-_SWING, _ROLL = 0.025, 0.008  # least heights of swinging feet and of the lifted end of a standing one [m] ...
+_KNOT, _STEP = 0.05, 0.0125  # of the change and of the instants [s]; 80 and 20 ms cost half, and a run falls
+_SWING, _ROLL = 0.006, 0.0  # least heights of swinging feet and of the lifted end of a standing one [m] ...
 _RISE = 0.08  # ... reached so long before and after they stand [s]; captured feet swing at 2 to 5 cm
 _TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
 _ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
@@ -86,7 +86,7 @@ class FeasibleWeights:
     leg: float = 3.0
     ankle: float = 2.0
     sway: float = 3e-3
-    jerk: float = 5e-5
+    jerk: float = 3e-4
 
     def tracking(self) -> Array:
         """Weights of the change, shape (57,)."""

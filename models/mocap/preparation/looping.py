@@ -16,7 +16,7 @@ from models.mocap.preparation.poses import inverse, plus
 
 Array = npt.NDArray[np.float64]
 
-_GAIT, _PLACE = 0.45, 0.30  # d of the ends of a gait's lap, of a cycle in place [rad]: walkers' steps differ by 0.1 to 0.3
+_GAIT, _PLACE = 0.45, 0.30  # d of the ends of a gait, of a cycle in place [rad]; walkers have 0.1 to 0.3
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps
 _COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
 _LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it

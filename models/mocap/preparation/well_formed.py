@@ -15,7 +15,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.feasible import contact_residual
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
-from models.mocap.preparation.stances import Stances, stances
+from models.mocap.preparation.stances import stances
 
 Array = npt.NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class WellFormed:
     lowest, highest : float
         Of the soles' contact points in stance over the floor, 1st and 99th percentile [m].
     tilt : float
-        Of soles that stand on heel and toes, 95th percentile [rad].
+        Of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
         Furthest that a contact point moves over the floor in one stance, 95th percentile over stances [m].
     outliers : int
@@ -129,7 +129,7 @@ def well_formed(clip: Clip) -> WellFormed:
     vectors = quaternions.logarithm(clip.poses[:, 7:].reshape(clip.n_frames, -1, 4))
     limits = joint_range()
     return WellFormed(
-        clip.duration, float(low), float(high), _tilt(clip, schedule), skate, outliers(clip), closed,
+        clip.duration, float(low), float(high), _tilt(clip, standing), skate, outliers(clip), closed,
         _seam(clip, closed), flights, falling,
         float(np.maximum(limits[:, :, 0] - vectors, vectors - limits[:, :, 1]).max()),
         contact_residual(clip, schedule) if clip.n_frames > 8 else 0.0,
@@ -148,11 +148,11 @@ def outliers(clip: Clip) -> int:
     return int(np.sum((accelerations > _STANDS_OUT * usual) & (accelerations > _JERKY)))
 
 
-def _tilt(clip: Clip, schedule: Stances) -> float:
+def _tilt(clip: Clip, resting: npt.NDArray[np.bool_]) -> float:
     angles: list[Array] = []
     turned = global_rotations(clip.poses)
     for foot, side in enumerate(("left", "right")):
-        flat = schedule.standing[:, 4 * foot] & schedule.standing[:, 4 * foot + 2]
+        flat = resting[:, 4 * foot : 4 * foot + 4].all(axis=1)
         up = quaternions.rotated(turned[flat, BODIES.index(f"{side}_foot")], np.array([0.0, 0.0, 1.0]))
         angles.append(np.arccos(np.clip(up[:, 2], -1.0, 1.0)))
     every = np.concatenate(angles)

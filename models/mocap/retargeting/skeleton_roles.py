@@ -1,9 +1,9 @@
 """Which joint of a foreign skeleton plays which part of the figure, found by its name and its place in the tree.
 
-Names known: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max Biped, Unreal,
-Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with sides before or
-after, namespaces and numbers. Pelvis, chest and abdomen go by many names, so they are taken by place: the pelvis is where
-the legs meet, the chest where the arms meet, the abdomen halfway between.
+Names known: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max Biped,
+Unreal, Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with sides
+before or after, namespaces and numbers. Pelvis, chest and abdomen go by many names, so they are taken by place: the
+pelvis is where the legs meet, the chest where the arms meet, the abdomen halfway between.
 """
 
 import re

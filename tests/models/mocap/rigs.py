@@ -12,7 +12,8 @@ from models.mocap import quaternions
 # What vendors call the parts: pelvis, abdomen, chest, neck, head; clavicle, upper arm, forearm, hand; thigh, shank,
 # foot, toe. @ is the side, as the family writes it.
 FAMILIES = {
-    "HumanIK": ("Left Right", "Hips Spine Spine1 Neck Head", "@Shoulder @Arm @ForeArm @Hand @UpLeg @Leg @Foot @ToeBase"),
+    "HumanIK": ("Left Right", "Hips Spine Spine1 Neck Head",
+                "@Shoulder @Arm @ForeArm @Hand @UpLeg @Leg @Foot @ToeBase"),
     "Mixamo": ("Left Right", "mixamorig:Hips mixamorig:Spine mixamorig:Spine2 mixamorig:Neck mixamorig:Head",
                "mixamorig:@Shoulder mixamorig:@Arm mixamorig:@ForeArm mixamorig:@Hand mixamorig:@UpLeg mixamorig:@Leg "
                "mixamorig:@Foot mixamorig:@ToeBase"),
@@ -31,7 +32,8 @@ FAMILIES = {
     "Biped": ("L R", "Bip01_Pelvis Bip01_Spine Bip01_Spine1 Bip01_Neck Bip01_Head",
               "Bip01_@_Clavicle Bip01_@_UpperArm Bip01_@_Forearm Bip01_@_Hand Bip01_@_Thigh Bip01_@_Calf Bip01_@_Foot "
               "Bip01_@_Toe0"),
-    "SMPL": ("L R", "Pelvis Spine1 Spine3 Neck Head", "@_Collar @_Shoulder @_Elbow @_Wrist @_Hip @_Knee @_Ankle @_Foot"),
+    "SMPL": ("L R", "Pelvis Spine1 Spine3 Neck Head",
+             "@_Collar @_Shoulder @_Elbow @_Wrist @_Hip @_Knee @_Ankle @_Foot"),
     "Unreal": ("l r", "pelvis spine_01 spine_03 neck_01 head",
                "clavicle_@ upperarm_@ lowerarm_@ hand_@ thigh_@ calf_@ foot_@ ball_@"),
     "Rigify": ("L R", "DEF-hips DEF-spine DEF-chest DEF-neck DEF-head",
@@ -89,7 +91,7 @@ def random_rig(rng: np.random.Generator) -> Rig:
 
 
 def _joints(rig):
-    """(name, carrying body, parent's name, place in the parent's frame) of every joint; the body of extras is that of their parent."""
+    """(name, carrying body, parent, place in the parent's frame) of every joint; extras have their parent's body."""
     sides, centre, limbs = FAMILIES[rig.family]
     centre, limbs, sides = centre.split(), limbs.split(), sides.split()
     model = figure_model()
@@ -145,7 +147,7 @@ def _joints(rig):
 def _zero_turns(rig, rows, rng):
     """D of every joint: R D is how its frame stands, R being its segment's rotation from the figure's rest."""
     children = {}
-    for name, _, parent, at in rows:
+    for _, _, parent, at in rows:
         if parent is not None and np.linalg.norm(at) > 1e-6:
             children.setdefault(parent, at)
     turns = {}

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from models.humanoid.skeleton import N_TANGENT
+from models.mocap.clip import Clip, pose_difference
+from models.mocap.library import embedded
+from models.mocap.preparation.change import DEGREE, Change, Normal
+from models.mocap.preparation.feasible import FeasibleWeights, _Problem
+from models.mocap.preparation.poses import plus, resampled, smoothed
+from models.mocap.preparation.stances import stances
+
+
+@pytest.fixture(scope="module", params=["closed", "open"])
+def change(request):
+    walk = resampled(embedded("walk"), 60.0)
+    clip = walk if request.param == "closed" else Clip(walk.poses[:40], 60.0, "part")
+    return Change(clip, 0.1, 0.05)
+
+
+def test_carried_poses_are_mujocos():
+    rng = np.random.default_rng(0)
+    poses = embedded("ginga").poses[:5]
+    tangents = 0.3 * rng.normal(size=(5, N_TANGENT))
+    np.testing.assert_allclose(pose_difference(poses, plus(poses, tangents)), tangents, atol=1e-12)
+
+
+def test_no_change_leaves_the_motion(change):
+    same = change.changed(np.zeros((change.n_points, N_TANGENT)), 60.0)
+    frames = min(same.n_frames, change.clip.n_frames)
+    np.testing.assert_allclose(pose_difference(same.poses[:frames], change.clip.poses[:frames]), 0.0, atol=2e-3)
+    assert same.closes() == change.clip.closes()
+
+
+def test_a_changed_lap_still_closes(change):
+    x = 0.02 * np.random.default_rng(1).normal(size=(change.n_points, N_TANGENT))
+    assert change.changed(x, 60.0).closes() == change.closed
+
+
+def test_normal_equations_are_those_of_the_stacked_rows(change):
+    """Banded and bordered, against a dense matrix whose columns are found by moving one unknown at a time."""
+    rng = np.random.default_rng(2)
+    rows = [rng.normal(size=(2, (DEGREE + 1) * N_TANGENT)) for _ in range(change.intervals)]
+    normal, n = Normal(change), change.n_points * N_TANGENT
+    for interval, row in enumerate(rows):
+        normal.add(interval, row.T @ row)
+    normal.band[0] += 1.0
+    normal.corner += np.eye(len(normal.corner))
+
+    def stacked(x):
+        points = change.points(x.reshape(-1, N_TANGENT))
+        return np.concatenate([row @ points[k : k + DEGREE + 1].ravel() for k, row in enumerate(rows)])
+
+    some = rng.normal(size=n)
+    residual = np.concatenate([row @ np.ones((DEGREE + 1) * N_TANGENT) for row in rows])
+    gradient = normal.gradient(np.array([rows[k].T @ residual[2 * k : 2 * k + 2] for k in range(change.intervals)]))
+    assert stacked(some) @ residual == pytest.approx(some @ gradient)
+    assert some @ normal.times(some) == pytest.approx(stacked(some) @ stacked(some) + some @ some)
+    wanted = rng.normal(size=n)
+    np.testing.assert_allclose(normal.times(normal.solve(wanted, 0.0)), wanted, atol=1e-5)
+
+
+def test_the_jacobian_of_the_errors(change):
+    """Against central differences along random changes; contacts keep their edges for so small a step."""
+    clip = change.clip
+    problem = _Problem(change, stances(clip, smoothed(clip, 8.0)), FeasibleWeights(strain=0.0))
+    rng = np.random.default_rng(3)
+    x = 1e-3 * rng.normal(size=change.n_points * N_TANGENT)
+    errors = problem.errors(x, True)
+    along = rng.normal(size=x.shape)
+    which = change.first[:, None] + np.arange(DEGREE + 1)
+    points = change.points(along.reshape(-1, N_TANGENT))
+    parts = np.stack([np.einsum("mk,mkn->mn", change.basis[order], points[which]) for order in range(3)], axis=1)
+    told = np.einsum("mofn,mon->mf", errors.jacobian, parts)
+    step = 1e-6
+    ahead, behind = (problem.errors(x + sign * step * along, False).weighted for sign in (1, -1))
+    found = (ahead - behind) / (2 * step)
+    # The two ends of an open motion take the velocities of their neighbours.
+    inner = slice(1, -1) if not change.closed else slice(None)
+    scale = np.abs(found[inner]).max(axis=0) + 1.0
+    assert np.quantile(np.abs(told - found)[inner] / scale, 0.99) < 0.02

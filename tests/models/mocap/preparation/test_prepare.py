@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+
+from experiments.preparation.command import prepare_file, summary
+from models.errors import ModelError
+from models.mocap.clip import Clip, pose_difference
+from models.mocap.library import embedded, load
+from models.mocap.preparation.looping import looped, mirrored
+from models.mocap.preparation.poses import resampled, sole_points
+from models.mocap.preparation.stances import stances
+from models.mocap.preparation.well_formed import outliers, well_formed
+from models.mocap.readers.own_bvh import write_bvh
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """Two and a half laps of the embedded walk, cut where it happens."""
+    walk = resampled(embedded("walk"), 120.0)
+    rows = [walk.poses[:-1]]
+    for _ in range(2):
+        rows.append(walk.displacement.moved(rows[-1]))
+    return walk, Clip(np.concatenate(rows)[37 : 37 + round(2.5 * walk.n_frames)], walk.fps, "walks")
+
+
+def test_the_lap_of_a_walk_is_found_and_closed(walks):
+    walk, several = walks
+    found = looped(several)
+    assert found.kind == "cycle"
+    assert found.clip.closes()
+    # The embedded walk is two strides.
+    assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
+
+
+def test_a_closed_clip_is_left_as_it_is(walks):
+    assert looped(walks[0]).clip is walks[0]
+
+
+def test_what_does_not_repeat_rests_at_both_ends(walks):
+    part = Clip(walks[1].poses[: walks[0].n_frames // 5], 120.0, "part")
+    found = looped(part)
+    assert found.kind == "open"
+    speeds = np.abs(found.clip.velocities())
+    assert max(speeds[0].max(), speeds[-1].max()) < 0.2
+
+
+@pytest.mark.parametrize("wish", ["1:9", "two", "2:1"])
+def test_a_wrong_loop_is_told_in_one_line(walks, wish):
+    with pytest.raises(ModelError, match=r"--loop .*expected"):
+        looped(walks[1], wish)
+
+
+def test_a_mirrored_mirror_is_the_motion(walks):
+    np.testing.assert_allclose(pose_difference(mirrored(mirrored(walks[0])).poses, walks[0].poses), 0.0, atol=1e-12)
+    ours, theirs = sole_points(walks[0].poses), sole_points(mirrored(walks[0]).poses)
+    np.testing.assert_allclose(ours[:, :4] * (1, -1, 1), theirs[:, 4:], atol=1e-9)
+
+
+def test_the_walks_feet_stand_by_turns(walks):
+    schedule = stances(walks[0], walks[0])
+    left, right = schedule.standing[:, :4].any(axis=1), schedule.standing[:, 4:].any(axis=1)
+    assert 0.5 < left.mean() < 0.75
+    assert (left | right).all()
+    assert not (left & right).all()
+
+
+def test_the_embedded_walk_is_well_formed(walks):
+    assert well_formed(walks[0]).faults() == ()
+
+
+def test_a_pose_that_does_not_belong_stands_out(walks):
+    poses = walks[0].poses.copy()
+    poses[20, 3:] = np.tile([1.0, 0, 0, 0], 18)
+    assert outliers(walks[0]) == 0
+    assert outliers(Clip(poses, 120.0, "popped")) >= 1
+
+
+@pytest.mark.slow
+def test_a_captured_walk_is_made_well_formed(mocap, tmp_path):
+    made = prepare_file(mocap / "snu/walk.bvh", tmp_path / "walk.bvh", report=tmp_path)
+    before, after = well_formed(made.captured), well_formed(made.clip)
+    assert after.closed
+    assert after.residual < 0.05 < before.residual
+    assert after.skate < before.skate
+    assert "walk" in summary(made, after)
+    assert (tmp_path / "prepare-walk.html").stat().st_size > 10_000
+    again = load(tmp_path / "walk.bvh").clip
+    np.testing.assert_allclose(pose_difference(again.poses, made.clip.poses), 0.0, atol=1e-7)
+
+
+def test_a_target_that_exists_is_left(tmp_path):
+    write_bvh(embedded("walk"), tmp_path / "walk.bvh")
+    with pytest.raises(ModelError, match="--overwrite"):
+        prepare_file(tmp_path / "walk.bvh", tmp_path / "walk.bvh")
