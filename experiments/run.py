@@ -36,7 +36,7 @@ from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from models.scene import P_WH
 from sim.loop.clock import RealTime
-from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into
+from sim.loop.loop import BLOCK_SECONDS, Loop, groups, record_into, shown_configuration
 from sim.loop.memory import peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
@@ -131,7 +131,7 @@ def _simulate(
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         record(ticks, frames, n)
-        page.show(servo.plant.qpos, ticks.hand[n - 1, 1:4], ticks.force[n - 1])
+        page.show(shown_configuration(servo), ticks.hand[n - 1, 1:4], ticks.force[n - 1])
 
     laws = session.parts.program.python_laws
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
@@ -159,7 +159,7 @@ def _live_page(session: Session) -> Page:
     from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
 
     static = session.static()
-    return LivePage(session.world.model, courses(static), float(np.asarray(static["tube_radius"])), P_WH)
+    return LivePage(session.world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH)
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:

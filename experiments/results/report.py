@@ -91,9 +91,7 @@ def write_report(
         _PAGE.format(
             title=html.escape(title),
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
-            replay=html.escape(
-                replay_html(recording, model, target) if "reference" in recording.groups["frames"] else ""
-            ),
+            replay=html.escape(replay_html(recording, model, target)),
             replayed=replayed,
             curves=_curves(recording, tube),
             push=PUSH,

@@ -70,6 +70,13 @@ def configuration_size(servo: Servo) -> int:
     return len(servo.plant.qpos) + shown
 
 
+def shown_configuration(servo: Servo) -> Array:
+    """Configuration of the world now, and the pose of a figure that is shown but not in it."""
+    if isinstance(servo.figure, KinematicFigure):
+        return np.concatenate([servo.plant.qpos, servo.reference.pose])
+    return servo.plant.qpos
+
+
 def groups(servo: Servo) -> dict[str, Group]:
     """What a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the figure's.
 

@@ -132,17 +132,22 @@ class _Stage:
     def __init__(self, scene: viser.SceneApi, recording: Recording, model: mujoco.MjModel, target: Target):
         self._scene = scene
         self._ticks = {name: recording.channel("ticks", name) for name in ("t", "p", "force", "user")}
-        self._frames = {name: recording.channel("frames", name) for name in ("t", "qpos", "reference")}
+        # Of a figure that is only shown there is one, where the animation has it; and there may be none.
+        kind = recording.texts.get("figure", "physical")
+        self._simulated = kind == "physical"
+        names = ("t", "qpos") if kind == "none" else ("t", "qpos", "reference")
+        self._frames = {name: recording.channel("frames", name) for name in names}
         self._data = mujoco.MjData(model)
         self._model = model
-        first = next(joint for joint in range(model.njnt) if model.joint(joint).name.startswith(target.prefix))
-        self._root = int(model.jnt_qposadr[first])
-        self._travels = model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
+        joints = (joint for joint in range(model.njnt) if model.joint(joint).name.startswith(target.prefix))
+        first = next(joints, None)
+        self._root = 0 if first is None else int(model.jnt_qposadr[first])
+        self._travels = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
         self._p_WH = recording.array("p_WH")
         figure = body_shapes(model, target.prefix)
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
-        self._ghost = _Actor(scene, "ghost", figure, 1.0, ghost=True)
+        self._ghost = _Actor(scene, "ghost", figure if self._simulated else [], 1.0, ghost=True)
         peak = max(_typical_peak(self._ticks["force"]), _typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
             name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))
@@ -156,8 +161,10 @@ class _Stage:
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
         above = np.array([0.0, 0.0, target.height])
-        self._label("figure", target.name, above)
-        self._label("ghost", target.animation, GHOST_AT + above)
+        if kind != "none":
+            self._label("figure", target.name if self._simulated else target.animation, above)
+        if self._simulated:
+            self._label("ghost", target.animation, GHOST_AT + above)
 
     def _label(self, name: str, text: str, position: Array) -> None:
         self._scene.add_label(
@@ -196,7 +203,8 @@ class _Stage:
         n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
         shown = times[0] + np.arange(n) / FPS
         ticks, frames = (np.minimum(np.searchsorted(t, shown), len(t) - 1) for t in (times, frame_times))
-        roots = np.array([self._frames["reference"][int(k)][:2] for k in frames])
+        shows = "reference" in self._frames
+        roots = np.array([self._frames["reference"][int(k)][:2] for k in frames]) if shows else np.zeros((n, 2))
         followed = _followed(roots) if self._travels else np.zeros_like(roots)
         piece = int(TRAIL_SECONDS * FPS)
         for i in range(n):
@@ -212,10 +220,11 @@ class _Stage:
         mujoco.mj_kinematics(self._model, self._data)
         self._phantom.pose(self._data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
         self._figure.pose(self._data, shift, 1.0, np.zeros(3))
-        reference = self._frames["reference"][frame]
-        self._data.qpos[self._root : self._root + len(reference)] = reference
-        mujoco.mj_kinematics(self._model, self._data)
-        self._ghost.pose(self._data, shift, 1.0, GHOST_AT)
+        if self._simulated:
+            reference = self._frames["reference"][frame]
+            self._data.qpos[self._root : self._root + len(reference)] = reference
+            mujoco.mj_kinematics(self._model, self._data)
+            self._ghost.pose(self._data, shift, 1.0, GHOST_AT)
         self._grid.position = -shift % 1.0 * np.array([1.0, 1.0, 0.0])
         tip = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][tick]
         for name, (handle, scale) in self._arrows.items():
