@@ -14,11 +14,7 @@ from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverC
 from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
-from experiments.files.map_files import Lifted, load_map
-from experiments.setups.lead import s_curve
-from experiments.setups.lifted_runs import curve_number, lifted_curve
-from experiments.setups.pace import course_of
-from experiments.setups.setups import certified_laws, leading_drag
+from experiments.setups.certified_law import certified_laws, leading_drag
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
@@ -35,6 +31,8 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
 
 
 def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
+    from experiments.setups.lead import s_curve  # brings splines with it, which a check of gains does not need
+
     return {"": s_curve()}
 
 
@@ -43,6 +41,10 @@ def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapF
 
 
 def _curves_of_file(config: RunConfig, part: MapFile) -> dict[str, Trajectory]:
+    from experiments.files.map_files import Lifted, load_map
+    from experiments.setups.lifted_runs import curve_number, lifted_curve
+    from experiments.setups.pace import course_of
+
     found = load_map(Path(part.file))
     if not isinstance(found, Lifted):
         return _circle(config, part)

@@ -26,8 +26,9 @@ from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import clip_inputs, read_certificate
 from experiments.flights.ballistics import clip_ballistics
+from experiments.setups.certified_law import certified_laws
 from experiments.setups.clips import load_clips
-from experiments.setups.setups import certified_laws, resolved
+from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"

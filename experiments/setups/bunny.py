@@ -8,7 +8,6 @@ from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Bunny
 from experiments.config.run_config import RunConfig
 from experiments.setups.budget import fastest
-from experiments.setups.certified_law import CertifiedLaw
 from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.governor import governed
 from experiments.setups.parts import ClipMapParts, Notes, Parts
@@ -26,10 +25,3 @@ def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:
     return fixed_curve_parts(
         config, mode, maps, FixedField(law, course, power, springs, Notes("BUNNY", maps.reach), urged)
     )
-
-
-def bunny_laws(mode: Bunny) -> dict[str, CertifiedLaw]:
-    """What is certified of it: near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
-    along = mode.bunny_attraction == "along"
-    width = float("inf") if along else mode.bunny_width
-    return {"": CertifiedLaw("follow" if along else "bunny", mode.stiffness, mode.damping, width)}

@@ -1,6 +1,15 @@
-"""A law of force as a certificate takes it."""
+"""Laws of force of a run as certificates take them, and how it leads along its curve, by mode.
 
+Light to import, as what certificates are checked by is.
+"""
+
+from collections.abc import Callable
 from typing import NamedTuple
+
+from controllers.errors import ParameterError
+from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
+from experiments.config.run_config import RunConfig
+from experiments.setups.defaults import resolved, river_gains, tube_gains
 
 
 class CertifiedLaw(NamedTuple):
@@ -20,3 +29,70 @@ class CertifiedLaw(NamedTuple):
     stiffness: float
     damping: float
     width: float
+
+
+Laws = dict[str, CertifiedLaw]
+"""By what is added to the names of their verdicts; that of the run's start by ""."""
+_ANY = float("inf")
+
+
+def certified_laws(config: RunConfig) -> Laws:
+    """The laws that a run uses.
+
+    Raises
+    ------
+    ParameterError
+        If there is no certificate for them.
+    """
+    return _LAWS[config.mode.kind](resolved(config).mode)
+
+
+def leading_drag(config: RunConfig) -> float:
+    """Damping [N s/m] with which a run leads along its curve; 0 where it does not lead."""
+    return _DRAGS.get(config.mode.kind, lambda mode: 0.0)(resolved(config).mode)
+
+
+def _follow(mode: Follow | StretchThenFollow) -> Laws:
+    return {"": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}
+
+
+def _bunny(mode: Bunny) -> Laws:
+    """Near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
+    along = mode.bunny_attraction == "along"
+    width = _ANY if along else mode.bunny_width
+    return {"": CertifiedLaw("follow" if along else "bunny", mode.stiffness, mode.damping, width)}
+
+
+def _rivers(mode: Rivers) -> Laws:
+    if mode.governor is not None:
+        raise ParameterError("rivers are certified without --governor")
+    return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
+
+
+def _stretch(mode: Stretch | StretchThenFollow) -> Laws:
+    """Tubes seek with the switch open, and hold with it closed."""
+    seek, damping = tube_gains(mode)
+    return {
+        "": CertifiedLaw("seek", seek, damping, _ANY),
+        "_held": CertifiedLaw("hold", mode.rubber, damping, _ANY),
+    }
+
+
+def _stretch_then_follow(mode: StretchThenFollow) -> Laws:
+    """Likewise, and the performance of the curve as it was before it was bent."""
+    return _stretch(mode) | {"_then": _follow(mode)[""]}
+
+
+def _lead(mode: Lead) -> Laws:
+    return {"": CertifiedLaw("leading", mode.leash, mode.damping, _ANY)}
+
+
+_LAWS: dict[str, Callable[..., Laws]] = {
+    "follow": _follow, "bunny": _bunny, "rivers": _rivers, "stretch": _stretch,
+    "stretch-then-follow": _stretch_then_follow, "lead": _lead,
+}  # fmt: skip
+_DRAGS: dict[str, Callable[..., float]] = {
+    "follow": lambda mode: mode.damping,
+    "rivers": lambda mode: river_gains(mode)[1],
+    "stretch-then-follow": lambda mode: mode.damping,
+}

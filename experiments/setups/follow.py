@@ -5,7 +5,6 @@ from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Follow
 from experiments.config.run_config import RunConfig
 from experiments.setups.budget import fastest
-from experiments.setups.certified_law import CertifiedLaw
 from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.governor import governed
 from experiments.setups.parts import ClipMapParts, Notes, Parts
@@ -18,8 +17,3 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     power, springs = river_power(mode.damping, fastest(course)), ((mode.stiffness, mode.tube),)
     field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
     return fixed_curve_parts(config, mode, maps, field)
-
-
-def follow_laws(mode: Follow) -> dict[str, CertifiedLaw]:
-    """What is certified of it."""
-    return {"": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}

@@ -20,7 +20,6 @@ from experiments.config.run_config import RunConfig
 from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.certified_law import CertifiedLaw
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.led_balance import balanced_on_ground, led_gains
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
@@ -197,11 +196,6 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
         tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=field.walker,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
-
-
-def lead_laws(mode: Lead) -> dict[str, CertifiedLaw]:
-    """What is certified of it."""
-    return {"": CertifiedLaw("leading", mode.leash, mode.damping, float("inf"))}
 
 
 def leading(mode: Lead, gait: Gait) -> Leading:

@@ -10,9 +10,10 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
 from experiments.config.modes import Rivers
 from experiments.setups.budget import fastest
+from experiments.setups.defaults import river_gains
 from experiments.setups.pace import paced
 from experiments.setups.parts import RiverChoice
-from experiments.setups.rivers import BESIDE, gains, river_time
+from experiments.setups.rivers import BESIDE, river_time
 from sim.body.figure import FigureGains
 from sim.users.intent import Push
 from sim.world.world import phantom_angles
@@ -72,7 +73,7 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
     SimError
         If the Phantom does not reach a curve.
     """
-    damping = gains(mode)[1]
+    damping = river_gains(mode)[1]
     curves = [paced(haptic_map.curve(i), damping) for i in range(len(haptic_map.names))]
     return side_by_side(RiverBundle(tuple(lifted_river(curve, mode) for curve in curves), haptic_map.names))
 
@@ -85,7 +86,7 @@ def side_by_side(bundle: RiverBundle) -> RiverChoice:
 def lifted_river(course: Trajectory, mode: Rivers) -> River:
     """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at."""
     speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
-    return River(course, mode.river_tube, river_time(mode), gains(mode)[1], np.outer(speeds, _SPEEDS))
+    return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEEDS))
 
 
 def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:
@@ -96,7 +97,7 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
     ParameterError
         If the curve has no transition.
     """
-    first, damping = curve_number(haptic_map, curve), gains(mode)[1]
+    first, damping = curve_number(haptic_map, curve), river_gains(mode)[1]
     rows = [row for row in haptic_map.transitions if first in (row[0], row[1])]
     if not rows:
         pairs = [" – ".join(haptic_map.names[int(i)] for i in row[:2]) for row in haptic_map.transitions]

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.errors import ParameterError
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.law import Law
@@ -14,7 +13,7 @@ from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.setups.budget import fastest
-from experiments.setups.certified_law import CertifiedLaw
+from experiments.setups.defaults import river_gains
 from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.governor import governed, speeds_along
 from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
@@ -30,15 +29,11 @@ SIGMA = {"discrete": 0.15, "smooth": 0.05}
 LOOK = {"discrete": 0.0, "smooth": 8e-3}
 GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
 WAVE = 0.6  # height of the wave, of the map's half width
-GAINS = {"default": (150.0, 16.0), "file": (50.0, 20.0)}
-"""k_r [N/m] and b_d [N s/m] of the rivers about a circle, and of a map from a file."""
-# Those of a map lie side by side: a hand that goes over from one to the other is drawn within τ = b_d/k_r, or the
-# figure would have to be at the other clip's speed at once.
 
 
 def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "rivers"."""
-    stiffness, damping = gains(mode)
+    stiffness, damping = river_gains(mode)
     course, choice, urged = maps.course(damping), maps.rivers(mode), 0.0
     if mode.governor is not None and mode.crossing != "sum":
         law = law_of(mode, gated(choice, maps), GATE)
@@ -53,28 +48,9 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     return fixed_curve_parts(config, mode, maps, field)
 
 
-def rivers_laws(mode: Rivers) -> dict[str, CertifiedLaw]:
-    """What is certified of each of them.
-
-    Raises
-    ------
-    ParameterError
-        If they are governed.
-    """
-    if mode.governor is not None:
-        raise ParameterError("rivers are certified without --governor")
-    return {"": CertifiedLaw("follow", *gains(mode), mode.river_tube)}
-
-
-def gains(mode: Rivers) -> tuple[float, float]:
-    """k_r [N/m] and b_d [N s/m], by default those of rivers about a circle."""
-    stiffness, damping = GAINS["default"]
-    return mode.stiffness or stiffness, mode.damping or damping
-
-
 def river_time(mode: Rivers) -> float:
     """τ = b_d / k_r of a river [s]."""
-    stiffness, damping = gains(mode)
+    stiffness, damping = river_gains(mode)
     return damping / stiffness
 
 
@@ -99,7 +75,7 @@ def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
 
 def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice:
     """The default rivers about a curve (`river_bundle`), told apart by its mean speed."""
-    bundle = river_bundle(curve, reach, river_time(mode), gains(mode)[1], mode.river_tube)
+    bundle = river_bundle(curve, reach, river_time(mode), river_gains(mode)[1], mode.river_tube)
     return RiverChoice(bundle, curve.length / curve.duration, HYSTERESIS)
 
 

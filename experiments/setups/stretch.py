@@ -22,7 +22,7 @@ from experiments.results.stretch_measures import editing_summary, performance_su
 from experiments.results.stretch_summary import stretch_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.certified_law import CertifiedLaw
+from experiments.setups.defaults import tube_gains
 from experiments.setups.fixed_curve import with_walls
 from experiments.setups.hands import (
     PAUSE,
@@ -40,9 +40,6 @@ from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from sim.users.intent import Grab
 
-SEEK, SOFT_SEEK, SOFT_DAMPING = 150.0, 50.0, 20.0
-"""k_f [N/m] about a circle; and on a map from a file, as soft as rivers there are, with its damping [N s/m]."""
-DAMPING = 14.0  # [N s/m] an edit that is undone takes the hand along in a tenth of a second, not in a fortieth
 REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap at about the curve's own pace
 # Radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third.
 OUTSIDE = 2.2
@@ -71,21 +68,6 @@ def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: 
     return _parts(config, mode, maps, course, performance, remarks)
 
 
-def stretch_laws(mode: Stretch | StretchThenFollow) -> dict[str, CertifiedLaw]:
-    """What is certified: tubes seek with the switch open, and hold with it closed."""
-    damping = DAMPING if mode.tube_damping is None else mode.tube_damping
-    seek = SEEK if mode.seek is None else mode.seek
-    return {
-        "": CertifiedLaw("seek", seek, damping, float("inf")),
-        "_held": CertifiedLaw("hold", mode.rubber, damping, float("inf")),
-    }
-
-
-def stretch_then_follow_laws(mode: StretchThenFollow) -> dict[str, CertifiedLaw]:
-    """Likewise, and the performance of the curve as it was before it was bent."""
-    return stretch_laws(mode) | {"_then": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}
-
-
 class _Performance(NamedTuple):
     """What performs the bent curve, from when on [s], its springs, and what its damper injects [W]."""
 
@@ -107,9 +89,9 @@ def _parts(
     if mode.bump > 0.5 * maps.curve.duration:
         raise ParameterError(f"bump is {mode.bump} s; expected at most half a lap, {0.5 * maps.curve.duration:g} s")
     user = _user(config, mode, maps)
-    seek = SEEK if mode.seek is None else mode.seek
+    seek, damping = tube_gains(mode)
     tubes = StretchyTubes(
-        course, seek, mode.rubber, DAMPING if mode.tube_damping is None else mode.tube_damping,
+        course, seek, mode.rubber, damping,
         epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE,
     )  # fmt: skip
     pushed = first_pushed_lap(maps.curve, user.grabs)

@@ -10,11 +10,12 @@ from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
+from experiments.setups.defaults import resolved
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
 from experiments.setups.parts import MapParts, Parts, Settings
 from experiments.setups.session import Session
-from experiments.setups.setups import map_parts, parts_of, resolved
+from experiments.setups.setups import map_parts, parts_of
 from experiments.setups.stylus import UPRIGHT, stylus_path
 from models.humanoid.skeleton import rest_pose
 from models.mocap.clip import Clip

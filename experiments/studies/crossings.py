@@ -23,7 +23,8 @@ from controllers.safety.limiter import ForceLimiter, limit_force
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
-from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, gains, law_of, river_time
+from experiments.setups.defaults import river_gains
+from experiments.setups.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
 from experiments.studies.field_figures import SPEED, straight_river
 from models.scene import PHANTOM, SceneConfig
 from sim.users.arm import Arm
@@ -124,7 +125,7 @@ def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
     """Field of the river along x and of a second one, or of the first alone, with the gains of the mode of rivers."""
     mode = Rivers()
     rivers = tuple(
-        replace(river, epsilon=mode.river_tube, tau=river_time(mode), drag=gains(mode)[1])
+        replace(river, epsilon=mode.river_tube, tau=river_time(mode), drag=river_gains(mode)[1])
         for river in (straight_river(0.0), second)
     )
     bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))

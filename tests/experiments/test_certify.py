@@ -11,17 +11,19 @@ import pytest
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from controllers.errors import ParameterError
-from experiments.certify import certified_field, certified_rivers
+from experiments.certify import certified_field
 from experiments.certify.certified_field import certificate_inputs
 from experiments.certify.certify import (
     CERTIFICATE,
     FLIGHTS_PLOT,
     PAGE,
     PLOT,
+    certified_rivers,
     certify_into,
 )
 from experiments.cli import main
 from experiments.config.words import run_config
+from experiments.files import certificate_files
 from experiments.files.certificate_files import read_certificate, verify_certificate
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
@@ -88,7 +90,7 @@ def test_a_certificate_is_of_its_device_and_its_code(folder, monkeypatch):
         patch.setattr(certified_field, "PREMIUM_1_5", heavier)
         with pytest.raises(CertificateError, match="changed: device;"):
             verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
-    monkeypatch.setattr(certified_field, "source_hash", lambda: "0")
+    monkeypatch.setattr(certificate_files, "source_hash", lambda: "0")
     with pytest.raises(CertificateError, match="changed: code;"):
         verify_certificate(file, certificate_inputs(run_config(), 0.0, HANDS, 1.0))
 

@@ -12,9 +12,10 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers
 from experiments.config.words import run_config
+from experiments.setups.defaults import resolved, river_gains
 from experiments.setups.parts import Parts
-from experiments.setups.rivers import gains, river_time
-from experiments.setups.setups import map_parts, parts_of, resolved
+from experiments.setups.rivers import river_time
+from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.arm import hand_force
 
@@ -63,7 +64,7 @@ def test_rivers_of_a_map_from_a_file_have_gains_of_their_own_too() -> None:
     for words, expected in (({}, (50.0, 20.0)), ({"stiffness": 40.0, "damping": 10.0}, (40.0, 10.0))):
         mode = resolved(run_config("rivers", "any.npz", "push", **words)).mode
         assert isinstance(mode, Rivers)
-        assert gains(mode) == expected
+        assert river_gains(mode) == expected
         assert river_time(mode) == pytest.approx(expected[1] / expected[0])
     assert resolved(run_config("follow", "any.npz")).mode == FollowMode()
 

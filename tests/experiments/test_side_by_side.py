@@ -6,9 +6,8 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
 from experiments.config.words import run_config
+from experiments.setups.defaults import resolved, river_gains
 from experiments.setups.lifted_runs import default_pushes, lifted_choice, lifted_river, pushed_over
-from experiments.setups.rivers import gains
-from experiments.setups.setups import resolved
 from models.mocap.library import embedded
 
 TURN = 2.0 * np.pi
@@ -25,16 +24,16 @@ def two_clips(transitions=((0.0, 1.0, 4.0, 0.1, 0.1),)):
 
 
 def test_gains_that_are_not_given_are_soft_where_rivers_are_side_by_side_and_as_usual_elsewhere():
-    assert gains(MODE) == (MODE.stiffness, MODE.damping) == (50.0, 20.0)
+    assert river_gains(MODE) == (MODE.stiffness, MODE.damping) == (50.0, 20.0)
     for usual in (run_config(), run_config(map="map.npz")):
         mode = resolved(usual).mode
         assert (mode.stiffness, mode.damping) == (300.0, 8.0)
     around = resolved(run_config(mode="rivers")).mode
-    assert gains(around) == (around.stiffness, around.damping) == (150.0, 16.0)
+    assert river_gains(around) == (around.stiffness, around.damping) == (150.0, 16.0)
     given = resolved(run_config(map="map.npz", mode="rivers", stiffness=300.0, damping=8.0)).mode
-    assert gains(given) == (300.0, 8.0)
+    assert river_gains(given) == (300.0, 8.0)
     one = resolved(run_config(map="map.npz", mode="rivers", stiffness=40.0)).mode
-    assert gains(one) == (40.0, 20.0)
+    assert river_gains(one) == (40.0, 20.0)
 
 
 def test_a_search_is_as_soft_as_rivers_side_by_side():

@@ -87,7 +87,7 @@ print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values())
 
 
 def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
-    here, copy = Path(kernel_units.__file__).parent.parent, tmp_path / "copy"
+    here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
     for package in ("models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     told = [
@@ -98,4 +98,4 @@ def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_the
         for sources in (here, here, copy)
     ]  # fmt: skip
     assert [row[:2] for row in told] == [["0", "1"], ["1", "0"], ["1", "0"]]
-    assert [Path(row[2]).parent.parent for row in told] == [here, here, copy]
+    assert [Path(row[2]).parents[2] for row in told] == [here, here, copy]

@@ -91,7 +91,7 @@ def calibrate(
     segments = np.empty((n, len(SEGMENTS), 4))
     trunk, thighs = unit(lines.trunk), unit(unit(lines.knees - lines.hips).sum(axis=1))
     bend = np.arccos(np.clip(-np.sum(trunk * thighs, axis=1), -1.0, 1.0))
-    least = float(np.nanmin(bend))
+    least = float(np.min(bend, where=np.isfinite(bend), initial=np.pi))
     straight = np.exp(-(((np.nan_to_num(bend, nan=np.pi) - least) / _STRAIGHT) ** 2) / 2.0)
     if rest_frame is not None:
         straight = np.zeros(n)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, JOINTS, SEGMENTS, figure_model, rest_pose
 from models.mocap.clip import Clip, pose_difference
-from models.mocap.library import load
+from models.mocap.library import embedded, load
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.own_bvh import own_clip, write_bvh, write_bvh_blocks
 
@@ -101,8 +101,7 @@ def test_angles_do_not_jump_from_frame_to_frame(tmp_path):
 
 
 def test_a_file_of_the_figure_is_not_retargeted_and_a_scaled_one_is(tmp_path):
-    clip = random_clip(6, n=3)
-    write_bvh(clip, tmp_path / "own.bvh")
+    write_bvh(embedded("walk"), tmp_path / "own.bvh")
     assert load(tmp_path / "own.bvh").report is None
     other = tmp_path / "scaled.bvh"
     other.write_text((tmp_path / "own.bvh").read_text().replace("OFFSET 0.000000 -42.44", "OFFSET 0.000000 -43.44"))
@@ -114,8 +113,6 @@ def test_a_file_of_the_figure_is_not_retargeted_and_a_scaled_one_is(tmp_path):
 
 def test_blocks_give_the_same_file_as_the_whole(tmp_path: Path) -> None:
     """Angles go on over the edges of blocks, also where a joint has turned by more than half a turn."""
-    from models.mocap.library import embedded
-
     clip = embedded("spin")
     write_bvh(clip, tmp_path / "whole.bvh")
     edges = [0, 1, 2, 50, 120, clip.n_frames]
