@@ -49,7 +49,10 @@ def certified_laws(config: RunConfig) -> Laws:
 
 def leading_drag(config: RunConfig) -> float:
     """Damping [N s/m] with which a run leads along its curve; 0 where it does not lead."""
-    return _DRAGS.get(config.mode.kind, lambda mode: 0.0)(resolved(config).mode)
+    mode = resolved(config).mode
+    if isinstance(mode, Rivers):
+        return river_gains(mode)[1]
+    return mode.damping if isinstance(mode, Follow | StretchThenFollow) else 0.0
 
 
 def _follow(mode: Follow | StretchThenFollow) -> Laws:
@@ -91,8 +94,3 @@ _LAWS: dict[str, Callable[..., Laws]] = {
     "follow": _follow, "bunny": _bunny, "rivers": _rivers, "stretch": _stretch,
     "stretch-then-follow": _stretch_then_follow, "lead": _lead,
 }  # fmt: skip
-_DRAGS: dict[str, Callable[..., float]] = {
-    "follow": lambda mode: mode.damping,
-    "rivers": lambda mode: river_gains(mode)[1],
-    "stretch-then-follow": lambda mode: mode.damping,
-}

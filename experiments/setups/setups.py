@@ -38,7 +38,8 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
     remarks: tuple[str, ...] = ()
     if clips is None:
         clips, remarks = load_clips(config.map.clips)
-    setup = (MAP_SETUPS | {"led": led_parts})[config.map.kind]
+    setups: dict[str, Callable[..., MapParts[Any]]] = {**MAP_SETUPS, "led": led_parts}
+    setup = setups[config.map.kind]
     return setup(config, config.map, clips, figure).said(remarks)
 
 

@@ -148,6 +148,10 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rotations = calibrating.global_rotations()
     positions = calibrating.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
+    if not (
+        np.any(np.sum(lines.trunk**2, axis=-1) > 0.0) and np.any(np.sum((lines.knees - lines.hips) ** 2, axis=-1) > 0.0)
+    ):
+        raise MotionFileError(motion.path, 0, "hips, knees or what is above them are in one place", "a trunk and legs")
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
