@@ -148,15 +148,20 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rotations = calibrating.global_rotations()
     positions = calibrating.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
-    if not (
-        np.any(np.sum(lines.trunk**2, axis=-1) > 0.0) and np.any(np.sum((lines.knees - lines.hips) ** 2, axis=-1) > 0.0)
-    ):
-        raise MotionFileError(motion.path, 0, "hips, knees or what is above them are in one place", "a trunk and legs")
     body = joints_below(roles.segments["pelvis"], motion.parents)
     up = up_axis(motion, lines, positions[:, body], hints.up)
     check_sides(motion, lines)
     frame = None if rest is None else rest - (dropped - skipped)
-    calibrated = calibrate(roles, motion.parents, lines, rotations, up.axis, motion.fps, frame)
+    unclear = MotionFileError(
+        motion.path, 0, "its joints do not tell how the body stands", "a trunk, thighs and shanks that have a length"
+    )
+    try:
+        with np.errstate(invalid="ignore"):
+            calibrated = calibrate(roles, motion.parents, lines, rotations, up.axis, motion.fps, frame)
+    except np.linalg.LinAlgError:
+        raise unclear from None
+    if not np.isfinite(calibrated.segments).all():
+        raise unclear
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
     segments = quaternions.product(axes, calibrated.segments[skipped:])
     own_leg = _own_leg("left_foot" in roles.segments or "left_shank" in roles.ends)
