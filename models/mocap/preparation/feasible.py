@@ -50,8 +50,8 @@ _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for p
 class FeasibleWeights:
     """What one unit of error costs before it is squared, per sampled instant.
 
-    From the prototype's trials on eight captures; a factor of two in any of them moved the residual by less than two
-    points and the joints by less than a degree.
+    Chosen on three walks and a run of the tuning half (`docs/your-own-motion.md`). The jerk's weight matters: three times
+    as large, two walks need 7 and 5 % instead of 21 and 9, and the run falls.
 
     Parameters
     ----------
