@@ -39,7 +39,8 @@ def test_every_hvf_command_of_a_page_is_one_that_the_program_takes(page: Path) -
                 arguments = shlex.split(line, comments=True)[1:]
                 command = parsed(arguments)
                 assert callable(command), line
-                if options := getattr(command, "options", None):
+                options = getattr(command, "options", None)
+                if options is not None and options.config is None:  # the file would be a run's that there has not been
                     assert config_of_options(options), line
 
 
