@@ -125,7 +125,7 @@ def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys
         (["lift", "walk", "--cyclic", "run"], "cyclic names run; expected some of the clips"),
         (["lift", "walk", "--room.r-range", "0.02", "0.3"], "does not reach|beyond the Phantom's stops"),
         (["lift", "walk", "run", "--room.separation", "0.2"], "2 clips do not fit 200 mm apart"),
-        (["run", "--curve", "walk"], "only a lifted map has curves by name"),
+        (["run", "--curve", "walk"], "--curve has no meaning with --mode follow; it belongs to --map FILE.npz"),
     ],
 )
 def test_what_cannot_be_lifted_is_one_line_and_exit_code_2(

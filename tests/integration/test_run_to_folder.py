@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_everything_is_written(folder: Path) -> None:
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     figures = {f"figures/{name}.png" for name in ("path", "deviation", "forces", "torques", "figure")}
-    assert names == {"run.h5", "summary.json", "report.html", "edited.bvh", "default.bvh"} | figures
+    assert names == {"run.h5", "summary.json", "config.json", "report.html", "edited.bvh", "default.bvh"} | figures
 
 
 def test_a_relaxed_hand_stays_within_a_millimetre_of_the_curve(folder: Path) -> None:
