@@ -32,6 +32,7 @@ from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
 from experiments.studies.field_cost import heaviest_field, tick_microseconds
+from experiments.studies.figure_cost import figure_cost
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
@@ -61,6 +62,10 @@ def bench() -> None:
     print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
     print(f"ten rivers of higher order, with the limiter: {tick_microseconds(*heaviest_field()):.1f} µs a tick (≤ 20)")
     print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
+    cost = figure_cost()
+    print(f"kinematic figure, against the physical one: {cost.physical / cost.kinematic:.1f} × as fast (≥ 3)")
+    print(f"no figure, against the physical one: {cost.physical / cost.none:.1f} × as fast (≥ 5)")
+    print(f"a tick without figure: {cost.none / cost.bare_step:.1f} bare mj_steps of the linkage (≤ 3)")
     print(f"soft walls of 17 joints: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
     four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))

@@ -1,9 +1,8 @@
-"""A figure in the physics, one that is only shown, and none: what is recorded, read and drawn of each, and how fast."""
+"""A figure in the physics, one that is only shown, and none: what is recorded, read and drawn of each."""
 
 import time
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from rich.console import Console
@@ -91,28 +90,3 @@ def test_a_fault_is_said_first_and_recorded(tmp_path: Path) -> None:
     with Recording(tmp_path / "run.h5") as recording:
         assert (recording.channel("ticks", "fault")[:] == 2.0).all()
         assert recording.summary is not None
-
-
-@pytest.mark.slow
-def test_what_is_not_simulated_costs_nothing() -> None:
-    """Processor time of a tick at one clock: shown 3 times as fast as simulated, none 5 times; none 3 bare steps."""
-    n, scene = 1000, {"physics_step": 1e-3}
-    sessions = {kind: session_of(kind, **scene) for kind in ("physical", "kinematic", "none")}
-    logs = {kind: make_logs(session.servo, n) for kind, session in sessions.items()}
-    cost = dict.fromkeys((*sessions, "bare"), np.inf)
-    model = sessions["none"].world.model
-    data = mujoco.MjData(model)
-    data.qpos[:] = sessions["none"].world.data.qpos
-    for block in range(6):
-        for kind, session in sessions.items():
-            begin = time.thread_time()
-            run_block(session.servo, n * block, n, False, *logs[kind])
-            if block > 0:
-                cost[kind] = min(cost[kind], (time.thread_time() - begin) / n)
-        begin = time.thread_time()
-        mujoco.mj_step(model, data, n)
-        cost["bare"] = min(cost["bare"], (time.thread_time() - begin) / n)
-    print({kind: f"{1e6 * seconds:.1f} µs" for kind, seconds in cost.items()})
-    assert cost["physical"] > 3.0 * cost["kinematic"]
-    assert cost["physical"] > 5.0 * cost["none"]
-    assert cost["none"] < 3.0 * cost["bare"]

@@ -1,0 +1,44 @@
+"""What a tick costs with the figure in the physics, only shown, and without one, beside a bare `mj_step`."""
+
+import time
+from typing import NamedTuple, get_args
+
+import mujoco
+import numpy as np
+
+from experiments.config.words import run_config
+from experiments.setups.wiring import wire
+from sim.loop.loop import make_logs
+from sim.loop.servo import run_block
+from sim.world.world import FigureKind
+
+STEP = 1e-3  # [s] of the physics: one to a servo tick
+_TICKS, _BLOCKS = 1000, 6
+
+
+class FigureCost(NamedTuple):
+    """Processor time of a tick, by kind of figure, and of a step of the linkage alone [s]."""
+
+    physical: float
+    kinematic: float
+    none: float
+    bare_step: float
+
+
+def figure_cost() -> FigureCost:
+    """Measure the kinds in turn, the best of some blocks after a first one."""
+    sessions = {kind: wire(run_config(figure=kind, physics_step=STEP)) for kind in get_args(FigureKind)}
+    logs = {kind: make_logs(session.servo, _TICKS) for kind, session in sessions.items()}
+    model, cost = sessions["none"].world.model, dict.fromkeys((*sessions, "bare_step"), np.inf)
+    data = mujoco.MjData(model)
+    data.qpos[:] = sessions["none"].world.data.qpos
+    for block in range(_BLOCKS):
+        for kind, session in sessions.items():
+            begin = time.thread_time()
+            run_block(session.servo, _TICKS * block, _TICKS, False, *logs[kind])
+            if block > 0:
+                cost[kind] = min(cost[kind], (time.thread_time() - begin) / _TICKS)
+        begin = time.thread_time()
+        mujoco.mj_step(model, data, _TICKS)
+        cost["bare_step"] = min(cost["bare_step"], (time.thread_time() - begin) / _TICKS)
+    return FigureCost(**cost)
