@@ -19,7 +19,7 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
-from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
+from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
@@ -116,6 +116,8 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
     path = Path(part.file)
     made, clips = load_figure_map(path)
     if isinstance(made, Lifted):
+        if part.around != Circle():
+            raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = _on_lifted(part, made, clips)
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")

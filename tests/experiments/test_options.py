@@ -311,3 +311,10 @@ def test_the_command_refuses_a_file_with_a_typo_in_a_line(tmp_path, capsys) -> N
     said = capsys.readouterr().err
     assert said.startswith(f"hvf: {path}: mode.follow.stifness is not known; expected some of kind, stiffness, ")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("mode", "map", "does"), [("follow", "cylindrical", "lead"), ("lead", "led", "relaxed")])
+def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> None:
+    text = f'{{"mode": {{"kind": "{mode}"}}, "map": {{"kind": "{map}"}}, "user": {{"does": "{does}"}}}}'
+    with pytest.raises(ParameterError, match="a hand leads in the mode lead only"):
+        from_json(RunConfig, text, "f.json")

@@ -107,6 +107,14 @@ def test_a_hand_is_pushed_over_at_the_transition_and_the_figure_breaks_into_a_ru
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 
+def test_a_lap_of_a_circle_has_no_meaning_on_a_lifted_map(
+    map_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "--map", str(map_file), "--lap", "3", "--out", str(tmp_path / "run")]) == 2
+    assert "leave out --lap and --radius" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_curve_without_a_transition_has_no_push_over_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "one.npz")
     assert main(["lift", "walk", "--out", out]) == 0
