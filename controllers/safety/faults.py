@@ -38,6 +38,20 @@ class Fault(IntEnum):
     READING_STALE = 6
     ENCODERS_FROZEN = 7
     READINGS_ENDED = 8
+    UNPLUGGED = 9
+    CHECKSUM_WRONG = 10
+    SEQUENCE_BACK = 11
+    OVER_TEMPERATURE = 12
+    DEVICE_RESET = 13
+    VERSION_WRONG = 14
+    REPORT_MALFORMED = 15
+    DEVICE_REPORTED = 16
+    OSCILLATION = 17
+    LEFT_WORKSPACE = 18
+    TOO_FAST = 19
+    MOTORS_HOT = 20
+    SERVO_LATE = 21
+    CONTROL_LOST = 22
 
     def words(self, value: float) -> str:
         """The fault in words, with its value."""
@@ -54,6 +68,20 @@ _WORDS = {
     Fault.READING_STALE: "the device gave no new reading for {:.3g} s",
     Fault.ENCODERS_FROZEN: "no encoder counted for {:.3g} s under a torque that moves the stylus",
     Fault.READINGS_ENDED: "the replayed hand had ended after {:.0f} ticks",
+    Fault.UNPLUGGED: "the device is gone",
+    Fault.CHECKSUM_WRONG: "{:.0f} reports in a row had a wrong checksum",
+    Fault.SEQUENCE_BACK: "a reading came {:.0f} numbers behind the last one",
+    Fault.OVER_TEMPERATURE: "a motor is at {:.0f} °C",
+    Fault.DEVICE_RESET: "the device began again by itself",
+    Fault.VERSION_WRONG: "the device speaks version {:g} of the protocol",
+    Fault.REPORT_MALFORMED: "a report of {:.0f} bytes",
+    Fault.DEVICE_REPORTED: "the device reported an error of its own, {:.0f}",
+    Fault.OSCILLATION: "the hand was shaken with {:.3g} N at the frequency of an instability",
+    Fault.LEFT_WORKSPACE: "the stylus was {:.3g} m outside the workspace",
+    Fault.TOO_FAST: "the stylus moved at {:.3g} m/s",
+    Fault.MOTORS_HOT: "the motors have used {:.0%} of what they can dissipate",
+    Fault.SERVO_LATE: "the servo was {:.3g} s late",
+    Fault.CONTROL_LOST: "who controls the run has not been heard for {:.3g} s",
 }
 
 # numba freezes globals; a member of an enumeration would be looked up in each kernel.

@@ -1,0 +1,110 @@
+"""What stands behind an `Exchange`: a driver that reads one real device, and commands it.
+
+A driver knows its device's transport and units; it knows no field, map, limit or clock of ours. The loop of the servo is
+
+    driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(command)
+
+Whatever cannot be a reading raises `DriverFault`; who drives latches it, lets go, and says why.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.safety.faults import Fault
+from sim.errors import SimError
+
+Array = npt.NDArray[np.float64]
+
+
+class DriverFault(SimError):
+    """A device that can no longer be relied on.
+
+    Parameters
+    ----------
+    fault : Fault
+        Which.
+    value : float
+        What was seen, in the fault's unit.
+    """
+
+    def __init__(self, fault: Fault, value: float = 0.0):
+        super().__init__(fault.words(value))
+        self.fault, self.value = fault, value
+
+
+class DeviceIdentity(NamedTuple):
+    """Who a device is, and what it can do.
+
+    Attributes
+    ----------
+    name, transport, serial, firmware : str
+        For people; empty where the device does not tell.
+    forces : bool
+        Whether it has motors.
+    watchdog : bool
+        Whether its firmware lets go by itself when commands stay out. One without is announced as such.
+    calibrated : bool
+        Whether its encoders know their zero.
+    """
+
+    name: str
+    transport: str
+    serial: str
+    firmware: str
+    forces: bool
+    watchdog: bool
+    calibrated: bool
+
+
+TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7
+"""Motors' temperatures [°C] (NaN where there is no sensor), last round trip [s], readings lost, read and refused."""
+
+
+class Driver(Protocol):
+    """A device's driver.
+
+    Attributes
+    ----------
+    identity : DeviceIdentity
+        Who the device is.
+    telemetry : Array
+        See `TEMPERATURE`, shape (7,); rewritten in place by `read`.
+    """
+
+    identity: DeviceIdentity
+    telemetry: Array
+
+    def read(self, reading: Array, timeout: float) -> bool:
+        """Write the newest reading, its number last (`sim.devices.exchange.READING_SEQUENCE`), shape (9,).
+
+        Returns
+        -------
+        bool
+            Whether there was a new one within `timeout` [s].
+
+        Raises
+        ------
+        DriverFault
+            If the device is gone, or told what cannot be.
+        """
+        ...
+
+    def write(self, torque: Array, enable: bool) -> None:
+        """Command the torques of the Phantom's joints θ1…θ3 [N m], shape (3,); motors off where not `enable`.
+
+        Raises
+        ------
+        DriverFault
+            If the device is gone.
+        """
+        ...
+
+    def let_go(self) -> None:
+        """Motors off, at once; never raises."""
+        ...
+
+    def close(self) -> None:
+        """Let go, and give the device back."""
+        ...
