@@ -1,6 +1,7 @@
 """What stands behind an `Exchange`: a driver that reads one real device, and commands it.
 
-A driver knows its device's transport and units; it knows no field, map, limit or clock of ours. The loop of the servo is
+A driver knows its device's transport and units; it knows no field, map, limit or clock of ours. The loop of the
+servo is
 
     driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(command)
 
