@@ -58,17 +58,20 @@ class Demand(NamedTuple):
         edges = np.broadcast_to(EDGES, moments.shape)
         return np.concatenate([edges, moments], axis=-1).reshape(len(arms), 4 * _N_SPHERES, 6).transpose(0, 2, 1)
 
-    def torque_on(self, grip: Array) -> Array:
-        """τ − Jᵀ f: torques of the joints while the floor pushes with `grip` (m, 32), shape (m, 51) [N m]."""
-        forces = grip.reshape(len(grip), _N_SPHERES, 4) @ EDGES
+    def levers(self) -> Array:
+        """Jᵀ: torques of the joints that a unit force along every edge of every sphere makes, shape (m, 51, 32)."""
         soles = self.spheres - (0.0, 0.0, CONTACT_RADIUS)
-        torque = self.torque.copy()
+        levers = np.zeros((*self.torque.shape, 4 * _N_SPHERES))
         for leg, body in enumerate(_LEGS):
             mine = slice(0, 4) if leg < 3 else slice(4, 8)
-            moment = np.cross(soles[:, mine] - self.anchors[:, leg, None], forces[:, mine]).sum(1)
-            first = 3 * (body - 1)
-            torque[:, first : first + 3] -= np.einsum("mij,mi->mj", self.frames[:, leg], moment)
-        return torque
+            moments = np.cross((soles[:, mine] - self.anchors[:, leg, None])[:, :, None], EDGES).reshape(-1, 16, 3)
+            turned = np.einsum("mij,mei->mje", self.frames[:, leg], moments)
+            levers[:, 3 * (body - 1) : 3 * body, 4 * mine.start : 4 * mine.stop] = turned
+        return levers
+
+    def torque_on(self, grip: Array) -> Array:
+        """τ − Jᵀ f: torques of the joints while the floor pushes with `grip` (m, 32), shape (m, 51) [N m]."""
+        return self.torque - np.einsum("mte,me->mt", self.levers(), grip)
 
 
 class Floor:

@@ -43,6 +43,7 @@ _SWING, _ROLL = 0.006, 0.0  # least heights of swinging feet and of the lifted e
 _RISE = 0.08  # ... reached so long before and after they stand [s]; captured feet swing at 2 to 5 cm
 _TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
 _ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
+_N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
 
@@ -124,7 +125,7 @@ class Feasible(NamedTuple):
 
 
 class _Errors(NamedTuple):
-    """Weighted errors (m, 107) of the nonlinear terms, their Jacobian blocks, and the residual wrench (m, 6)."""
+    """Weighted errors (m, 140) of the nonlinear terms, their Jacobian blocks, and the residual wrench (m, 6)."""
 
     weighted: Array
     jacobian: Array | None
@@ -236,7 +237,7 @@ class _Problem:
         return stacked[live], errors.weighted[here][live]
 
     def errors(self, x: Array, with_jacobian: bool) -> _Errors:
-        """Nonlinear errors of a change: torques (18), wrench (6), slip (24), depth (8), limits (51)."""
+        """Nonlinear errors of a change: torques (51), wrench (6), slip (24), depth (8), limits (51)."""
         w, m = self.w, len(self.change.times)
         state = self.change.states(x.reshape(-1, N_TANGENT))
         dynamics = _Dynamics(self, state, with_jacobian)
@@ -251,7 +252,7 @@ class _Problem:
         low = w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance, 0.0) * ~self.grounded
         vectors = quaternions.logarithm(state.q[:, 7:].reshape(m, 17, 4)).reshape(m, 51)
         excess = vectors - np.clip(vectors, self.low, self.high)
-        share = demand.torque_on(grip)[:, 33:] / torque_limit()[33:]
+        share = demand.torque_on(grip) / torque_limit()
         strain = share - np.clip(share, -_STRONG, _STRONG)
         parts = [w.strain * strain, scale * residual, slip.reshape(m, 24), low, w.limit * excess]
         weighted = np.concatenate(parts, axis=1)
@@ -267,15 +268,17 @@ class _Problem:
             # Moments of the forces change with their arms.
             arms[:, 3:] -= _cross(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
         moving[:, 0] -= arms
-        jacobian[:, :, 18:24] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
-        jacobian[:, 0, 24:48] = (w.slip * self.pinned[..., None] * dynamics.spheres).reshape(m, 24, N_TANGENT)
-        jacobian[:, 0, 48:56] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        jacobian[:, 0, 56:][:, :, 6:] = w.limit * (excess != 0)[:, :, None] * np.eye(51)
+        jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
+        jacobian[:, 0, _W:_S] = (w.slip * self.pinned[..., None] * dynamics.spheres).reshape(m, 24, N_TANGENT)
+        jacobian[:, 0, _S:_D] = w.depth * (low < 0)[:, :, None] * dynamics.spheres[:, :, 2]
+        jacobian[:, 0, _D:][:, :, 6:] = w.limit * (excess != 0)[:, :, None] * np.eye(51)
         hot = np.flatnonzero(np.any(strain != 0, axis=1))
         if len(hot):
-            # Forces are taken as they are: how they shift with the state is of second order beside the torques.
-            gain = w.strain * (strain[hot] != 0) / torque_limit()[33:]
-            jacobian[hot, :, :18] = gain[:, None, :, None] * dynamics.torque[hot]
+            gain = w.strain * (strain[hot] != 0) / torque_limit()
+            follows = demand.levers()[hot] @ answer[hot]
+            torque = dynamics.torque[hot] - np.einsum("mti,moin->motn", follows, moving[hot])
+            torque[:, 0] -= dynamics.leaning(pushes, hot)
+            jacobian[hot, :, :_N] = gain[:, None, :, None] * torque
         return _Errors(weighted, jacobian, residual)
 
 
@@ -291,6 +294,7 @@ class _Dynamics:
         many = m if with_jacobian else 0
         by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
         self.spheres, self.com = np.zeros((many, 8, 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
+        self.anchors, self.turns = np.zeros((2, many, 6, 3, N_TANGENT))
         result, moved, full = np.zeros(N_TANGENT), np.zeros(model.nq), np.empty((N_TANGENT, N_TANGENT))
         step = np.zeros(N_TANGENT)
         kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
@@ -306,6 +310,8 @@ class _Dynamics:
                 continue
             for i, geom in enumerate(problem.spheres):
                 mujoco.mj_jac(model, d, self.spheres[k, i], None, spheres[k, i], int(model.geom_bodyid[geom]))
+            for i, body in enumerate(bodies):
+                mujoco.mj_jac(model, d, self.anchors[k, i], self.turns[k, i], anchors[k, i], body)
             mujoco.mj_jacSubtreeCom(model, d, self.com[k], 1)
             mujoco.mj_crb(model, d)
             _full_mass(model, d, full)
@@ -352,7 +358,28 @@ class _Dynamics:
         shifted = self.com.copy()
         shifted[:, :, :3] -= np.eye(3)
         self.wrench[:, 0, 3:] += _cross(force[:, :3]) @ shifted
-        self.torque = by[:, :, 39:57]
+        self.torque = by[:, :, 6:]
+
+    def leaning(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
+        """How the torques of forces that stay follow the place, d(Jᵀ)/dx f: shape (n, 51, 57).
+
+        Parameters
+        ----------
+        pushes : Array
+            Forces of the floor, shape (m, 8, 3) [N].
+        states : array of int, shape (n,)
+            Of which states.
+        """
+        demand, leaning = self.demand, np.zeros((len(states), 51, N_TANGENT))
+        soles = demand.spheres[states] - (0.0, 0.0, CONTACT_RADIUS)
+        for leg, body in enumerate(_LEGS):
+            mine = slice(0, 4) if leg < 3 else slice(4, 8)
+            force, anchor = pushes[states, mine], demand.anchors[states, leg]
+            moment = np.cross(soles[:, mine] - anchor[:, None], force).sum(1)
+            moved = self.spheres[states, mine] - self.anchors[states, leg, None]
+            change = -(_cross(force) @ moved).sum(1) + _cross(moment) @ self.turns[states, leg]
+            leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, leg].transpose(0, 2, 1) @ change
+        return leaning
 
 
 def _clearance(schedule: Stances, fps: float, closed: bool) -> Array:
