@@ -27,6 +27,9 @@ class FigureGains(NamedTuple):
         Largest residual force as a share of body weight, and moment as a share of body weight × stature.
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
+    settling_reach : float
+        The same for a point of a foot that bears load with another one [m]: what is about to be set down is planned
+        with, or the ankle holds it up.
     stance_height : float
         Height from which the reference lifts a contact point that stood [m].
     swing_speed : float
@@ -48,6 +51,7 @@ class FigureGains(NamedTuple):
     moment_bound: float = 0.2
     reference_reach: float = 0.03
     contact_reach: float = 0.002
+    settling_reach: float = 0.015
     stance_height: float = 0.008
     swing_speed: float = 1.0
     flight_height: float = 0.02
@@ -79,6 +83,8 @@ class FigureState(NamedTuple):
         Body weight [N], stature [m], radius of the contact spheres [m], coefficient of friction that is relied on.
     acceleration, wanted_root : Array
         Planned acceleration (57), and the root's as the feedback asks for it (6).
+    loaded : Array
+        1 where a foot touches the floor, 0 where it does not, shape (2,).
     share, near : Array
         How much each contact point may bear, and whether it stands in the reference, 0 to 1, shape (10,).
     force, given : Array
@@ -122,6 +128,7 @@ class FigureState(NamedTuple):
     acceleration: Array
     wanted_root: Array
     rotation: Array
+    loaded: Array
     share: Array
     near: Array
     points: Array

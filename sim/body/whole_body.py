@@ -75,6 +75,11 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
     support = 0.0
+    for leg in range(2):
+        s.loaded[leg] = 0.0
+        for c in range(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT):
+            height = s.contact_pos[s.contact[c], 2] - s.radius
+            s.loaded[leg] = max(s.loaded[leg], _nearness(height, s.gains.contact_reach))
     for c in range(s.share.shape[0]):
         now = s.twin_contact_pos[s.twin_contact[c]]
         way = np.sqrt((s.points[c, 0] - now[0]) ** 2 + (s.points[c, 1] - now[1]) ** 2)
@@ -82,6 +87,8 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
         touch = _nearness(s.points[c, 2], s.gains.contact_reach)
+        if c < 2 * _N_FOOT:
+            touch = max(touch, s.loaded[c // _N_FOOT] * _nearness(s.points[c, 2], s.gains.settling_reach))
         rests = _nearness(way, s.gains.lift_time * s.gains.swing_speed)
         s.near[c] = rests * _nearness(height, s.gains.stance_height)
         s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)

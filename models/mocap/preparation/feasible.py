@@ -76,7 +76,7 @@ class FeasibleWeights:
     moment: float = 40.0
     flight: float = 5.0
     slip: float = 300.0
-    depth: float = 200.0
+    depth: float = 600.0
     limit: float = 100.0
     strain: float = 10.0
     place: float = 1.0
@@ -208,7 +208,7 @@ class _Problem:
                     system.add(interval, rows[0].T @ rows[0])
                     parts[interval] = rows[0].T @ rows[1]
             g = system.gradient(parts) + self.fixed.times(x)
-            for _ in range(6):
+            for _ in range(12):
                 trial = x - system.solve(g, damping)
                 after = self.errors(trial, False)
                 if (cost := self.cost(after, trial)) < costs[-1]:
