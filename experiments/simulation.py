@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from dataclasses import replace as replaced
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -23,7 +22,7 @@ from experiments.setups.figure_maps import Place, composite_parts, cylindrical_p
 from experiments.setups.parts import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.stylus import stylus_path
-from experiments.setups.wiring import assemble, check_rates, ticks_of
+from experiments.setups.wiring import assemble, check_rates
 from models.mocap.clip import Clip
 from models.scene import SceneConfig
 from sim.loop.loop import Loop
@@ -184,8 +183,6 @@ class Simulation:
     tank: EnergyTank | None = None
 
     def __post_init__(self) -> None:
-        if self.figure.figure_ticks is None:
-            object.__setattr__(self, "figure", replaced(self.figure, figure_ticks=8))
         check_rates(self)
 
     @property
@@ -236,7 +233,7 @@ class Simulation:
         ModelError, ControllerError, SimError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
-        least = 2.0 * self.clock.servo_period * ticks_of(self)
+        least = 2.0 * self.clock.servo_period * self.figure.figure_ticks
         if not least <= seconds < np.inf:
             raise ParameterError(f"a run of {seconds} s; expected {least:g} s or more, and finite")
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)

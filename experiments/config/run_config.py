@@ -53,9 +53,8 @@ class Figure:
         [kg]
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
-    figure_ticks : int, optional
-        Servo ticks between two updates; by default 8, but 2 where clips are played as they are (a map from a file, of
-        rivers, of a led figure): a foot lands between two updates.
+    figure_ticks : int
+        Servo ticks between two updates of the figure, between which a foot may land.
     blend : float
         Time in which one clip goes over into another [s].
     """
@@ -64,7 +63,7 @@ class Figure:
     stature: float = above(0.0, default=DEFAULT_STATURE, unit="m")
     mass: float = above(0.0, default=DEFAULT_MASS, unit="kg")
     smoothing: float = above(0.0, default=6.0, unit="Hz")
-    figure_ticks: int | None = whole(1, default=None)
+    figure_ticks: int = whole(1, default=2)
     blend: float = at_least(0.0, default=0.4, unit="s")
 
 
@@ -95,7 +94,7 @@ class Clock:
     """
 
     servo_period: Annotated[float, above(0.0, unit="s")] = 1e-3
-    physics_step: Annotated[float, above(0.0, unit="s")] = 1.25e-4
+    physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 
 @part

@@ -1,4 +1,4 @@
-"""What the parts of a configuration leave to each other: gains by the kind of map, the figure's updates.
+"""What the parts of a configuration leave to each other: gains by the kind of map.
 
 Light to import, as what certificates are checked by is.
 """
@@ -8,8 +8,6 @@ from dataclasses import replace
 from experiments.config.modes import Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 
-LANDS = ("file", "rivers", "led")
-"""Kinds of map whose clips are played as they are: a foot lands between two updates of the figure."""
 RIVER_GAINS = {"default": (150.0, 16.0), "file": (50.0, 20.0)}
 """k_r [N/m] and b_d [N s/m] of the rivers about a circle, and of a map from a file."""
 # Those of a map lie side by side: a hand that goes over from one to the other is drawn within τ = b_d/k_r, or the
@@ -34,8 +32,7 @@ def resolved(config: RunConfig) -> RunConfig:
         names, values = _OPEN[config.mode.kind]
         numbers = values["file" if config.map.kind == "file" else "default"]
         left = {name: n for name, n in zip(names, numbers, strict=True) if getattr(config.mode, name) is None}
-    ticks = config.figure.figure_ticks or (2 if config.map.kind in LANDS else 8)
-    return replace(config, mode=replace(config.mode, **left), figure=replace(config.figure, figure_ticks=ticks))
+    return replace(config, mode=replace(config.mode, **left))
 
 
 def river_gains(mode: Rivers) -> tuple[float, float]:

@@ -66,8 +66,8 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
-    if config.seconds < 2.0 * config.clock.servo_period * ticks_of(config):
-        least = 2.0 * config.clock.servo_period * ticks_of(config)
+    if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
+        least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     check_rates(config)
     world = World(config.scene, config.figure.kind)
@@ -113,12 +113,7 @@ def check_rates(settings: Settings) -> None:
     """
     settings.scene.substeps()
     figure = settings.figure
-    check_reference(settings.clock.servo_period * ticks_of(settings), figure.smoothing, figure.blend)
-
-
-def ticks_of(settings: Settings) -> int:
-    """Servo ticks between two updates of the figure."""
-    return settings.figure.figure_ticks or 1
+    check_reference(settings.clock.servo_period * settings.figure.figure_ticks, figure.smoothing, figure.blend)
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
@@ -142,12 +137,12 @@ def _servo(parts: Parts, world: World) -> Servo:
     body, reference = _BODIES[world.kind](parts, world, compiled)
     return Servo(
         plant=make_plant(world), device=device, field=field, reference=reference, figure=body,
-        figure_ticks=ticks_of(config), argument=device.hand[1:8] if walker is None else walker.argument,
+        figure_ticks=config.figure.figure_ticks, argument=device.hand[1:8] if walker is None else walker.argument,
     )  # fmt: skip
 
 
 def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledReference:
-    figure, period = parts.config.figure, parts.config.clock.servo_period * ticks_of(parts.config)
+    figure, period = parts.config.figure, parts.config.clock.servo_period * parts.config.figure.figure_ticks
     legs = packed_legs(world.figure)
     return unlinked_reference(
         world.figure, compiled, period, figure.smoothing, figure.blend, legs, parts.held_seconds
