@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint format bench gate fuzz clean
+.PHONY: setup demo test test-all lint format docs bench gate fuzz clean
 
 setup: $(READY)
 
@@ -31,6 +31,10 @@ lint: $(READY)
 format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# Pages and reference, strictly: a warning or a link that leads nowhere is an error. Open build/docs/index.html.
+docs: $(READY)
+	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet docs build/docs
 
 bench: $(READY)
 	$(BIN)/hvf bench

@@ -33,7 +33,7 @@ def _run(program, seconds=0.2):
 
 
 def test_the_example_of_the_docs_runs_and_has_its_20_lines(capsys):
-    text = (Path(__file__).parents[2] / "docs" / "your-own-law.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "tutorials" / "your-own-law.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len([line for line in code.splitlines() if line.strip()]) <= 20
     exec(compile(code, "your-own-law.md", "exec"), {"__name__": "example"})
