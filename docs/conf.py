@@ -39,10 +39,19 @@ html_show_sourcelink = False
 html_math_renderer = "mathml"
 
 
+_ACCENT = re.compile(r'<mover accent="true">\s*<mi>(.)</mi>\s*<mo stretchy="false">([˙¨ˆ~ˉ])</mo>\s*</mover>')
+_COMBINING = {"˙": "\u0307", "¨": "\u0308", "ˆ": "\u0302", "~": "\u0303", "ˉ": "\u0304"}
+
+
+def _combined(accent: re.Match[str]) -> str:
+    """One letter with its accent: without a font for mathematics a browser puts the dot into the letter."""
+    return f'<mi class="accented">{accent[1]}{_COMBINING[accent[2]]}</mi>'
+
+
 def _mathml(self: HTML5Translator, node: nodes.Node, block: bool) -> None:
     tex = node.astext().replace(r"\|", r"\Vert ").replace(r"\textstyle", "")
     try:
-        self.body.append(tex2mathml(tex, as_block=block))
+        self.body.append(_ACCENT.sub(_combined, tex2mathml(tex, as_block=block)))
     except MathError as error:
         logging.getLogger(__name__).warning("%r: %s", tex, error, location=node)
     raise nodes.SkipNode
