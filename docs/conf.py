@@ -84,14 +84,15 @@ def _plain_bars(app: Sphinx, what: str, name: str, obj: object, options: object,
             lines[i] = "".join(parts)
 
 
-def _once(app: Sphinx, what: str, name: str, obj: object, skip: bool, options: object) -> bool | None:
-    """Describe what `hvf` exports on its own page only."""
-    elsewhere = app.env.current_document.docname != "reference/python"
-    return True if elsewhere and what == "module" and getattr(hvf, name, None) is obj else None
+def _skipped(app: Sphinx, what: str, name: str, obj: object, skip: bool, options: object) -> bool | None:
+    """Leave out what `hvf` exports, which is on its own page, and fields of tuples, which their class describes."""
+    exported = what == "module" and getattr(hvf, name, None) is obj
+    elsewhere = exported and app.env.current_document.docname != "reference/python"
+    return True if elsewhere or type(obj).__name__ == "_tuplegetter" else None
 
 
 def setup(app: Sphinx) -> None:
     """Mathematics as MathML, which browsers draw by themselves, and docstrings as they are written."""
     app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
     app.connect("autodoc-process-docstring", _plain_bars)
-    app.connect("autodoc-skip-member", _once)
+    app.connect("autodoc-skip-member", _skipped)
