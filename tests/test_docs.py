@@ -63,6 +63,7 @@ def test_the_python_of_a_page_runs_from_top_to_bottom(
     said = capsys.readouterr().out
     for sentence in SAID.get(name(page), []):
         assert sentence in said
+    assert " fell at " not in said
     assert not [path for path in tmp_path.iterdir() if path.suffix != ".png"]  # a run in memory leaves nothing
 
 
