@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint format bench gate fuzz clean
+.PHONY: setup demo test test-all test-commands lint format docs bench gate fuzz clean
 
 setup: $(READY)
 
@@ -20,7 +20,11 @@ test: $(READY)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-all: $(READY)
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not commands'
+
+# Every hvf command of README and docs, run in a fresh folder from top to bottom (a quarter of an hour).
+test-commands: $(READY)
+	$(BIN)/python -m pytest -m commands
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -31,6 +35,10 @@ lint: $(READY)
 format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# Pages and reference, strictly: a warning or a link that leads nowhere is an error. Open build/docs/index.html.
+docs: $(READY)
+	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet docs build/docs
 
 bench: $(READY)
 	$(BIN)/hvf bench

@@ -4,10 +4,10 @@ The public face: parts of a simulation, what can be done with it, and nothing of
 
     import hvf
 
-    walk, jump = hvf.clips("walk", "jump")
+    dance, cheer = hvf.clips("squat_dance", "cheer")
     curve = hvf.circle(radius=0.0477, lap=4.0)
     river = hvf.Follow(curve, k_r=300, b_d=8)
-    sim = hvf.Simulation(field=river, haptic_map=hvf.Cylindrical([walk, jump], around=curve))
+    sim = hvf.Simulation(field=river, haptic_map=hvf.Cylindrical([dance, cheer], around=curve))
     run = sim.run(10.0)
     print(run)
 """

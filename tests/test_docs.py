@@ -1,54 +1,138 @@
-"""What the documents show works: their Python runs, their commands parse, their links lead somewhere."""
+"""What the documents show works: Python runs, commands parse, links lead somewhere, the site builds."""
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
+from typing import get_args
 
+import matplotlib.pyplot as plt
 import pytest
 
-from experiments.cli import parsed
+from experiments.cli import Command, parsed
 from experiments.config.words import config_of_options
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "models").rglob("README.md"))]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *sorted((ROOT / "models").rglob("README.md"))]
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+SAID = {  # what the blocks of a page print, where a sentence of the page says so
+    "README.md": ["{'field.k_r': 400}", "law floor"],  # the law branches, so nothing is certain of it
+    "docs/tutorials/your-own-law.md": [
+        "k = 100 N/m: pushed down by 6.2 mm",
+        "k = 400 N/m: pushed down by 3.5 mm",
+        "k = 400 N/m: certified",
+        "k = 20000 N/m: refuted",
+    ],
+}
 
 
-def blocks(page: Path, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def blocks(page: Path, *languages: str) -> list[str]:
+    found = FENCE.findall(page.read_text(encoding="utf-8"))
+    return [block for language, block in found if language.strip() in languages]
+
+
+def commands(page: Path) -> list[str]:
+    """Lines of blocks and code in sentences that begin with hvf, make or python -m."""
+    shown = [line for block in blocks(page, "", "sh") for line in block.splitlines()]
+    prose = FENCE.sub("", page.read_text(encoding="utf-8"))
+    inline = [" ".join(code.split()) for code in re.findall(r"(?<!`)`([^`]+)`(?!`)", prose)]
+    return [line for line in shown + inline if re.match(r"(hvf|make|python -m) \S", line) and "…" not in line]
+
+
+def pages_with(*languages: str) -> list[Path]:
+    return [page for page in PAGES if blocks(page, *languages)]
 
 
 @pytest.mark.slow
-def test_the_readme_s_python_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("page", pages_with("python"), ids=name)
+def test_the_python_of_a_page_runs_from_top_to_bottom(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (code,) = blocks(ROOT / "README.md", "python")
     names: dict[str, object] = {}
-    exec(compile(code, "README.md", "exec"), names)
+    for block in blocks(page, "python"):
+        exec(compile(block, name(page), "exec"), names)
+    plt.close("all")
     said = capsys.readouterr().out
-    assert "{'field.k_r': 400}" in said
-    assert "law floor" in said  # it branches, so nothing is certain of it
-    assert not list(tmp_path.iterdir())
+    for sentence in SAID.get(name(page), []):
+        assert sentence in said
+    assert " fell at " not in said
+    assert not [path for path in tmp_path.iterdir() if path.suffix != ".png"]  # a run in memory leaves nothing
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_hvf_command_of_a_page_is_one_that_the_program_takes(page: Path) -> None:
-    for block in blocks(page, ""):
-        for line in block.splitlines():
-            if line.startswith("hvf ") and "…" not in line:
-                arguments = shlex.split(line, comments=True)[1:]
-                command = parsed(arguments)
-                assert callable(command), line
-                options = getattr(command, "options", None)
-                if options is not None and options.config is None:  # the file would be a run's that there has not been
-                    assert config_of_options(options), line
+@pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=name)
+def test_every_command_of_a_page_is_one_that_there_is(page: Path) -> None:
+    for line in commands(page):
+        program, *arguments = shlex.split(line, comments=True)
+        if program == "hvf":
+            _parses(arguments, line)
+        elif program == "make":
+            assert re.search(rf"^{re.escape(arguments[0])}:", MAKEFILE, re.MULTILINE), line
+        elif arguments[1].split(".")[0] in ("experiments", "models"):
+            module = ROOT / arguments[1].replace(".", "/")
+            assert module.with_suffix(".py").exists() or (module / "__main__.py").exists(), line
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def _parses(arguments: list[str], line: str) -> None:
+    if {"--help", "--version", "COMMAND"} & set(arguments) or arguments[0].startswith("--"):
+        return
+    if len(arguments) == 1 and arguments[0] in COMMANDS:
+        return  # the command's name, without what it needs
+    command = parsed(arguments)
+    assert callable(command), line
+    options = getattr(command, "options", None)
+    if options is not None and options.config is None:  # the file would be a run's that there has not been
+        assert config_of_options(options), line
+
+
+COMMANDS = [get_args(part)[1].name for part in get_args(Command)]
+
+
+def test_the_reference_lists_every_command() -> None:
+    listed = re.findall(r"^\| `hvf (\w+)`", (DOCS / "reference" / "command-line.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(listed) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_and_pictures_of_a_page_are_there(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", FENCE.sub("", page.read_text(encoding="utf-8"))):
         if not target.startswith("http"):
-            assert (page.parent / target).exists(), target
+            moved = [name(other) for other in PAGES if other.name == Path(target).name]
+            assert (page.parent / target).exists(), f"{target} is not there; pages of that name: {moved}"
+
+
+SOURCE = re.compile(r"`((?:controllers|experiments|models|sim|tests|examples|docs)/[\w/.-]+)(?::(\w+))?`")
+
+
+def test_files_and_functions_that_pages_name_are_there() -> None:
+    for page in PAGES:
+        for path, defined in SOURCE.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
+            assert (ROOT / path).exists(), f"{name(page)}: {path}"
+            if defined:
+                source = (ROOT / path).read_text(encoding="utf-8")
+                assert re.search(rf"^(?:def|class) {defined}\b", source, re.MULTILINE), (
+                    f"{name(page)}: {path}:{defined}"
+                )
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    built = subprocess.run(
+        [sys.executable, "-m", "sphinx", "--builder", "html", "--fail-on-warning", "--keep-going", "--quiet",
+         str(DOCS), str(tmp_path / "site")],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stderr
+    page = (tmp_path / "site" / "explanation" / "paper.html").read_text(encoding="utf-8")
+    assert "<math" in page  # drawn by the browser, without a script from elsewhere
+    assert not re.findall(r"<(?:script|link)[^>]+(?:src|href)=\"https?://", page)
 
 
 def test_the_licence_is_the_one_that_the_project_names() -> None:

@@ -71,7 +71,7 @@ def _kernel(function: Callable[..., Any], count: int) -> Kernel:
         where = f"in line {at[-1]}: " if at else ""
         raise ParameterError(
             f"{place_of(function)} cannot be compiled: {where}{said}. Expected a function of numbers, "
-            "see docs/your-own-law.md"
+            "see docs/tutorials/your-own-law.md"
         ) from None
     given: Any = compiled.overloads[signature].signature.return_type
     tupled = isinstance(given, types.BaseTuple)

@@ -1,7 +1,7 @@
 """Drawings of flights: a clip against free fall, and what the physical figure makes of it at many rates.
 
-``python -m experiments.certify.ballistic_figures docs ../shared/mocap`` flies the embedded jump and backflip and two
-captured jumps, draws the picture of the docs and prints its table.
+``python -m experiments.certify.ballistic_figures docs/pictures ../shared/mocap`` flies the embedded jump and backflip
+and two captured jumps, draws the picture of the docs and prints its table.
 """
 
 import sys

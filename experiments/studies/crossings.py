@@ -1,6 +1,6 @@
 """Hands at crossings of two rivers, on the simulated Phantom: who stays, who changes over, who is thrown out.
 
-``python -m experiments.studies.crossings`` prints the table of `docs/fields.md`.
+``python -m experiments.studies.crossings`` prints the table of `docs/validation/crossing-rivers.md`.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Pictures of the fields, and the table of crossings: ``python -m experiments.studies.field_figures docs``."""
+"""Pictures of the fields, and the table of crossings: ``python -m experiments.studies.field_figures docs/pictures``."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The lifted map beside a hand-made one, for the docs: ``python -m experiments.studies.lifting_figures docs``."""
+"""The lifted map beside a hand-made one: ``python -m experiments.studies.lifting_figures docs/pictures``."""
 
 import sys
 from pathlib import Path

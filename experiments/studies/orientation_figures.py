@@ -1,4 +1,4 @@
-"""The stylus turned, and what the figure makes of it: ``python -m experiments.studies.orientation_figures docs``."""
+"""The stylus turned, and what the figure does: ``python -m experiments.studies.orientation_figures docs/pictures``."""
 
 import sys
 import tempfile

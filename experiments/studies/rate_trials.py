@@ -1,4 +1,4 @@
-"""Gate and governor on the simulated Phantom: ``python -m experiments.studies.rate_trials docs`` draws what is felt.
+"""Gate and governor on the simulated Phantom, drawn by ``python -m experiments.studies.rate_trials docs/pictures``.
 
 A hand is led through the flight of the backflip at one speed after another, by an arm's impedance along the curve.
 """

@@ -1,7 +1,7 @@
 """Hands in crossing rivers on the MuJoCo Phantom, from any state and with any push; certificates against them.
 
 ``python -m experiments.studies.switching_trials 40`` draws rivers and compares what is certified with what happens;
-``python -m experiments.studies.switching_trials docs`` draws the picture of the docs.
+``python -m experiments.studies.switching_trials docs/pictures`` draws the picture of the docs.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Hands with and without a soft wall, in a picture: ``python -m experiments.studies.wall_trials docs``."""
+"""Hands with and without a soft wall, in a picture: ``python -m experiments.studies.wall_trials docs/pictures``."""
 
 import sys
 from pathlib import Path

@@ -238,7 +238,8 @@ def test_a_held_point_is_carried_to_finite_places_only() -> None:
 
 
 def test_the_example_of_the_documentation_runs() -> None:
-    text = (Path(__file__).resolve().parents[2] / "docs" / "stretchy-tubes.md").read_text(encoding="utf-8")
+    page = Path(__file__).resolve().parents[2] / "docs" / "explanation" / "stretchy-tubes.md"
+    text = page.read_text(encoding="utf-8")
     names: dict = {}
     exec(text.split("```python\n")[1].split("```")[0], names)
     np.testing.assert_allclose(names["bent"].point(1.0), [0.0, 0.07, 0.01], atol=1e-12)

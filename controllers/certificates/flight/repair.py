@@ -3,7 +3,7 @@ r"""The nearest motion that can be flown: a nonlinear program in the timing and 
 Frame k keeps its posture; free are how long it lasts until the next, h_k, and how far the whole body is moved, δ_k:
 
 .. math:: \min_{h, \delta, p, v, \bar L} \; \frac1n \sum_k
-            \Big(\frac{\ln h_k / h}{s_h}\Big)^2 + \Big(\frac{\lVert\delta_k\rVert}{s_\delta}\Big)^2
+            \Bigl(\frac{\ln h_k / h}{s_h}\Bigr)^2 + \Bigl(\frac{\lVert\delta_k\rVert}{s_\delta}\Bigr)^2
             + \text{(changes of both)} + \sum_{k \in \text{flight}} \lVert L_k h / h_k - \bar L \rVert^2 / L_{max}^2
 
 subject to free fall in every flight, c_k + δ_k = p + v τ_k − ½ g τ_k² e_z; a floor that only pushes, c̈_z ≥ −g; legs

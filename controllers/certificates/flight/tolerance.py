@@ -17,7 +17,7 @@ class BallisticTolerance:
     ----------
     gravity : (float, float)
         Least and greatest gravity that viewers take for natural [m/s²] (after Reitsma & Pollard 2003; what that rests
-        on is said in docs/ballistics.md).
+        on is said in docs/explanation/ballistics.md).
     distance : float
         How far a body that really falls may stray from the recorded centre of mass [m].
     misfit : float

@@ -51,8 +51,8 @@ _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for p
 class FeasibleWeights:
     """What one unit of error costs before it is squared, per sampled instant.
 
-    Chosen on three walks and a run of the tuning half (`docs/your-own-motion.md`). The jerk's weight matters: with a
-    smaller one two walks needed 21 and 9 % instead of 7 and 5, and with 5e-5 the run stood.
+    Chosen on three walks and a run of the tuning half (`docs/validation/prepared-captures.md`). The jerk's weight
+    matters: with a smaller one two walks needed 21 and 9 % instead of 7 and 5, and with 5e-5 the run stood.
 
     Parameters
     ----------
