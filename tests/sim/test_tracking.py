@@ -45,7 +45,7 @@ def test_the_walk_stays_within_its_figures():
     result = track(embedded("walk"), 4.0)
     assert result.joint_error <= 5.0
     assert result.root_error_max <= 0.05
-    assert result.residual_force <= 0.15
+    assert result.residual_force <= 0.04  # 0.057 where a foot is not planned to be set down
     assert result.grounded >= 0.99
     assert result.slide <= 0.03
     assert result.warnings == 0
