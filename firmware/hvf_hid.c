@@ -133,11 +133,14 @@ static uint16_t trips(hvf_device *device, const hvf_sensors *sensors) {
     return status;
 }
 
-void hvf_tick(hvf_device *device, const hvf_sensors *sensors, hvf_motors *motors, hvf_input *report) {
-    device->status |= trips(device, sensors);
-    if (device->status & TRIPPED) off(device);
+void hvf_drive(const hvf_device *device, hvf_motors *motors) {
     motors->on = (device->status & HVF_STATUS_ENABLED) != 0;
     memcpy(motors->torque, device->torque, sizeof motors->torque);
+}
+
+void hvf_tick(hvf_device *device, const hvf_sensors *sensors, hvf_input *report) {
+    device->status |= trips(device, sensors);
+    if (device->status & TRIPPED) off(device);
 
     memset(report, 0, sizeof *report);
     report->report = HVF_INPUT;

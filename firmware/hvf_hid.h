@@ -116,8 +116,11 @@ size_t hvf_give_feature(const hvf_device *device, uint8_t report, uint8_t *bytes
 /* A feature report was sent; returns 1 if it was taken: only the calibration, and only while the motors are off. */
 int hvf_take_feature(hvf_device *device, const uint8_t *bytes, size_t n);
 
-/* Once a period: judges, commands the motors, and fills the input report. */
-void hvf_tick(hvf_device *device, const hvf_sensors *sensors, hvf_motors *motors, hvf_input *report);
+/* Once a period: judges, and fills the input report. */
+void hvf_tick(hvf_device *device, const hvf_sensors *sensors, hvf_input *report);
+
+/* What the motors have to do, after each of the above. */
+void hvf_drive(const hvf_device *device, hvf_motors *motors);
 
 /* The report descriptor, for the USB stack: vendor page 0xFF48, usage 0x56, four reports of 63 bytes and a number. */
 extern const uint8_t hvf_report_descriptor[];

@@ -1,4 +1,4 @@
-/* The reference firmware: one loop, at the rate that the identity tells. Feature reads are answered by the USB stack's
+/* The reference firmware: one loop, that reports at the rate that the identity tells. Feature reads are answered by the USB stack's
  * interrupt with `hvf_give_feature(&phantom, …)`, which only reads. */
 #include "phantom_board.h"
 
@@ -16,13 +16,18 @@ int main(void) {
 
     board_begin(&identity, &calibration, &boot);
     hvf_begin(&phantom, &identity, &calibration, boot);
-    while (board_waits_for_tick()) {
-        board_sense(&sensors);
+    for (int period = 0; period >= 0; period = board_period()) {
         while ((n = board_receive(bytes, sizeof bytes)) > 0) {
-            if (bytes[0] == HVF_OUTPUT) hvf_take_output(&phantom, bytes, n, sensors.time_us);
-            else hvf_take_feature(&phantom, bytes, n);
+            if (bytes[0] != HVF_OUTPUT) hvf_take_feature(&phantom, bytes, n);
+            else if (hvf_take_output(&phantom, bytes, n, board_time_us())) {
+                hvf_drive(&phantom, &motors); /* at once: waiting for the period would be a delay in the force */
+                board_drive(&motors);
+            }
         }
-        hvf_tick(&phantom, &sensors, &motors, &report);
+        if (!period) continue;
+        board_sense(&sensors);
+        hvf_tick(&phantom, &sensors, &report);
+        hvf_drive(&phantom, &motors);
         board_drive(&motors);
         board_send(&report);
         board_feed_hardware_watchdog();

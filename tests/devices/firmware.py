@@ -82,7 +82,9 @@ class Firmware:
 
     def take(self, report: bytes) -> bool:
         if report[0] == protocol.OUTPUT:
-            return bool(self.c.hvf_take_output(self.device, report, len(report), self.sensors.time_us))
+            taken = self.c.hvf_take_output(self.device, report, len(report), self.sensors.time_us)
+            self.c.hvf_drive(self.device, ctypes.byref(self.motors))
+            return bool(taken)
         return bool(self.c.hvf_take_feature(self.device, report, len(report)))
 
     def feature(self, number: int) -> bytes:
@@ -94,7 +96,8 @@ class Firmware:
         """A period passes; the input report."""
         self.sensors.time_us += round(period * 1e6)
         room = ctypes.create_string_buffer(64)
-        self.c.hvf_tick(self.device, ctypes.byref(self.sensors), ctypes.byref(self.motors), room)
+        self.c.hvf_tick(self.device, ctypes.byref(self.sensors), room)
+        self.c.hvf_drive(self.device, ctypes.byref(self.motors))
         return room.raw
 
     def turn_to(self, angles: np.ndarray) -> None:

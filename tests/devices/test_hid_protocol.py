@@ -101,7 +101,8 @@ def test_the_reference_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> No
 #include "{ROOT}/firmware/phantom_board.h"
 static uint64_t now; static hvf_input last;
 void board_begin(hvf_identity *i, hvf_calibration *c, uint16_t *boot) {{ i->rate_hz = 1000; c->flags = 1; *boot = 7; }}
-int board_waits_for_tick(void) {{ now += 1000; return now <= 1000000; }}
+int board_period(void) {{ now += 100; return now > 1000000 ? -1 : now % 1000 == 0; }}
+uint64_t board_time_us(void) {{ return now; }}
 void board_sense(hvf_sensors *s) {{ s->time_us = now; s->encoder[1] = (int32_t)now; }}
 void board_drive(const hvf_motors *m) {{ (void)m; }}
 size_t board_receive(uint8_t *b, size_t n) {{ (void)b; (void)n; return 0; }}
