@@ -28,10 +28,12 @@ class DriverFault(SimError):
         Which.
     value : float
         What was seen, in the fault's unit.
+    detail : str
+        What the device says of it, where it has words.
     """
 
-    def __init__(self, fault: Fault, value: float = 0.0):
-        super().__init__(fault.words(value))
+    def __init__(self, fault: Fault, value: float = 0.0, detail: str = ""):
+        super().__init__(f"{fault.words(value)} ({detail})" if detail else fault.words(value))
         self.fault, self.value = fault, value
 
 
