@@ -80,6 +80,11 @@ class Firmware:
         self.sensors.time_us = 0
         self.c.hvf_begin(self.device, identity().tobytes(), calibration().tobytes(), ctypes.c_uint16(self.boot))
 
+    def descriptor(self) -> bytes:
+        """HID report descriptor."""
+        size = ctypes.c_size_t.in_dll(self.c, "hvf_report_descriptor_size").value
+        return bytes((ctypes.c_uint8 * size).in_dll(self.c, "hvf_report_descriptor"))
+
     def take(self, report: bytes) -> bool:
         if report[0] == protocol.OUTPUT:
             taken = self.c.hvf_take_output(self.device, report, len(report), self.sensors.time_us)
