@@ -7,6 +7,7 @@ Angles and torques of the joints come from the device's own calibration:
 n the counts, z their zero, N counts a turn of the joint, η motor turns a turn of the joint.
 """
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -48,7 +49,7 @@ HOTTEST = 100.0
 _BAD_IN_ROW = 3  # a disturbance spoils one report or two; a cable or a device that is broken goes on
 _DRAIN = 64  # reports that Linux keeps for a hidraw node
 _SENT = 256  # commands whose time is kept, for the round trip
-_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER | protocol.STATUS_WATCHDOG
+_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
 
 
 class HidHandle(Protocol):
@@ -100,8 +101,9 @@ class HidPhantom:
         self._last: int | None = None  # number of the last input report
         self._taken = self._bad = 0
         self._sent, self._sent_at = 0, np.full(_SENT, np.nan)
-        self._enabled = False
-        self._started_us = 0
+        self._enabled_since: int | None = None  # number of the output report that switched the motors on
+        self._again = False  # the motors went off while nobody was there: switch off, then on
+        self._given = math.nan  # device's time of the reading that was handed out last
         self._arrival = self._quickest = math.nan
 
     def _feature(self, number: int) -> Any:
@@ -153,16 +155,18 @@ class HidPhantom:
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; readings carry the device's time since its power-up."""
-        new, milliseconds = False, math.ceil(timeout * 1e3)
+        new, taken = False, 0
         try:
-            raw = self._handle.read(protocol.REPORT_SIZE + 1, milliseconds)
-            for _ in range(_DRAIN):
-                if not raw:
-                    break
+            # A byte of room shows a report that is too long.
+            raw = self._handle.read(protocol.REPORT_SIZE + 1, math.ceil(timeout * 1e3))
+            while raw:
                 new = self._take(bytes(raw), reading) or new
-                raw = self._handle.read(protocol.REPORT_SIZE + 1)
+                taken += 1
+                raw = self._handle.read(protocol.REPORT_SIZE + 1) if taken < _DRAIN else []
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
+        if new:
+            self._given = float(reading[READING_CLOCK])
         return new
 
     def _take(self, raw: bytes, reading: Array) -> bool:
@@ -188,11 +192,12 @@ class HidPhantom:
         reading[READING_SEQUENCE] = self._taken
         self._measure(report)
         self._judge_status(int(report["status"]))
+        self._judge_watchdog(report)
         return True
 
     def _judge_boot(self, boot: int) -> None:
         if boot != self._boot:
-            self._boot, self._last, self._enabled = boot, None, False
+            self._boot, self._last, self._enabled_since = boot, None, None
             self._arrival = self._quickest = math.nan
             raise DriverFault(Fault.DEVICE_RESET)
 
@@ -232,10 +237,22 @@ class HidPhantom:
             self.telemetry[TEMPERATURE : TEMPERATURE + 3]))  # fmt: skip
         if status & protocol.STATUS_HOT or hottest >= HOTTEST:
             raise DriverFault(Fault.OVER_TEMPERATURE, float(hottest))
-        # The watchdog of a device that is not asked for torque has nothing to switch off.
-        told = status & (_ERRORS if self._enabled else _ERRORS & ~protocol.STATUS_WATCHDOG)
+        told = status & _ERRORS
         if told:
             raise DriverFault(Fault.DEVICE_REPORTED, told)
+
+    def _judge_watchdog(self, report: Any) -> None:
+        """The firmware switched off: a fault where commands went out and did not arrive, and else a gap.
+
+        After a gap the force is ramped in again by who drives, so the motors may be switched on again.
+        """
+        since = self._enabled_since
+        if since is None or not int(report["status"]) & protocol.STATUS_WATCHDOG or int(report["answered"]) < since:
+            return
+        if int(report["time_us"]) * 1e-6 - self._given > 0.5 * WATCHDOG:
+            self._again = True
+        else:
+            raise DriverFault(Fault.DEVICE_REPORTED, protocol.STATUS_WATCHDOG)
 
     def write(self, torque: Array, enable: bool) -> None:
         """See `sim.devices.driver.Driver.write`; a torque is cut at the peak torque that the device tells.
@@ -249,6 +266,11 @@ class HidPhantom:
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, first_not_finite(torque))
         self._sent += 1
+        enable, self._again = enable and not self._again, False
+        if not enable:
+            self._enabled_since = None
+        elif self._enabled_since is None:
+            self._enabled_since = self._sent
         report = protocol.blank(protocol.OUTPUT)
         report["flags"] = protocol.ENABLE if enable else 0
         report["boot"], report["sequence"], report["watchdog_us"] = self._boot, self._sent, self._watchdog_us
@@ -256,7 +278,6 @@ class HidPhantom:
             report["torque"] = np.rint(np.clip(torque / self._turns, -self._peak, self._peak) / protocol.TORQUE_UNIT)
         report["answers"] = self._last or 0
         self._sent_at[self._sent % _SENT] = self._clock()
-        self._enabled = enable
         try:
             written = self._handle.write(protocol.sealed(report))
         except (OSError, ValueError):  # hidapi's binding raises ValueError once it is closed
@@ -266,10 +287,8 @@ class HidPhantom:
 
     def let_go(self) -> None:
         """Motors off, at once; never raises."""
-        try:
+        with contextlib.suppress(DriverFault):
             self.write(np.zeros(3), False)
-        except DriverFault:
-            self._enabled = False
 
     def close(self) -> None:
         """Let go, and give the device back."""

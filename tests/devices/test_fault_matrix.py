@@ -120,6 +120,12 @@ def other_number(run: Fixture, rng: np.random.Generator) -> int:
     return 0
 
 
+def deaf(run: Fixture, rng: np.random.Generator) -> int:
+    """Commands go out and do not arrive: the cable's other half."""
+    run.handle.write = lambda buff: len(buff)
+    return 13  # the watchdog, and the report that tells
+
+
 def hot(run: Fixture, rng: np.random.Generator) -> int:
     run.firmware.sensors.temperature[int(rng.integers(0, 3))] = int(rng.integers(10_000, 15_000))
     return 0
@@ -161,7 +167,7 @@ def not_finite(run: Fixture, rng: np.random.Generator) -> int:
 FAULTS = {
     unplug: Fault.UNPLUGGED, stall: Fault.READING_STALE, stale: Fault.READING_STALE, reordered: Fault.SEQUENCE_BACK,
     swapped: Fault.SEQUENCE_BACK, bits: Fault.CHECKSUM_WRONG, short: Fault.REPORT_MALFORMED,
-    long: Fault.REPORT_MALFORMED, other_number: Fault.REPORT_MALFORMED, hot: Fault.OVER_TEMPERATURE,
+    long: Fault.REPORT_MALFORMED, other_number: Fault.REPORT_MALFORMED, hot: Fault.OVER_TEMPERATURE, deaf: Fault.DEVICE_REPORTED,
     reset: Fault.DEVICE_RESET, amplifier: Fault.DEVICE_REPORTED, encoder: Fault.DEVICE_REPORTED,
     jump: Fault.RATE_IMPOSSIBLE, not_finite: Fault.READING_NOT_FINITE,
 }  # fmt: skip
@@ -234,3 +240,24 @@ def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(runs, seed: 
     assert bad == last.count("twice") + last.count("bits")
     assert lost >= last.count("lost")
     assert read > 250
+
+
+@pytest.mark.parametrize("milliseconds", [5, 50, 500])
+def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(runs, milliseconds: int) -> None:
+    run = runs()
+    for _ in range(300):
+        run.loop.step()
+    for _ in range(milliseconds):
+        run.rig.behind.move()
+        run.rig.behind.tell()
+    assert run.firmware.motors.on == (milliseconds < 10)
+    if milliseconds > 64:  # what Linux keeps
+        run.handle.queue = type(run.handle.queue)(list(run.handle.queue)[:64])
+    forces = []
+    for _ in range(400):
+        ticks, _ = run.loop.step()
+        forces.append(float(np.linalg.norm(ticks.force)))
+    assert run.rig.fault == Fault.NONE
+    assert run.firmware.motors.on
+    assert max(forces[:5]) < 0.3 * max(forces)
+    assert np.abs(np.diff(forces)).max() < 0.2
