@@ -49,6 +49,7 @@ HOTTEST = 100.0
 _BAD_IN_ROW = 3  # a disturbance spoils one report or two; a cable or a device that is broken goes on
 _DRAIN = 64  # reports that Linux keeps for a hidraw node
 _SENT = 256  # commands whose time is kept, for the round trip
+_CELSIUS = protocol.TEMPERATURE_UNIT
 _ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
 
 
@@ -181,17 +182,17 @@ class HidPhantom:
                 raise DriverFault(Fault.CHECKSUM_WRONG, self._bad)
             return False
         self._bad = 0
-        report = np.frombuffer(raw, protocol.INPUT_REPORT)[0]
-        self._judge_boot(int(report["boot"]))
-        if not self._is_next(int(report["sequence"])):
+        report = protocol.unpacked_input(raw)
+        self._judge_boot(report.boot)
+        if not self._is_next(report.sequence):
             return False
-        reading[READING_THETA : READING_GIMBAL + 3] = (report["encoder"] - self._zero) * self._angle
-        reading[READING_SWITCH] = int(report["flags"]) & protocol.SWITCH
-        reading[READING_CLOCK] = int(report["time_us"]) * 1e-6
+        reading[READING_THETA : READING_GIMBAL + 3] = (report.encoder - self._zero) * self._angle
+        reading[READING_SWITCH] = report.flags & protocol.SWITCH
+        reading[READING_CLOCK] = report.time_us * 1e-6
         self._taken += 1
         reading[READING_SEQUENCE] = self._taken
         self._measure(report)
-        self._judge_status(int(report["status"]))
+        self._judge_status(report.status)
         self._judge_watchdog(report)
         return True
 
@@ -214,17 +215,14 @@ class HidPhantom:
         self._last = number
         return True
 
-    def _measure(self, report: Any) -> None:
+    def _measure(self, report: protocol.InputReport) -> None:
         now, told = self._clock(), self.telemetry
-        celsius = report["temperature"]
-        told[TEMPERATURE : TEMPERATURE + 3] = np.where(
-            celsius == protocol.NO_TEMPERATURE, np.nan, celsius * protocol.TEMPERATURE_UNIT
-        )
-        answered = int(report["answered"])
-        if 0 <= self._sent - answered < _SENT and answered > 0:
-            told[ROUND_TRIP] = now - self._sent_at[answered % _SENT] - int(report["held_us"]) * 1e-6
+        for i, celsius in enumerate(report.temperature):
+            told[TEMPERATURE + i] = math.nan if celsius == protocol.NO_TEMPERATURE else celsius * _CELSIUS
+        if 0 <= self._sent - report.answered < _SENT and report.answered > 0:
+            told[ROUND_TRIP] = now - self._sent_at[report.answered % _SENT] - report.held_us * 1e-6
         # The two clocks began at different times: only how the difference changes means something.
-        delay = now - int(report["time_us"]) * 1e-6
+        delay = now - report.time_us * 1e-6
         if math.isnan(self._arrival):
             self._quickest, told[JITTER] = delay, 0.0
         else:
@@ -233,23 +231,24 @@ class HidPhantom:
         told[STALENESS] = delay - self._quickest
 
     def _judge_status(self, status: int) -> None:
-        hottest = np.max(self.telemetry[TEMPERATURE : TEMPERATURE + 3], initial=-np.inf, where=~np.isnan(
-            self.telemetry[TEMPERATURE : TEMPERATURE + 3]))  # fmt: skip
+        hottest = -math.inf
+        for celsius in self.telemetry[TEMPERATURE : TEMPERATURE + 3].tolist():
+            hottest = max(hottest, celsius)  # what is not a number is left out
         if status & protocol.STATUS_HOT or hottest >= HOTTEST:
-            raise DriverFault(Fault.OVER_TEMPERATURE, float(hottest))
+            raise DriverFault(Fault.OVER_TEMPERATURE, hottest)
         told = status & _ERRORS
         if told:
             raise DriverFault(Fault.DEVICE_REPORTED, told)
 
-    def _judge_watchdog(self, report: Any) -> None:
+    def _judge_watchdog(self, report: protocol.InputReport) -> None:
         """The firmware switched off: a fault where commands went out and did not arrive, and else a gap.
 
         After a gap the force is ramped in again by who drives, so the motors may be switched on again.
         """
         since = self._enabled_since
-        if since is None or not int(report["status"]) & protocol.STATUS_WATCHDOG or int(report["answered"]) < since:
+        if since is None or not report.status & protocol.STATUS_WATCHDOG or report.answered < since:
             return
-        if int(report["time_us"]) * 1e-6 - self._given > 0.5 * WATCHDOG:
+        if report.time_us * 1e-6 - self._given > 0.5 * WATCHDOG:
             self._again = True
         else:
             raise DriverFault(Fault.DEVICE_REPORTED, protocol.STATUS_WATCHDOG)
@@ -262,7 +261,7 @@ class HidPhantom:
         DriverFault
             If the device is gone, or a torque is not finite: then the motors are off.
         """
-        if not np.all(np.isfinite(torque)):
+        if not np.isfinite(torque).all():
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, first_not_finite(torque))
         self._sent += 1
@@ -271,15 +270,14 @@ class HidPhantom:
             self._enabled_since = None
         elif self._enabled_since is None:
             self._enabled_since = self._sent
-        report = protocol.blank(protocol.OUTPUT)
-        report["flags"] = protocol.ENABLE if enable else 0
-        report["boot"], report["sequence"], report["watchdog_us"] = self._boot, self._sent, self._watchdog_us
-        if enable:
-            report["torque"] = np.rint(np.clip(torque / self._turns, -self._peak, self._peak) / protocol.TORQUE_UNIT)
-        report["answers"] = self._last or 0
+        shaft = np.clip(torque / self._turns, -self._peak, self._peak) / protocol.TORQUE_UNIT if enable else np.zeros(3)
+        report = protocol.packed_output(
+            enable, self._boot, self._sent % 2**32, self._watchdog_us, np.rint(shaft).astype(int).tolist(),
+            self._last or 0,
+        )  # fmt: skip
         self._sent_at[self._sent % _SENT] = self._clock()
         try:
-            written = self._handle.write(protocol.sealed(report))
+            written = self._handle.write(report)
         except (OSError, ValueError):  # hidapi's binding raises ValueError once it is closed
             written = -1
         if written < 0:

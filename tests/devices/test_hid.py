@@ -11,6 +11,8 @@ from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, T
 from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle
+from tests.devices.follow import device_follow, rms, simulated_follow
+from tests.devices.rig import FirmwareBehind, Linkage, Rig
 
 POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
 
@@ -158,3 +160,12 @@ def test_a_device_that_is_another_or_has_no_scale_is_refused(handle, number, cha
     other_feature(number, **changed)(handle)
     with pytest.raises(SimError, match=says):
         HidPhantom(handle, "x")
+
+
+@pytest.mark.slow
+def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+    places, rig = device_follow(
+        lambda device: Rig(device, HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+    )
+    assert rig.fault == Fault.NONE
+    assert rms(places, simulated_follow()) < 1e-3

@@ -46,6 +46,21 @@ def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
     assert all(layout.itemsize == protocol.REPORT_SIZE for layout in STRUCTS.values())
 
 
+def test_taking_a_report_apart_and_putting_one_together_agree_with_the_layout() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(100):
+        raw = rng.bytes(64)
+        told, record = protocol.unpacked_input(raw), np.frombuffer(raw, protocol.INPUT_REPORT)[0]
+        for name, value in told._asdict().items():
+            np.testing.assert_array_equal(value, record[name], err_msg=name)
+        torque, answers = rng.integers(-(2**31), 2**31, 3).tolist(), int(rng.integers(0, 2**32))
+        made = np.frombuffer(protocol.packed_output(True, 77, 2**32 - 1, 5000, torque, answers), protocol.OUTPUT_REPORT)[0]
+        assert protocol.is_sound(made.tobytes())
+        assert made["torque"].tolist() == torque
+        fields = ("report", "flags", "boot", "sequence", "watchdog_us", "answers")
+        assert [int(made[name]) for name in fields] == [2, 1, 77, 2**32 - 1, 5000, answers]
+
+
 def test_constants_are_the_header_s(tmp_path: Path) -> None:
     pairs = {
         "HVF_VERSION_MAJOR": protocol.VERSION[0], "HVF_VERSION_MINOR": protocol.VERSION[1], "HVF_MAGIC": protocol.MAGIC,
