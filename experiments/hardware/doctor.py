@@ -1,5 +1,6 @@
 """What stands between this machine and a device: libraries, permissions, the system's limits, and how late it is."""
 
+import os
 import platform
 import sys
 import time
@@ -101,7 +102,9 @@ def _libraries() -> list[Finding]:
         ("OpenHaptics (HD)", find_hdapi(), "install 3D Systems' OpenHaptics and device driver, for a Touch or Phantom"),
         ("Force Dimension (dhd)", find_dhd(), "install the Force Dimension SDK, for an omega, delta, sigma or Falcon"),
     ):
-        found.append(Finding(name, OK, path) if path else Finding(name, MISSING, "the library is not installed", install))
+        found.append(
+            Finding(name, OK, path) if path else Finding(name, MISSING, "the library is not installed", install)
+        )
     return found
 
 
@@ -124,16 +127,16 @@ def _permissions(devices: list[FoundDevice]) -> list[Finding]:
 def _limits() -> list[Finding]:
     if not sys.platform.startswith("linux"):
         return [Finding("realtime", WEAK, f"{platform.system()} has no realtime class that is used here")]
-    import resource
+    import resource  # not on Windows
 
     unlimited = resource.RLIM_INFINITY
     priority = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
-    memory = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    memory = unlimited if os.geteuid() == 0 else resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]  # root has no limit
     limits = "in /etc/security/limits.d/hvf.conf, then log in again"
     return [
         _preemption(),
-        Finding("realtime priority", OK, f"up to {'any' if priority == unlimited else priority}")
-        if priority != 0
+        Finding("realtime priority", OK, "allowed")
+        if priority != 0 or _is_given_precedence()
         else Finding("realtime priority", WEAK, "not allowed (RLIMIT_RTPRIO 0)", f"put `USER - rtprio 80` {limits}"),
         Finding("memory lock", OK, "unlimited" if memory == unlimited else f"{memory / 2**20:.0f} MB")
         if memory == unlimited or memory >= 2**30
@@ -142,6 +145,17 @@ def _limits() -> list[Finding]:
         ),
         _governor(),
     ]
+
+
+def _is_given_precedence() -> bool:
+    """Whether the system gives this process SCHED_FIFO; it is as before after this."""
+    policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        return False
+    os.sched_setscheduler(0, policy, parameter)
+    return True
 
 
 def _preemption() -> Finding:
@@ -173,7 +187,7 @@ def _text(path: str) -> str:
 
 
 def measured_lateness(seconds: float = 1.0) -> Lateness:
-    """Lateness of a loop of 1 kHz with absolute deadlines in this process; a missed deadline is left out, not made up."""
+    """Lateness of a loop of 1 kHz with absolute deadlines in this process; one that is missed is left out."""
     late: list[float] = []
     begin, k, missed = time.monotonic(), 0, 0
     while k * PERIOD < seconds:

@@ -125,7 +125,7 @@ def _hid_device(row: dict[str, Any]) -> FoundDevice:
 
 
 def open_hid(path: str) -> HidHandle:
-    """hidapi's handle of a node.
+    """Hidapi's handle of a node.
 
     Raises
     ------

@@ -58,7 +58,7 @@ _FAULTS = {0x0200: Fault.MOTORS_HOT, 0x0203: Fault.TOO_FAST, 0x0302: Fault.UNPLU
 class ErrorInfo(ctypes.Structure):
     """HDErrorInfo."""
 
-    _fields_ = [  # noqa: RUF012 - ctypes' own
+    _fields_ = [
         ("errorCode", ctypes.c_uint), ("internalErrorCode", ctypes.c_int), ("hHD", ctypes.c_uint),
     ]  # fmt: skip
 
@@ -260,7 +260,7 @@ class HdapiDevice:
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
-        """See `sim.devices.driver.Driver.write`: the force at the tip that the torques stand for, from the next callback on.
+        """See `sim.devices.driver.Driver.write`: the force that the torques stand for, from the next callback on.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-r"""A device of another build, taken as a Phantom: the joints that put the stylus where it is, and its force from torques.
+r"""A device of another build, taken as a Phantom: joints that put the stylus where it is, and its force from torques.
 
 Libraries of vendors tell a pose and take a force at the tip. With the Phantom's own kinematics the angles are
 :math:`\theta = p^{-1}(p_P)`, and the torques :math:`\tau = J^T F + N` that the loop commands give back
@@ -78,6 +78,6 @@ def tip_force(theta: Array, torque: Array, largest: float) -> Array:
     j = np.array(jacobian(angles))
     if np.linalg.svd(j, compute_uv=False)[-1] < WEAKEST:
         return np.zeros(3)
-    force = np.linalg.solve(j.T, torque - np.array(gravity_torques(angles)))
+    force: Array = np.linalg.solve(j.T, torque - np.array(gravity_torques(angles))).astype(np.float64)
     size = float(np.linalg.norm(force))
     return force * (largest / size) if size > largest else force

@@ -20,5 +20,3 @@ def firmware(firmware_library: Path) -> Firmware:
 @pytest.fixture
 def handle(firmware: Firmware) -> FirmwareHandle:
     return FirmwareHandle(firmware)
-
-

@@ -29,14 +29,14 @@ def compiled(folder: Path, *sources: Path, program: bool = False) -> Path:
 
 
 class Sensors(ctypes.Structure):
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         ("time_us", ctypes.c_uint64), ("encoder", ctypes.c_int32 * 6), ("temperature", ctypes.c_int16 * 3),
         ("pressed", ctypes.c_uint8), ("amplifier_fault", ctypes.c_uint8), ("encoder_fault", ctypes.c_uint8),
     ]  # fmt: skip
 
 
 class Motors(ctypes.Structure):
-    _fields_ = [("on", ctypes.c_uint8), ("torque", ctypes.c_int32 * 3)]  # noqa: RUF012
+    _fields_ = [("on", ctypes.c_uint8), ("torque", ctypes.c_int32 * 3)]
 
 
 def identity(watchdog_max_us: int = 100_000) -> np.ndarray:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, stylus_orientation
 from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, stylus_orientation
 from sim.devices.dhd import load_dhd
 from sim.devices.hdapi import load_hdapi
 from tests.devices.firmware import compiled

@@ -41,7 +41,9 @@ def test_its_axes_are_towards_the_user_right_and_up(dhd) -> None:
     pose(dhd, [0.01, 0.02, 0.03])
     reading = np.zeros(9)
     assert device.read(reading, 0.0)
-    np.testing.assert_allclose(forward_kinematics(reading[3:6]), vector_to_device_frame((-0.01, -0.02, 0.03)), atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(reading[3:6]), vector_to_device_frame((-0.01, -0.02, 0.03)), atol=1e-12
+    )
     assert tuple(reading[[0, 2]]) == (1.0, 1.0)
     dhd.mock_guard(1)
     assert not device.read(reading, 0.0)

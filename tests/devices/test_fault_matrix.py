@@ -1,4 +1,4 @@
-"""Faults of a device on the wire, injected at seeded times while the field pulls: the force goes, and the reason stays."""
+"""Faults of a device on the wire, at seeded times while the field pulls: the force goes, and the reason stays."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -167,9 +167,9 @@ def not_finite(run: Fixture, rng: np.random.Generator) -> int:
 FAULTS = {
     unplug: Fault.UNPLUGGED, stall: Fault.READING_STALE, stale: Fault.READING_STALE, reordered: Fault.SEQUENCE_BACK,
     swapped: Fault.SEQUENCE_BACK, bits: Fault.CHECKSUM_WRONG, short: Fault.REPORT_MALFORMED,
-    long: Fault.REPORT_MALFORMED, other_number: Fault.REPORT_MALFORMED, hot: Fault.OVER_TEMPERATURE, deaf: Fault.DEVICE_REPORTED,
-    reset: Fault.DEVICE_RESET, amplifier: Fault.DEVICE_REPORTED, encoder: Fault.DEVICE_REPORTED,
-    jump: Fault.RATE_IMPOSSIBLE, not_finite: Fault.READING_NOT_FINITE,
+    long: Fault.REPORT_MALFORMED, other_number: Fault.REPORT_MALFORMED, hot: Fault.OVER_TEMPERATURE,
+    deaf: Fault.DEVICE_REPORTED, reset: Fault.DEVICE_RESET, amplifier: Fault.DEVICE_REPORTED,
+    encoder: Fault.DEVICE_REPORTED, jump: Fault.RATE_IMPOSSIBLE, not_finite: Fault.READING_NOT_FINITE,
 }  # fmt: skip
 
 

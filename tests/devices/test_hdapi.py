@@ -160,7 +160,8 @@ def test_the_vendor_s_own_thread_serves_a_thousand_times_a_second(hd) -> None:
 
 @pytest.mark.parametrize(
     ("order", "says"),
-    [("mock_missing", "HD_DEVICE_FAULT; expected a name"), ("mock_no_scheduler", "scheduler at 1000 Hz: HD_TIMER_ERROR")],
+    [("mock_missing", "HD_DEVICE_FAULT; expected a name"),
+     ("mock_no_scheduler", "scheduler at 1000 Hz: HD_TIMER_ERROR")],
 )  # fmt: skip
 def test_a_device_or_scheduler_that_is_not_there_is_a_line(hd, order, says) -> None:
     getattr(hd, order)(1)

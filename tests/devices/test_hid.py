@@ -69,7 +69,9 @@ def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver
     assert not firmware.joint_torque.any()
 
 
-def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finite_lets_go(driver, handle, firmware) -> None:
+def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finite_lets_go(
+    driver, handle, firmware
+) -> None:
     rng = np.random.default_rng(5)
     bad = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, 0.0]
     for _ in range(500):

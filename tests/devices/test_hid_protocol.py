@@ -18,7 +18,18 @@ STRUCTS = {
 }  # fmt: skip
 
 
-def output(firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other):
+def printed(folder: Path, lines: list[str]) -> str:
+    """What C prints that knows the header."""
+    source = folder / "printed.c"
+    body = "\n".join(lines)
+    head = f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\n'
+    source.write_text(head + f"int main(void) {{\n{body}\nreturn 0;\n}}\n")
+    return subprocess.run([compiled(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
+
+
+def output(
+    firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other
+):
     made = protocol.blank(protocol.OUTPUT)
     made["flags"], made["boot"], made["sequence"] = int(enable), firmware.boot, sequence
     made["watchdog_us"], made["torque"] = watchdog_us, torque
@@ -33,10 +44,7 @@ def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
         for struct, layout in STRUCTS.items()
         for name in layout.names
     ]
-    source = tmp_path / "layout.c"
-    body = "\n".join(lines)
-    source.write_text(f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\nint main(void) {{\n{body}\nreturn 0;\n}}\n')
-    told = subprocess.run([compiled(tmp_path, source, program=True)], capture_output=True, text=True, check=True).stdout
+    told = printed(tmp_path, lines)
     expected = [
         f"{struct} {name} {layout.fields[name][1]} {layout.fields[name][0].itemsize}"
         for struct, layout in STRUCTS.items()
@@ -54,7 +62,9 @@ def test_taking_a_report_apart_and_putting_one_together_agree_with_the_layout() 
         for name, value in told._asdict().items():
             np.testing.assert_array_equal(value, record[name], err_msg=name)
         torque, answers = rng.integers(-(2**31), 2**31, 3).tolist(), int(rng.integers(0, 2**32))
-        made = np.frombuffer(protocol.packed_output(True, 77, 2**32 - 1, 5000, torque, answers), protocol.OUTPUT_REPORT)[0]
+        made = np.frombuffer(
+            protocol.packed_output(True, 77, 2**32 - 1, 5000, torque, answers), protocol.OUTPUT_REPORT
+        )[0]
         assert protocol.is_sound(made.tobytes())
         assert made["torque"].tolist() == torque
         fields = ("report", "flags", "boot", "sequence", "watchdog_us", "answers")
@@ -74,10 +84,7 @@ def test_constants_are_the_header_s(tmp_path: Path) -> None:
         "HVF_CALIBRATION": protocol.CALIBRATION, "HVF_SWITCH": protocol.SWITCH, "HVF_ENABLE": protocol.ENABLE,
         "HVF_CALIBRATED": protocol.CALIBRATED,
     }  # fmt: skip
-    source = tmp_path / "constants.c"
-    body = "\n".join(f'printf("%lld\\n", (long long){name});' for name in pairs)
-    source.write_text(f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\nint main(void) {{\n{body}\nreturn 0;\n}}\n')
-    told = subprocess.run([compiled(tmp_path, source, program=True)], capture_output=True, text=True, check=True).stdout
+    told = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
     assert [int(line) for line in told.split()] == list(pairs.values())
 
 
@@ -124,7 +131,9 @@ size_t board_receive(uint8_t *b, size_t n) {{ (void)b; (void)n; return 0; }}
 void board_send(const hvf_input *r) {{ last = *r; if (now == 1000000) fwrite(&last, 1, sizeof last, stdout); }}
 void board_feed_hardware_watchdog(void) {{}}
 """)
-    program = compiled(tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True)
+    program = compiled(
+        tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True
+    )
     raw = subprocess.run([program], capture_output=True, check=True).stdout
     assert protocol.is_sound(raw)
     report = np.frombuffer(raw, protocol.INPUT_REPORT)[0]

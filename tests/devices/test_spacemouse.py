@@ -67,7 +67,9 @@ def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, 
     return np.array(vector_to_hand_frame(forward_kinematics(reading[3:6]))), reading
 
 
-@pytest.mark.parametrize(("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))])
+@pytest.mark.parametrize(
+    ("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
+)
 def test_a_push_right_towards_the_user_or_down_goes_there_at_the_top_speed(mouse, cap, clock, push, way) -> None:
     tip(mouse, clock, 1)
     cap.push(*push)
