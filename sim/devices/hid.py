@@ -184,6 +184,8 @@ class HidPhantom:
         self._bad = 0
         report = protocol.unpacked_input(raw)
         self._judge_boot(report.boot)
+        if self._last is None:
+            self._take_over(report)
         if not self._is_next(report.sequence):
             return False
         reading[READING_THETA : READING_GIMBAL + 3] = (report.encoder - self._zero) * self._angle
@@ -195,6 +197,12 @@ class HidPhantom:
         self._judge_status(report.status)
         self._judge_watchdog(report)
         return True
+
+    def _take_over(self, report: protocol.InputReport) -> None:
+        """Go on where another program stopped: with its numbers, and with motors that its silence switched off."""
+        if not 0 <= report.answered <= self._sent:
+            self._sent = report.answered
+        self._again = bool(report.status & protocol.STATUS_WATCHDOG)
 
     def _judge_boot(self, boot: int) -> None:
         if boot != self._boot:

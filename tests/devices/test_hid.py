@@ -121,6 +121,26 @@ def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
     np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
 
 
+def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_reading_on(handle, firmware, driver) -> None:
+    """The firmware takes no number twice; where the last program stopped, the device tells."""
+    reading, torque = np.zeros(9), np.array([0.1, -0.1, 0.1])
+    for _ in range(500):
+        driver.write(torque, True)
+        handle.tick()
+        driver.read(reading, 0.0)
+    for _ in range(20):
+        handle.tick()  # it was killed: the firmware switched off
+    handle.queue.clear()
+    again = HidPhantom(handle, "in memory")
+    handle.tick()
+    assert again.read(reading, 0.0)
+    for _ in range(2):
+        again.write(torque, True)
+        handle.tick()
+        assert again.read(reading, 0.0)
+    np.testing.assert_allclose(firmware.joint_torque, torque, atol=13.3e-6)
+
+
 def test_a_calibration_without_a_reading_is_refused(driver) -> None:
     with pytest.raises(SimError, match="nothing to calibrate"):
         driver.calibrate(np.zeros(3), np.zeros(3))
