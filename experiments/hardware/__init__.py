@@ -1,0 +1,1 @@
+"""Real devices: which there are, and whether this machine can drive one."""
