@@ -30,6 +30,7 @@ from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
+from experiments.render.options import Render  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -281,7 +282,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Picture:
-    """Render the Phantom and the figure of a run into a PNG file (headless: MUJOCO_GL=egl or osmesa)."""
+    """Render the Phantom and the figure of a run into a PNG file."""
 
     folder: Positional[Path]
     """Folder of a run."""
@@ -290,7 +291,7 @@ class Picture:
 
     def __call__(self) -> int:
         """Render."""
-        from experiments.results.picture import draw_picture
+        from experiments.render.picture import draw_picture
 
         draw_picture(self.folder, self.target)
         return 0
@@ -357,6 +358,7 @@ Command = (
     | Annotated[TeleArm, tyro.conf.subcommand("arm")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
+    | Annotated[Render, tyro.conf.subcommand("render")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
