@@ -29,6 +29,7 @@ from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
+from experiments.paper_figures.options import Figures  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from experiments.render.options import Render  # noqa: E402
 from models.errors import ModelError  # noqa: E402
@@ -359,6 +360,7 @@ Command = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Render, tyro.conf.subcommand("render")]
+    | Annotated[Figures, tyro.conf.subcommand("figures")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )

@@ -31,7 +31,7 @@ import os; os._exit(0)
 
 
 SUN = (38.0, -52.0)  # where its light goes: azimuth to that of the view, elevation [degrees]
-SUN_DISTANCE = 4.0  # of its shadow map from what is looked at [m]
+SUN_DISTANCE = 9.0  # of its shadow map from what is looked at [m]
 
 
 class NoGraphics(SimError):
