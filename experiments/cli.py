@@ -79,18 +79,21 @@ class Demo:
 
 @dataclass(frozen=True)
 class Convert:
-    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH."""
+    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH, or to glTF."""
 
     source: Positional[Path]
     """Motion file to read."""
     target: Positional[Path]
-    """BVH file to write."""
+    """File to write: .bvh, or .glb for glTF."""
     overwrite: bool = False
     """Replace the target if it exists."""
 
     def __call__(self) -> int:
         """Convert, and say what the file was taken for."""
-        from models.mocap.library import convert
+        if self.target.suffix.lower() == ".glb":
+            from experiments.export.gltf import convert_to_gltf as convert
+        else:
+            from models.mocap.library import convert
 
         report = convert(self.source, self.target, overwrite=self.overwrite).report
         for line in report.lines() if report else ("the figure's own skeleton: nothing to retarget",):

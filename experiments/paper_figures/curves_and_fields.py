@@ -26,7 +26,8 @@ from experiments.results.folder import config_of
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
-SECONDS = 0.12  # of a velocity that an arrow shows: 1 mm for 8 mm/s
+SECONDS = 0.25  # of motion that an arrow of Figure 1 shows
+LONGEST = 22.0  # arrow of Figure 4 [mm]
 PER_NEWTON = 6.0  # drawn length of a force [mm/N]
 POSES = 12  # around the curve
 STATURE = 24.0  # drawn length of a metre of the figure [mm]
@@ -46,7 +47,7 @@ def trajectory_and_vectors(runs: Path) -> Figure:
     path(ax, ring, CURVE, "trajectory φ", 1.8)
     at = phases[:-1:12]
     speed = MILLIMETRES * np.array([curve.velocity(phase) for phase in at])
-    arrows(ax, MILLIMETRES * curve.point(at), SECONDS * speed, TUBE, "its vectors dφ/dt")
+    arrows(ax, MILLIMETRES * curve.point(at), SECONDS * speed, TUBE, "its vectors dφ/dt", 1.8)
     path(ax, hand, USER, "a hand that pushes", 1.1)
     felt = slice(None, None, max(1, len(hand) // 26))
     arrows(ax, hand[felt], PER_NEWTON * force[felt], FIELD, "force of the field")
@@ -87,7 +88,7 @@ def field_and_map(runs: Path) -> Figure:
         ends = np.array([place + 4.0 * away, middle + (size - 0.42 * STATURE) * away])
         ax.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
         ax.plot(*place, "o", ms=3.5, color=CURVE, zorder=5)
-    ax.annotate("h", middle + (size - 0.7 * STATURE) * np.array([0.02, 1.0]), fontsize=11, style="italic")
+    ax.annotate("h", middle + np.array([0.74 * size, 2.5]), fontsize=12, style="italic")
     reach = size + 1.15 * STATURE
     ax.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]), aspect="equal")
     ax.set(xlabel="x [mm]", ylabel="y [mm]")
@@ -122,15 +123,19 @@ def v_plus_u(runs: Path) -> Figure:
     there = performed.point(at)
     v = np.array([river.flow(0.0, place) for place in there])
     u = np.array([performed.velocity(time) for time in at]) - v
+    seconds = LONGEST / (MILLIMETRES * float(np.linalg.norm(u[:, :2], axis=1).max()))
     for vectors, color, name in ((v, TUBE, "V"), (u, FIELD, "U")):
-        tips = MILLIMETRES * SECONDS * vectors[:, :2]
+        tips = MILLIMETRES * seconds * vectors[:, :2]
         left.quiver(
             *(MILLIMETRES * there[:, :2]).T, *tips.T, color=color, angles="xy", scale_units="xy", scale=1.0,
             width=0.005, zorder=4, label=name,
         )  # fmt: skip
-    left.set_title(f"V and U along φ', {1e3 * SECONDS:g} ms of motion")
+    left.set_title(f"V and U along φ', {1e3 * seconds:.0f} ms of motion")
     right.plot(line[:, 0], line[:, 1], color=FIELD, lw=4.0, alpha=0.45, label="integral curve of V + U")
-    right.set_title(f"they differ by {apart:.2g} mm RMS")
+    right.set_title(f"it is {apart:.1g} mm RMS from φ'")
     for ax in (left, right):
         ax.legend(loc="center", fontsize=8)
+    reach = 1.12 * np.abs(np.concatenate((ring, hand))[:, :2] - ring.mean(axis=0)[:2]).max()
+    middle = ring.mean(axis=0)
+    left.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
     return figure

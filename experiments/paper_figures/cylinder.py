@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.config.maps import Cylindrical
@@ -59,7 +60,7 @@ def four_motion_cylinder(runs: Path) -> Figure:
     path(ax, MILLIMETRES * ring, CURVE, "curve φ", 1.0, (0, (4, 3)))
     path(ax, MILLIMETRES * alone, FIELD, "hand in FOLLOW, left alone", 1.4)
     path(ax, MILLIMETRES * pushed, USER, "hand in FOLLOW, pushing", 1.4)
-    ax.legend(loc="upper left", bbox_to_anchor=(-0.36, 1.0))
+    ax.legend(loc="upper left", bbox_to_anchor=(-0.34, 1.0))
     strip = figure.add_subplot(grid[1])
     _strip(strip, poses, [f"{time:.1f} s" for time in times])
     strip.set_title("frames of the animation h(p) while the hand pushes")
@@ -102,11 +103,8 @@ def _painted(legs: str, rest: str) -> Paint:
     return lambda body, _rgba: legs if body.endswith(LEGS) else rest
 
 
-def _strip(ax: object, poses: Array, words: list[str], paint: Paint | None = None) -> None:
+def _strip(ax: Axes, poses: Array, words: list[str], paint: Paint | None = None) -> None:
     """Poses side by side on a floor, all seen from the side to which the first faces, with words below."""
-    from matplotlib.axes import Axes
-
-    assert isinstance(ax, Axes)
     people = Silhouettes()
     for k, pose in enumerate(poses):
         azimuth = facing(pose) + np.pi - 0.5

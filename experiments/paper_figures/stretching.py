@@ -34,7 +34,7 @@ def stretching(runs: Path) -> Figure:
     hardest = int(np.argmax(np.linalg.norm(force, axis=1)))
     figure = Figure(figsize=(9.6, 3.7), layout="constrained")
     every = np.concatenate((before, after, MILLIMETRES * performing))
-    axes = [workspace(figure, (1, 3, k), every, 46.0) for k in (1, 2, 3)]
+    axes = [workspace(figure, place, every, 46.0) for place in figure.add_gridspec(1, 3)]
     for ax, title in zip(axes, ("before", "after stretching", "FOLLOW"), strict=True):
         ax.set_title(title)
         path(ax, before, CURVE, "curve before", 1.8 if ax is axes[0] else 0.9, "-" if ax is axes[0] else (0, (4, 3)))
