@@ -27,7 +27,7 @@ def crossing_rivers(runs: Path) -> Figure:
     figure = Figure(figsize=(7.2, 6.2), layout="constrained")
     grid = figure.add_gridspec(3, 1, height_ratios=(3.4, 1.0, 0.7))
     every = MILLIMETRES * np.concatenate([course.points for course in drawn])
-    ax = workspace(figure, grid[0], np.concatenate((every, hand)), 30.0)
+    ax = workspace(figure, grid[0], np.concatenate((every, hand)), 30.0, 1.2)
     for course in drawn:
         path(ax, MILLIMETRES * course.points, course.line, "", 0.9, (0, (4, 3)))
     colored_path(ax, hand, colors, 1.6)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
@@ -25,6 +26,8 @@ from experiments.results.figures import PALE_TUBE
 from experiments.results.folder import config_of
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
+
+Array = npt.NDArray[np.float64]
 
 SECONDS = 0.25  # of motion that an arrow of Figure 1 shows
 LONGEST = 22.0  # arrow of Figure 4 [mm]
@@ -124,18 +127,21 @@ def v_plus_u(runs: Path) -> Figure:
     v = np.array([river.flow(0.0, place) for place in there])
     u = np.array([performed.velocity(time) for time in at]) - v
     seconds = LONGEST / (MILLIMETRES * float(np.linalg.norm(u[:, :2], axis=1).max()))
+    tips: list[Array] = []
     for vectors, color, name in ((v, TUBE, "V"), (u, FIELD, "U")):
-        tips = MILLIMETRES * seconds * vectors[:, :2]
+        tips.append(MILLIMETRES * seconds * vectors[:, :2])
         left.quiver(
-            *(MILLIMETRES * there[:, :2]).T, *tips.T, color=color, angles="xy", scale_units="xy", scale=1.0,
+            *(MILLIMETRES * there[:, :2]).T, *tips[-1].T, color=color, angles="xy", scale_units="xy", scale=1.0,
             width=0.005, zorder=4, label=name,
         )  # fmt: skip
     left.set_title(f"V and U along φ', {1e3 * seconds:.0f} ms of motion")
     right.plot(line[:, 0], line[:, 1], color=FIELD, lw=4.0, alpha=0.45, label="integral curve of V + U")
     right.set_title(f"it is {apart:.1g} mm RMS from φ'")
-    for ax in (left, right):
-        ax.legend(loc="center", fontsize=8)
-    reach = 1.12 * np.abs(np.concatenate((ring, hand))[:, :2] - ring.mean(axis=0)[:2]).max()
+    named = [ax.get_legend_handles_labels() for ax in (left, right)]
+    handles = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
+    every = np.concatenate((ring[:, :2], hand[:, :2], *(MILLIMETRES * there[:, :2] + tip for tip in tips)))
+    reach = 1.04 * np.abs(every - ring.mean(axis=0)[:2]).max()
     middle = ring.mean(axis=0)
     left.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
     return figure

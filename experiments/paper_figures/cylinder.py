@@ -51,7 +51,7 @@ def four_motion_cylinder(runs: Path) -> Figure:
     edges = [_edge(ring, middle, side * reach, height * reach) for height in (-1, 1) for side in (-1, 1)]
     figure = Figure(figsize=(7.2, 6.4), layout="constrained")
     grid = figure.add_gridspec(2, 1, height_ratios=(3.1, 1.0))
-    ax = workspace(figure, grid[0], MILLIMETRES * np.concatenate(edges), 30.0, -58.0)
+    ax = workspace(figure, grid[0], MILLIMETRES * np.concatenate(edges), 30.0, 1.1)
     for name, edge, color in zip(names, edges, RIVERS, strict=False):
         path(ax, MILLIMETRES * edge, color, name, 2.0)
     for k in range(0, 120, 10):
@@ -115,5 +115,5 @@ def _strip(ax: Axes, poses: Array, words: list[str], paint: Paint | None = None)
     for k, word in enumerate(words):
         ax.annotate(word, (APART * k, -0.12), ha="center", va="top", fontsize=7.5)
     ax.axhline(0.0, color="#b9bec8", lw=0.6, zorder=1)
-    ax.set(aspect="equal", xlim=(-0.7, APART * (len(poses) - 1) + 0.7), ylim=(-0.35 if words else -0.05, 2.05))
+    ax.set(aspect="equal", xlim=(-0.7, APART * (len(poses) - 1) + 0.7), ylim=(-0.35, 2.05))
     ax.axis("off")

@@ -24,7 +24,7 @@ def configs() -> dict[str, RunConfig]:
         CYLINDER: demo_config(),
         COMPOSITE: RunConfig(map=Composite(), user=User(does="push"), seconds=9.0),
         STRETCH: RunConfig(mode=StretchThenFollow()),
-        RIVERS: RunConfig(mode=Rivers(), map=RiverClips(), user=User(does="push")),
+        RIVERS: RunConfig(mode=Rivers(), map=RiverClips(), user=User(does="push"), seconds=8.0),
     }
 
 

@@ -10,16 +10,18 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 Array = npt.NDArray[np.float64]
 
+_AZIMUTH = -60.0  # of who looks [degrees]
 
-def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0, azimuth: float = -62.0) -> Axes3D:
+
+def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0, zoom: float = 1.0) -> Axes3D:
     """Axes of the hand frame [mm] around points (n, 3) in millimetres, all to one scale."""
     ax: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.06 * float(np.max(high - low))
     ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
     ax.set(zlim=(low[2] - margin, high[2] + margin), xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
-    ax.set_box_aspect(high - low + 2.0 * margin)
-    ax.view_init(elev=elevation, azim=azimuth)
+    ax.set_box_aspect(high - low + 2.0 * margin, zoom=zoom)
+    ax.view_init(elev=elevation, azim=_AZIMUTH)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis._axinfo["grid"].update(color="#e6e8ec", linewidth=0.6)

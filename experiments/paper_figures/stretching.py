@@ -14,7 +14,7 @@ from experiments.render.graphics import offscreen_backend
 from sim.recording.recording import Recording, RecordingError
 from sim.viewer.palette import CURVE, FIELD, USER
 
-FORCE = 18.0  # drawn length of the force in the last panel [mm]
+FORCE = 30.0  # drawn length of the force in the last panel [mm]
 MOMENTS = 4
 _WIDTH, _HEIGHT = 1280, 720
 
@@ -34,7 +34,7 @@ def stretching(runs: Path) -> Figure:
     hardest = int(np.argmax(np.linalg.norm(force, axis=1)))
     figure = Figure(figsize=(9.6, 3.7), layout="constrained")
     every = np.concatenate((before, after, MILLIMETRES * performing))
-    axes = [workspace(figure, place, every, 46.0) for place in figure.add_gridspec(1, 3)]
+    axes = [workspace(figure, place, every, 46.0, 1.25) for place in figure.add_gridspec(1, 3)]
     for ax, title in zip(axes, ("before", "after stretching", "FOLLOW"), strict=True):
         ax.set_title(title)
         path(ax, before, CURVE, "curve before", 1.8 if ax is axes[0] else 0.9, "-" if ax is axes[0] else (0, (4, 3)))

@@ -4,12 +4,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.render.captions import Captions, Entry, halved
 from experiments.render.film_file import FilmFile, check_target
 from experiments.render.graphics import Canvas, Image, offscreen_backend
@@ -21,6 +23,7 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, TUBE, USER
 
+Array = npt.NDArray[np.float64]
 Show = Literal["both", "workspace", "stage"]
 
 WORKSPACE_SHARE = 0.42  # of the width, where both are shown
@@ -87,7 +90,9 @@ class Frames:
     """
 
     def __init__(self, recording: Recording, folder: Path, film: Film, backend: str):
-        self._film, self._world = film, shown_world(recording, film.width, film.height)
+        self._film = film
+        self._bent_from, bent = _bent(recording, folder)
+        self._world = shown_world(recording, film.width, film.height, bent)
         self.moments: Timeline = timeline(
             recording, folder, self._world, film.fps, film.start, film.seconds, film.ghost
         )
@@ -107,6 +112,7 @@ class Frames:
     def frame(self, row: int) -> Image:
         """The frame of a row, shape (height, width, 3)."""
         self.stage.put(row)
+        self._world.show_bent(bool(self.moments.t[row] >= self._bent_from))
         height, time = self._film.height, f"{self.moments.t[row]:.1f} s"
         parts: list[Image] = []
         if self._left:
@@ -125,6 +131,15 @@ class Frames:
     def close(self) -> None:
         """Give the buffers back."""
         self._canvas.close()
+
+
+def _bent(recording: Recording, folder: Path) -> tuple[float, Array | None]:
+    """From when a bent curve is performed [s], and its points; never, and none, where there is none."""
+    told = (recording.summary or {}).get("performance")
+    if not isinstance(told, dict) or not (folder / CURVE_FILE).exists():
+        return np.inf, None
+    curve = load_curve(folder / CURVE_FILE)
+    return float(cast(dict[str, float], told)["start"]), curve.point(np.linspace(curve.start, curve.end, 400))
 
 
 def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:

@@ -16,7 +16,7 @@ from models.humanoid.skeleton import N_POSE, figure_spec
 from models.scene import FIGURE, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
-from sim.viewer.palette import TUBE, rgb
+from sim.viewer.palette import FIELD, TUBE, rgb
 from sim.viewer.replay_html import drawn_tube
 from sim.viewer.shapes import tube
 
@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 Rgba = tuple[float, float, float, float]
 
 GHOST = "ghost/"
+BENT = "bent"
 CURVE_RADIUS = 0.0009  # [m]
 TUBE_OPACITY = 0.17
 GHOST_WHITE = 0.45  # share of white in the ghost's colour
@@ -67,6 +68,11 @@ class ShownWorld:
         """Where the figure's pose begins."""
         return int(self.model.joint(FIGURE + "root").qposadr[0])
 
+    def show_bent(self, shown: bool) -> None:
+        """Show the bent curve, or hide it."""
+        if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, BENT) >= 0:
+            self.model.geom(BENT).rgba[3] = float(shown)
+
     def put(self, qpos: Array, ghost: Array | None = None) -> None:
         """Put the world into a recorded configuration, and its ghost into a pose."""
         self.data.qpos[: self.recorded] = qpos
@@ -76,8 +82,16 @@ class ShownWorld:
         mujoco.mj_camlight(self.model, self.data)
 
 
-def shown_world(recording: Recording, width: int, height: int) -> ShownWorld:
+def shown_world(recording: Recording, width: int, height: int, bent: Array | None = None) -> ShownWorld:
     """The world of a recording, for pictures of up to width × height pixels.
+
+    Parameters
+    ----------
+    recording : Recording
+    width, height : int
+        [pixels]
+    bent : array (n, 3), optional
+        Points of the curve as the hand bent it, in H [m]; hidden until `ShownWorld.show_bent`.
 
     Raises
     ------
@@ -93,6 +107,8 @@ def shown_world(recording: Recording, width: int, height: int) -> ShownWorld:
             geom.rgba = np.array(mixed_with_white(TUBE, GHOST_WHITE))
         spec.attach(figure, prefix=GHOST, frame=spec.worldbody.add_frame())
     _draw_courses(spec, recording)
+    if bent is not None:
+        _draw(spec, BENT, bent, 1.5 * CURVE_RADIUS, mixed_with_white(FIELD, 0.0, 0.0))
     _sort(spec)
     _light(spec)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
@@ -114,15 +130,19 @@ def _draw_courses(spec: mujoco.MjSpec, recording: Recording) -> None:
         looks = [("curve", CURVE_RADIUS, mixed_with_white(course.line, 0.0))]
         looks += [("tube", radius, mixed_with_white(course.tube, 0.0, TUBE_OPACITY))] * (radius > 0.0)
         for name, thickness, color in looks:
-            vertices, faces = tube(P_WH + course.points, thickness)
-            spec.add_mesh(
-                name=f"{name}{k}", uservert=vertices.ravel().tolist(), userface=faces.ravel().tolist(),
-                smoothnormal=True, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-            )  # fmt: skip
-            spec.worldbody.add_geom(
-                name=f"{name}{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{name}{k}", rgba=color,
-                contype=0, conaffinity=0,
-            )  # fmt: skip
+            _draw(spec, f"{name}{k}", course.points, thickness, color)
+
+
+def _draw(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color: Rgba) -> None:
+    """A tube around points of the hand frame as one surface."""
+    vertices, faces = tube(P_WH + points, thickness)
+    spec.add_mesh(
+        name=name, uservert=vertices.ravel().tolist(), userface=faces.ravel().tolist(),
+        smoothnormal=True, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )  # fmt: skip
+    spec.worldbody.add_geom(
+        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=color, contype=0, conaffinity=0
+    )
 
 
 def _sort(spec: mujoco.MjSpec) -> None:
