@@ -32,6 +32,9 @@ from experiments.files.json_text import json_text  # noqa: E402
 from experiments.paper_figures.options import Figures  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from experiments.render.options import Render  # noqa: E402
+from experiments.results.folder import RECORDING  # noqa: E402
+from experiments.welcome import WELCOME, next_step  # noqa: E402
+from experiments.working import working  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -181,10 +184,12 @@ class Certify:
 
         if self.clip is not None:
             folder = self.out or Path(f"runs/certificate-{Path(self.clip).stem}")
-            return certify_clip_into(self.clip, folder, self._judging())
+            with working("certifying a clip"):
+                return certify_clip_into(self.clip, folder, self._judging())
         config, clips = self._what()
         folder = self.out or Path("runs/certificate")
-        return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
+        with working("certifying"):
+            return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
 
     def _checked(self, file: Path) -> Certificate | None:
         from experiments.certify.certified_field import certificate_inputs
@@ -219,7 +224,9 @@ class Repair:
         """Repair, and say what was changed."""
         from experiments.flights.repair import repair_file
 
-        for line in repair_file(self.source, self.target, self.overwrite).lines():
+        with working("repairing"):
+            repaired = repair_file(self.source, self.target, self.overwrite)
+        for line in repaired.lines():
             print(line)
         return 0
 
@@ -264,7 +271,8 @@ class Lift:
         """Lift, and say what came of it."""
         from experiments.lifting.lift import lift_into
 
-        report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
+        with working("lifting", len(self.clips)):
+            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
         print(json_text(report.to_json()) if self.json else "\n".join(report.lines()))
         return 0
 
@@ -280,7 +288,8 @@ class Report:
         """Draw."""
         from experiments.results.report_of import write_report_of
 
-        write_report_of(self.folder)
+        with working("drawing the report"):
+            write_report_of(self.folder)
         return 0
 
 
@@ -297,7 +306,8 @@ class Picture:
         """Render."""
         from experiments.render.picture import draw_picture
 
-        draw_picture(self.folder, self.target)
+        with working("drawing"):
+            draw_picture(self.folder, self.target)
         return 0
 
 
@@ -323,7 +333,8 @@ class Bench:
         """Measure."""
         from experiments.studies.benchmarks import bench
 
-        bench()
+        with working("measuring speed"):
+            bench()
         return 0
 
 
@@ -383,11 +394,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
-        print(f"hvf {version('haptic-vector-fields')}")
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words in ([], ["--version"]):
+        print(WELCOME if not words else f"hvf {version('haptic-vector-fields')}")
         return 0
+    command: Command | None = None
     try:
-        return parsed(arguments)()
+        command = parsed(arguments)
+        return command()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -398,8 +412,15 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf: {said}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("hvf: stopped; what was recorded so far is kept", file=sys.stderr)
+        print(f"hvf: stopped; {_kept(command)}", file=sys.stderr)
         return 130
+
+
+def _kept(command: Command | None) -> str:
+    """What is left of a command that was stopped, and how to go on."""
+    if isinstance(command, Run | Demo) and (command.out / RECORDING).exists():
+        return next_step(str(command.out))
+    return "nothing is left half done"
 
 
 def parsed(arguments: Sequence[str] | None) -> Command:
