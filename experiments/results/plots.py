@@ -70,14 +70,19 @@ canvas.plot { width: 100%; height: 9rem; touch-action: pan-y; }
 
 def _plots(recording: Recording) -> list[Plot]:
     """Distance, forces, and of a physical figure how well it follows."""
-    ticks, frames = recording.groups["ticks"], recording.groups["frames"]
+    ticks, frames = recording.groups["ticks"], recording.groups.get("frames", {})
     found: list[Plot] = []
     if "distance" in ticks:
         source = recording.texts.get("distance_from", "the curve")
         distance = Line("distance", CURVE, 1e3 * _largest(ticks["distance"][:]))
         found.append(Plot(f"distance of the hand from {source}", "mm", (distance,)))
-    norms = {name: _largest(np.linalg.norm(ticks[name][:], axis=1)) for name in ("force", "user")}
-    found.append(Plot("forces", "N", (Line("field", FIELD, norms["force"]), Line("hand", USER, norms["user"]))))
+    forces = (("force", "field", FIELD), ("user", "hand", USER))
+    lines = [
+        Line(name, color, _largest(np.linalg.norm(ticks[channel][:], axis=1)))
+        for channel, name, color in forces
+        if channel in ticks
+    ]
+    found += [Plot("forces", "N", tuple(lines))] * bool(lines)
     if "joint_error" in frames and "body_weight" in recording.arrays:
         weight = float(recording.array("body_weight"))
         residual = 100.0 * _largest(np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
