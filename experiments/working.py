@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
@@ -38,7 +38,7 @@ def left(elapsed: float, expected: float | None) -> str:
 
 
 @contextmanager
-def working(what: str, share: float = 1.0) -> Iterator[None]:
+def working(what: str, share: float = 1.0) -> Generator[None]:
     """Tell on stderr, where a person looks, what is done and how long it still takes.
 
     Parameters

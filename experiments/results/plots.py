@@ -36,6 +36,8 @@ def plots_html(recording: Recording) -> str:
     """A section of a page with the plots of a recording; an empty text if it has none."""
     t = recording.channel("ticks", "t")
     plots = _plots(recording)
+    if not plots:
+        return ""
     data = {
         "start": float(t[0]), "end": float(t[-1]),
         "plots": [
@@ -53,7 +55,7 @@ def plots_html(recording: Recording) -> str:
     # A text in a script must not end it.
     numbers = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return (
-        f'{_STYLE}{canvases}<p>Wheel or two fingers zoom, dragging moves, <button id="plot-all">all</button> shows the '
+        f'{_STYLE}<h2>Over time</h2>{canvases}<p>Wheel or two fingers zoom, dragging moves, <button id="plot-all">all</button> shows the '
         f"whole run; the red line is where the replay is.</p>"
         f'<script type="application/json" id="plot-data">{numbers}</script><script>{script}</script>'
     )

@@ -43,7 +43,6 @@ hand; where that is above {push:g} N, the path is orange too. {curves}
 {replayed}
 The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
 their true size.</p>
-<h2>Over time</h2>
 {plots}
 <h2>Figures</h2>
 <div class="figures">{figures}</div>

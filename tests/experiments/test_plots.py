@@ -1,4 +1,4 @@
-"""Plots of a run's page: their numbers are the recording's, no peak is lost, and the browser's line follows the replay."""
+"""Plots of a run's page: their numbers are the recording's, no peak is lost, and a line is where the replay is."""
 
 import json
 import re
@@ -51,8 +51,8 @@ def test_in_a_browser_the_wheel_zooms_and_the_line_is_where_the_replay_is(tmp_pa
     replay = "<div role=slider aria-valuenow=5.5></div>"
     page_file = tmp_path / "page.html"
     page_file.write_text(
-        f'<!DOCTYPE html><meta name="viewport" content="width=device-width"><iframe title="Replay in 3D" srcdoc="{replay}">'
-        f"</iframe>{section(tmp_path)}",
+        '<!DOCTYPE html><meta name="viewport" content="width=device-width">'
+        f'<iframe title="Replay in 3D" srcdoc="{replay}"></iframe>{section(tmp_path)}',
         encoding="utf-8",
     )
     with playwright.sync_playwright() as p:
