@@ -48,15 +48,16 @@ def plots_html(recording: Recording) -> str:
     canvases = "".join(
         f'<div class="over-time"><b>{html.escape(plot.title)}</b> [{html.escape(plot.unit)}] '
         + " ".join(f'<span style="color:{line.color}">{html.escape(line.name)}</span>' for line in plot.lines)
-        + f' <output></output></div><canvas class="plot" role="img" aria-label="{html.escape(plot.title)}"></canvas>'
+        + " <output></output></div>"
+        + f'<canvas class="plot" role="img" aria-label="{html.escape(plot.title)}"></canvas>'
         for plot in plots
     )
     script = files("experiments.results").joinpath("plots.js").read_text(encoding="utf-8")
     # A text in a script must not end it.
     numbers = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return (
-        f'{_STYLE}<h2>Over time</h2>{canvases}<p>Wheel or two fingers zoom, dragging moves, <button id="plot-all">all</button> shows the '
-        f"whole run; the red line is where the replay is.</p>"
+        f"{_STYLE}<h2>Over time</h2>{canvases}<p>Wheel or two fingers zoom, dragging moves, "
+        '<button id="plot-all">all</button> shows the whole run; the red line is where the replay is.</p>'
         f'<script type="application/json" id="plot-data">{numbers}</script><script>{script}</script>'
     )
 

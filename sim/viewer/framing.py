@@ -1,4 +1,4 @@
-"""What keeps a replay in the picture: arrows of a length that fits, and a floor that goes with a figure that travels."""
+"""What keeps a replay in the picture: arrows of a length that fits, and a camera that goes with who travels."""
 
 import numpy as np
 import numpy.typing as npt
