@@ -30,7 +30,12 @@ from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
 from experiments.hardware.command import Hardware  # noqa: E402
+from experiments.paper_figures.options import Figures  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
+from experiments.render.options import Render  # noqa: E402
+from experiments.results.folder import RECORDING  # noqa: E402
+from experiments.welcome import WELCOME, next_step  # noqa: E402
+from experiments.working import working  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -78,18 +83,21 @@ class Demo:
 
 @dataclass(frozen=True)
 class Convert:
-    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH."""
+    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH, or to glTF."""
 
     source: Positional[Path]
     """Motion file to read."""
     target: Positional[Path]
-    """BVH file to write."""
+    """File to write: .bvh, or .glb for glTF."""
     overwrite: bool = False
     """Replace the target if it exists."""
 
     def __call__(self) -> int:
         """Convert, and say what the file was taken for."""
-        from models.mocap.library import convert
+        if self.target.suffix.lower() == ".glb":
+            from experiments.export.gltf import convert_to_gltf as convert
+        else:
+            from models.mocap.library import convert
 
         report = convert(self.source, self.target, overwrite=self.overwrite).report
         for line in report.lines() if report else ("the figure's own skeleton: nothing to retarget",):
@@ -177,10 +185,12 @@ class Certify:
 
         if self.clip is not None:
             folder = self.out or Path(f"runs/certificate-{Path(self.clip).stem}")
-            return certify_clip_into(self.clip, folder, self._judging())
+            with working("certifying a clip"):
+                return certify_clip_into(self.clip, folder, self._judging())
         config, clips = self._what()
         folder = self.out or Path("runs/certificate")
-        return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
+        with working("certifying"):
+            return certify_into(config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging())
 
     def _checked(self, file: Path) -> Certificate | None:
         from experiments.certify.certified_field import certificate_inputs
@@ -215,7 +225,9 @@ class Repair:
         """Repair, and say what was changed."""
         from experiments.flights.repair import repair_file
 
-        for line in repair_file(self.source, self.target, self.overwrite).lines():
+        with working("repairing"):
+            repaired = repair_file(self.source, self.target, self.overwrite)
+        for line in repaired.lines():
             print(line)
         return 0
 
@@ -260,7 +272,8 @@ class Lift:
         """Lift, and say what came of it."""
         from experiments.lifting.lift import lift_into
 
-        report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
+        with working("lifting", len(self.clips)):
+            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
         print(json_text(report.to_json()) if self.json else "\n".join(report.lines()))
         return 0
 
@@ -276,13 +289,14 @@ class Report:
         """Draw."""
         from experiments.results.report_of import write_report_of
 
-        write_report_of(self.folder)
+        with working("drawing the report"):
+            write_report_of(self.folder)
         return 0
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Render the Phantom and the figure of a run into a PNG file (headless: MUJOCO_GL=egl or osmesa)."""
+    """Render the Phantom and the figure of a run into a PNG file."""
 
     folder: Positional[Path]
     """Folder of a run."""
@@ -291,9 +305,10 @@ class Picture:
 
     def __call__(self) -> int:
         """Render."""
-        from experiments.results.picture import draw_picture
+        from experiments.render.picture import draw_picture
 
-        draw_picture(self.folder, self.target)
+        with working("drawing"):
+            draw_picture(self.folder, self.target)
         return 0
 
 
@@ -319,7 +334,8 @@ class Bench:
         """Measure."""
         from experiments.studies.benchmarks import bench
 
-        bench()
+        with working("measuring speed"):
+            bench()
         return 0
 
 
@@ -358,6 +374,8 @@ Command = (
     | Annotated[TeleArm, tyro.conf.subcommand("arm")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
+    | Annotated[Render, tyro.conf.subcommand("render")]
+    | Annotated[Figures, tyro.conf.subcommand("figures")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Hardware, tyro.conf.subcommand("hardware")]
@@ -378,11 +396,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    if list(sys.argv[1:] if arguments is None else arguments) == ["--version"]:
-        print(f"hvf {version('haptic-vector-fields')}")
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words in ([], ["--version"]):
+        print(WELCOME if not words else f"hvf {version('haptic-vector-fields')}")
         return 0
+    command: Command | None = None
     try:
-        return parsed(arguments)()
+        command = parsed(arguments)
+        return command()
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
@@ -393,8 +414,15 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf: {said}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("hvf: stopped; what was recorded so far is kept", file=sys.stderr)
+        print(f"hvf: stopped; {_kept(command)}", file=sys.stderr)
         return 130
+
+
+def _kept(command: Command | None) -> str:
+    """What is left of a command that was stopped, and how to go on."""
+    if isinstance(command, Run | Demo) and (command.out / RECORDING).exists():
+        return next_step(str(command.out))
+    return "nothing is left half done"
 
 
 def parsed(arguments: Sequence[str] | None) -> Command:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
@@ -19,7 +19,8 @@ def compile_once(console: Console, units: Sequence[Unit]) -> None:
         return
     console.print("Compiling what this run needs; it is kept until that changes.")
     columns = (TextColumn("compiling"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
-    with Progress(*columns, TimeElapsedColumn(), TextColumn("{task.fields[names]}"), console=console) as progress:
+    told = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[names]}"))
+    with Progress(*columns, *told, console=console) as progress:
         task = progress.add_task("", total=len(waiting), names=_names(waiting))
 
         def done(unit: Unit) -> None:

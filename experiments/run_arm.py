@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict
@@ -49,7 +50,12 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     with Recorder(out / RECORDING, to_dict(config), config.seed, arm_groups(servo), static) as recorder:
         loop, first = Loop(servo, world, record_arm(recorder, servo, world)), servo.plant.period * config.arm_ticks
         loop.run(first)
-        times = loop.run(config.seconds - first)
+        with Progress(
+            TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
+            TimeRemainingColumn(), console=console,
+        ) as bar:  # fmt: skip
+            task = bar.add_task("", total=config.seconds)
+            times = loop.run(config.seconds - first, lambda t: bar.update(task, completed=t))
         recorder.flush()
         with Recording(out / RECORDING) as recording:
             summary = arm_summary(recording, world.arm, config, times.real_time_factor)

@@ -1,5 +1,6 @@
 """The physical figure on its own, following clips: how well, and with how much help."""
 
+import time
 from dataclasses import asdict
 
 from rich.console import Console
@@ -8,7 +9,7 @@ from experiments.compiling import compile_once
 from experiments.files.json_text import json_text
 from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
-from sim.body.tracking import track
+from sim.body.tracking import TrackingReport, track
 from sim.compilation.units import Unit
 
 
@@ -38,7 +39,13 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
     def ready(units: tuple[Unit, ...]) -> None:
         compile_once(console, units)
 
-    reports = {name: track(clip, seconds, ready=ready) for name, clip in zip(names, clips, strict=True)}
+    reports: dict[str, TrackingReport] = {}
+    began = time.perf_counter()
+    for k, (name, clip) in enumerate(zip(names, clips, strict=True)):
+        reports[name] = track(clip, seconds, ready=ready)
+        rest = (len(names) - k - 1) * (time.perf_counter() - began) / (k + 1)
+        if rest > 0.0:
+            console.print(f"{k + 1} of {len(names)} clips tracked, about {rest:.0f} s left", highlight=False)
     if as_json:
         print(json_text({name: asdict(report) for name, report in reports.items()}))
         return

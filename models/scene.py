@@ -78,8 +78,8 @@ def _add_table(world: mujoco.MjsBody) -> None:
             world.add_geom(type=box, size=[0.02, 0.02, height], pos=leg, rgba=wood, contype=0, conaffinity=0)
 
 
-def _device_spec(config: SceneConfig) -> mujoco.MjSpec:
-    """Floor, table and Phantom (prefix ``phantom/``)."""
+def device_spec(config: SceneConfig) -> mujoco.MjSpec:
+    """The world without a figure, before compilation: floor, table and Phantom (prefix ``phantom/``)."""
     spec = mujoco.MjSpec()
     spec.modelname = "haptic vector fields"
     spec.option.timestep = config.servo_period / config.substeps()
@@ -110,7 +110,7 @@ def _device_spec(config: SceneConfig) -> mujoco.MjSpec:
 
 def world_spec(config: SceneConfig) -> mujoco.MjSpec:
     """The world before compilation: floor, table, Phantom (prefix ``phantom/``) and figure (``figure/``)."""
-    spec = _device_spec(config)
+    spec = device_spec(config)
     spec.attach(figure_spec(config.stature, config.mass), prefix=FIGURE, frame=spec.worldbody.add_frame())
     return spec
 
@@ -134,22 +134,27 @@ def device_world_model(config: SceneConfig) -> mujoco.MjModel:
     ModelError
         If the rates do not divide.
     """
-    return _device_spec(config).compile()
+    return device_spec(config).compile()
 
 
-def robot_world_model(config: SceneConfig) -> mujoco.MjModel:
-    """The compiled world with a robot arm (prefix ``robot/``) on a pedestal in the place of the figure.
-
-    Raises
-    ------
-    ModelError
-        If the rates do not divide.
-    """
-    spec = _device_spec(config)
+def robot_spec(config: SceneConfig) -> mujoco.MjSpec:
+    """The world with a robot arm (prefix ``robot/``) on a pedestal in the place of the figure, before compilation."""
+    spec = device_spec(config)
     height = 0.5 * PEDESTAL
     pedestal = spec.worldbody.add_body(name=ROBOT + "pedestal", pos=[0.0, 0.0, height])
     pedestal.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.16, 0.16, height], rgba=[0.55, 0.57, 0.6, 1.0], contype=0, conaffinity=0
     )
     spec.attach(arm_spec(), prefix=ROBOT, frame=pedestal.add_frame(pos=[0.0, 0.0, height]))
-    return spec.compile()
+    return spec
+
+
+def robot_world_model(config: SceneConfig) -> mujoco.MjModel:
+    """The compiled world of `robot_spec`.
+
+    Raises
+    ------
+    ModelError
+        If the rates do not divide.
+    """
+    return robot_spec(config).compile()

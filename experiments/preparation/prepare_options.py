@@ -31,12 +31,14 @@ class Prepare:
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
         from experiments.preparation.command import prepare_file, summary
+        from experiments.working import working
         from models.mocap.preparation.well_formed import well_formed
         from models.mocap.retargeting.retarget import Hints
 
-        made = prepare_file(
-            self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
-            self.overwrite,
-        )  # fmt: skip
+        with working("preparing"):
+            made = prepare_file(
+                self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
+                self.overwrite,
+            )  # fmt: skip
         print(summary(made, well_formed(made.clip)))
         return 0

@@ -59,6 +59,11 @@ def clips_of(recording: Recording) -> tuple[Clip, ...]:
 
 def world_of(recording: Recording) -> mujoco.MjModel:
     """The model that a recording's configurations are of: with the figure if there was one."""
-    stature, mass, servo_period, physics_step = (float(number) for number in recording.array("scene"))
     kind = cast(FigureKind, recording.texts["figure"])
-    return World(SceneConfig(stature, mass, servo_period, physics_step), kind).full_model()
+    return World(scene_of(recording), kind).full_model()
+
+
+def scene_of(recording: Recording) -> SceneConfig:
+    """What the world of a recording was made of."""
+    stature, mass, servo_period, physics_step = (float(number) for number in recording.array("scene"))
+    return SceneConfig(stature, mass, servo_period, physics_step)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import mujoco
 
+from experiments.results.plots import plots_html
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
@@ -27,7 +28,8 @@ ul {{ margin: 0 0 1rem; padding-left: 1.2rem; }}
 iframe {{ width: 100%; height: min(42rem, 80vh); border: 1px solid #d9dde4; border-radius: 6px; }}
 p {{ font-size: .9rem; color: #566072; margin: .5rem 0; }}
 p b {{ font-weight: 600; }}
-.figures {{ columns: 26rem; column-gap: 1.5rem; }}
+.figures {{ columns: min(26rem, 100%); column-gap: 1.5rem; }}
+@media (max-width: 600px) {{ body {{ padding: .8rem; }} ul {{ overflow-wrap: anywhere; }} iframe {{ height: 70vh; }} }}
 img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
 </style>
 </head>
@@ -41,6 +43,7 @@ hand; where that is above {push:g} N, the path is orange too. {curves}
 {replayed}
 The Phantom is drawn {magnification:g} times larger and beside the figures; the simulation has them in one world at
 their true size.</p>
+{plots}
 <h2>Figures</h2>
 <div class="figures">{figures}</div>
 <h2>Made with</h2>
@@ -93,6 +96,7 @@ def write_report(
             lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
             replay=html.escape(replay_html(recording, model, target)),
             replayed=replayed,
+            plots=plots_html(recording),
             curves=_curves(recording, tube),
             push=PUSH,
             field=FIELD,

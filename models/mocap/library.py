@@ -119,7 +119,9 @@ def convert(source: Path, target: Path, overwrite: bool = False, hints: Hints | 
         If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
     """
     if target.suffix.lower() != ".bvh":
-        raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
+        raise ModelError(
+            f"cannot write {target}: only BVH and glTF are written; expected a name that ends in .bvh, .glb"
+        )
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
     loaded = load(source, hints)

@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from sim.recording.recording import Channel, Recording
+from sim.recording.recording import Recording
 from sim.viewer.courses import Course, courses
+from sim.viewer.framing import followed, typical_peak
 from sim.viewer.palette import FIELD, PUSH, TUBE, USER, rgb
 from sim.viewer.shapes import Shape, body_shapes, tube
 
@@ -28,7 +29,6 @@ MAGNIFICATION = 4.0
 PHANTOM_AT = np.array([1.35, -0.55, 1.0])  # where the origin of the hand frame is drawn [m]
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
 ARROW = 0.6  # drawn length of a large force [m]
-TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
 TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
 TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
 # The only notification a replay can give is that the browser renders in software.
@@ -148,7 +148,7 @@ class _Stage:
         self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
         self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
         self._ghost = _Actor(scene, "ghost", figure if self._simulated else [], 1.0, ghost=True)
-        peak = max(_typical_peak(self._ticks["force"]), _typical_peak(self._ticks["user"]), 1e-9)
+        peak = max(typical_peak(self._ticks["force"]), typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
             name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))
         }
@@ -205,17 +205,17 @@ class _Stage:
         ticks, frames = (np.minimum(np.searchsorted(t, shown), len(t) - 1) for t in (times, frame_times))
         shows = "reference" in self._frames
         roots = np.array([self._frames["reference"][int(k)][:2] for k in frames]) if shows else np.zeros((n, 2))
-        followed = _followed(roots) if self._travels else np.zeros_like(roots)
+        shifts = followed(roots, FPS) if self._travels else np.zeros_like(roots)
         piece = int(TRAIL_SECONDS * FPS)
         for i in range(n):
-            self._show(int(ticks[i]), int(frames[i]), followed[i])
+            self._show(int(ticks[i]), int(frames[i]), shifts[i])
             if i % piece == 0 and i > 0:
                 self._extend_trail(i // piece, int(ticks[i - piece]), int(ticks[i]))
             serializer.insert_sleep(1 / FPS)
         return serializer.as_html()
 
-    def _show(self, tick: int, frame: int, followed: Array) -> None:
-        shift = np.array([*followed, 0.0])
+    def _show(self, tick: int, frame: int, shifted: Array) -> None:
+        shift = np.array([*shifted, 0.0])
         self._data.qpos[:] = self._frames["qpos"][frame]
         mujoco.mj_kinematics(self._model, self._data)
         self._phantom.pose(self._data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
@@ -242,18 +242,3 @@ class _Stage:
         vertices, faces = tube(points[moved], 0.007, sides=8)
         color = rgb(USER if pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)
-
-
-def _typical_peak(channel: Channel) -> float:
-    """Norm that only a two-hundredth of the rows exceeds, so that a jolt does not shrink all other arrows."""
-    return float(np.percentile(np.linalg.norm(channel[:: max(1, len(channel) // 20000)], axis=1), 99.5))
-
-
-def _followed(roots: Array) -> Array:
-    """What is subtracted from positions (n, 2): nothing, or the path of a travelling root, smoothed over a second."""
-    if np.max(np.linalg.norm(roots - roots[0], axis=1)) < TRAVEL:
-        return np.zeros_like(roots)
-    window = int(FPS) | 1
-    padded = np.pad(roots, ((window // 2, window // 2), (0, 0)), mode="edge")
-    kernel = np.full(window, 1 / window)
-    return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(2)], axis=1)

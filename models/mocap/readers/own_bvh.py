@@ -22,7 +22,11 @@ _CENTIMETRES = 100.0
 _TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),
          "left_ankle": (0.165, 0.0, -0.048), "right_ankle": (0.165, 0.0, -0.048)}  # fmt: skip
 _TO_FILE = [1, 2, 0]  # file axis k is world axis _TO_FILE[k]
-_TO_WORLD = [2, 0, 1]
+_AXES = {
+    "own": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "Blender's": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),  # Z up, facing −Y
+}
+"""From a file's axes to the world's: as written here, and as Blender writes the same skeleton after it was imported."""
 
 
 def _rotation_order(joint: str) -> tuple[int, int, int]:
@@ -135,15 +139,16 @@ def _vector(world: Array) -> str:
 
 
 def own_clip(motion: SourceMotion) -> Clip | None:
-    """The clip in a file that `write_bvh` wrote (same joints, same bones); None for any other skeleton."""
+    """The clip in a file that `write_bvh` wrote, or Blender of it (same joints and bones); None for any other."""
     if motion.joints != tuple(segment.joint for segment in SEGMENTS):
         return None
     if motion.parents != tuple(segment.parent for segment in SEGMENTS):
         return None
     model = figure_model()
-    bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:, _TO_FILE] * _CENTIMETRES
-    if np.abs(motion.offsets[1:] - bones).max() > 1e-4:
-        return None
-    quaternion = motion.rotations[..., [0, *(1 + axis for axis in _TO_WORLD)]]
-    position = motion.translations[:, 0, _TO_WORLD] / _CENTIMETRES
-    return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)
+    bones = np.array([model.body(segment.body).pos for segment in SEGMENTS])[1:] * _CENTIMETRES
+    for turn in _AXES.values():
+        if np.abs(motion.offsets[1:] @ turn.T - bones).max() <= 1e-4:
+            quaternion = np.concatenate((motion.rotations[..., :1], motion.rotations[..., 1:] @ turn.T), axis=-1)
+            position = motion.translations[:, 0] @ turn.T / _CENTIMETRES
+            return Clip(np.hstack((position, quaternion.reshape(motion.n_frames, -1))), motion.fps, motion.path.stem)
+    return None

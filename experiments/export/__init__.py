@@ -1,0 +1,1 @@
+"""The figure's animation for other programs."""

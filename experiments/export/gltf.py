@@ -1,0 +1,186 @@
+"""glTF of the figure's motion (glTF 2.0, binary): a skeleton of 18 joints, its animation, and a skin of its shapes.
+
+Axes are glTF's, Y up and facing +Z, in metres: the world's (x, y, z) is the file's (X, Y, Z) = (y, z, x), a turn, as in
+the BVH. So a quaternion's vector part changes places likewise, and glTF writes it x, y, z, w.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.errors import ModelError
+from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
+from models.mocap.clip import Clip
+from models.mocap.library import Loaded, load
+from sim.viewer.shapes import body_shapes
+
+Array = npt.NDArray[np.float64]
+
+_TO_FILE = [1, 2, 0]
+_FLOAT, _UNSIGNED_BYTE, _UNSIGNED_INT = 5126, 5121, 5125
+_VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
+
+
+class _Buffer:
+    """The binary part of a file, and where what stands in it."""
+
+    def __init__(self, library: Any, document: Any):
+        self._library, self._document, self._bytes = library, document, bytearray()
+
+    def add(self, values: npt.ArrayLike, kind: str, component: int, target: int | None = None) -> int:
+        """Append rows of numbers; returns the number of their accessor."""
+        dtype = {_FLOAT: "<f4", _UNSIGNED_BYTE: "u1", _UNSIGNED_INT: "<u4"}[component]
+        rows = np.ascontiguousarray(values, dtype=dtype)
+        raw = rows.tobytes()
+        self._document.bufferViews.append(
+            self._library.BufferView(buffer=0, byteOffset=len(self._bytes), byteLength=len(raw), target=target)
+        )
+        table = rows.reshape(len(rows), -1)
+        bounds = {}
+        if kind in ("SCALAR", "VEC3") and component == _FLOAT:
+            bounds = {"min": table.min(axis=0).tolist(), "max": table.max(axis=0).tolist()}
+        self._document.accessors.append(
+            self._library.Accessor(
+                bufferView=len(self._document.bufferViews) - 1, componentType=component, count=len(rows), type=kind,
+                **bounds,
+            )
+        )  # fmt: skip
+        self._bytes += raw + b"\0" * (-len(raw) % 4)
+        return len(self._document.accessors) - 1
+
+    def close(self) -> None:
+        """Put the bytes into the document."""
+        self._document.buffers.append(self._library.Buffer(byteLength=len(self._bytes)))
+        self._document.set_binary_blob(bytes(self._bytes))
+
+
+def write_gltf(clip: Clip, path: Path) -> None:
+    """Write a clip as a binary glTF file (.glb).
+
+    Raises
+    ------
+    ModelError
+        If the library for it is not installed.
+    OSError
+        If the file cannot be written.
+    """
+    try:
+        import pygltflib
+    except ImportError:
+        raise ModelError(
+            "glTF is written by pygltflib, which is not installed; expected pip install 'haptic-vector-fields[gltf]'"
+        ) from None
+    library: Any = pygltflib
+    document = library.GLTF2(
+        asset=library.Asset(version="2.0", generator="haptic vector fields"), scene=0,
+        scenes=[library.Scene(nodes=[0, len(SEGMENTS)])], buffers=[], bufferViews=[], accessors=[],
+    )  # fmt: skip
+    model = figure_model()
+    buffer = _Buffer(library, document)
+    rest = _add_skeleton(library, document, model, clip)
+    _add_skin(library, document, buffer, model, rest)
+    _add_motion(library, document, buffer, clip)
+    buffer.close()
+    document.save_binary(str(path))
+
+
+def _add_skeleton(library: Any, document: Any, model: mujoco.MjModel, clip: Clip) -> Array:
+    """Nodes of the joints in the clip's first pose, and one of the skin; returns the joints' places at rest (18, 3)."""
+    places = np.zeros((len(SEGMENTS), 3))
+    for index, segment in enumerate(SEGMENTS):
+        offset = np.asarray(model.body(segment.body).pos) if index else rest_pose()[:3]
+        places[index] = offset + (places[segment.parent] if index else 0.0)
+        start = clip.poses[0, :3] if index == 0 else offset
+        document.nodes.append(
+            library.Node(
+                name=segment.joint, translation=start[_TO_FILE].tolist(),
+                rotation=_rotations(clip.poses[:1], index)[0].tolist(),
+                children=[k for k, other in enumerate(SEGMENTS) if other.parent == index],
+            )
+        )  # fmt: skip
+    document.nodes.append(library.Node(name="figure", mesh=0, skin=0))
+    return places
+
+
+def _rotations(poses: Array, index: int) -> Array:
+    """Local rotations of a joint as glTF has them, x, y, z, w, shape (n, 4)."""
+    return poses[:, 3 + 4 * index : 7 + 4 * index][:, [2, 3, 1, 0]]
+
+
+def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjModel, rest: Array) -> None:
+    """A mesh of all that is seen of the figure at rest; each vertex goes with one joint."""
+    bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
+    by_color: dict[tuple[float, ...], list[tuple[int, Array, npt.NDArray[np.int64]]]] = {}
+    for shape in body_shapes(model, ""):
+        by_color.setdefault(shape.rgba, []).append((bodies[shape.body], shape.vertices, shape.faces))
+    primitives: list[Any] = []
+    for color, shapes in by_color.items():
+        first = np.cumsum([0] + [len(vertices) for _, vertices, _ in shapes])
+        points = np.concatenate([vertices + rest[joint] for joint, vertices, _ in shapes])[:, _TO_FILE]
+        joints = np.zeros((len(points), 4))
+        joints[:, 0] = np.concatenate([np.full(len(vertices), joint) for joint, vertices, _ in shapes])
+        weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+        faces = np.concatenate([faces + start for (_, _, faces), start in zip(shapes, first[:-1], strict=True)])
+        attributes = library.Attributes(
+            POSITION=buffer.add(points, "VEC3", _FLOAT, _VERTICES),
+            JOINTS_0=buffer.add(joints, "VEC4", _UNSIGNED_BYTE, _VERTICES),
+            WEIGHTS_0=buffer.add(weights, "VEC4", _FLOAT, _VERTICES),
+        )
+        indices = buffer.add(faces.ravel(), "SCALAR", _UNSIGNED_INT, _INDICES)
+        linear = [share**2.2 for share in color[:3]]  # glTF's colours are linear
+        document.materials.append(
+            library.Material(
+                pbrMetallicRoughness=library.PbrMetallicRoughness(
+                    baseColorFactor=[*linear, color[3]], metallicFactor=0.0, roughnessFactor=0.8
+                )
+            )
+        )
+        primitives.append(
+            library.Primitive(attributes=attributes, indices=indices, material=len(document.materials) - 1)
+        )
+    document.meshes.append(library.Mesh(name="figure", primitives=primitives))
+    inverse = np.tile(np.eye(4), (len(rest), 1, 1))
+    inverse[:, :3, 3] = -rest[:, _TO_FILE]
+    columns = inverse.transpose(0, 2, 1).reshape(len(rest), 16)
+    document.skins.append(
+        library.Skin(
+            joints=list(range(len(SEGMENTS))), skeleton=0, inverseBindMatrices=buffer.add(columns, "MAT4", _FLOAT)
+        )
+    )
+
+
+def _add_motion(library: Any, document: Any, buffer: _Buffer, clip: Clip) -> None:
+    times = buffer.add(np.arange(clip.n_frames) / clip.fps, "SCALAR", _FLOAT)
+    samplers: list[Any] = []
+    channels: list[Any] = []
+
+    def animate(node: int, what: str, values: Array, kind: str) -> None:
+        samplers.append(library.AnimationSampler(input=times, output=buffer.add(values, kind, _FLOAT)))
+        target = library.AnimationChannelTarget(node=node, path=what)
+        channels.append(library.AnimationChannel(sampler=len(samplers) - 1, target=target))
+
+    animate(0, "translation", clip.poses[:, _TO_FILE], "VEC3")
+    for index in range(len(SEGMENTS)):
+        animate(index, "rotation", _rotations(clip.poses, index), "VEC4")
+    document.animations.append(library.Animation(name=clip.name, samplers=samplers, channels=channels))
+
+
+def convert_to_gltf(source: Path, target: Path, overwrite: bool = False) -> Loaded:
+    """Read any motion file and write it as glTF on the figure.
+
+    Raises
+    ------
+    ModelError
+        If the source cannot be read, the target cannot be written, or it exists and is not to be overwritten.
+    """
+    if target.exists() and not overwrite:
+        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    loaded = load(source)
+    try:
+        write_gltf(loaded.clip, target)
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
+    return loaded

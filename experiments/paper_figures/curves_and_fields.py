@@ -1,0 +1,147 @@
+"""Figures 1, 2 and 4: a trajectory and its vectors, a field and its map, and V + U."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from controllers.fields.edited import Edited, performance
+from controllers.fields.river import River, integrate
+from experiments.config.modes import Follow
+from experiments.paper_figures.silhouettes import Silhouettes, facing
+from experiments.paper_figures.sources import (
+    CYLINDER,
+    MILLIMETRES,
+    curve_of,
+    poses_at,
+    pushed_lap,
+    recording_in,
+    ticks,
+)
+from experiments.paper_figures.space import arrows, path, workspace
+from experiments.results.figures import PALE_TUBE
+from experiments.results.folder import config_of
+from sim.recording.recording import Recording
+from sim.viewer.palette import CURVE, FIELD, TUBE, USER
+
+Array = npt.NDArray[np.float64]
+
+SECONDS = 0.25  # of motion that an arrow of Figure 1 shows
+LONGEST = 22.0  # arrow of Figure 4 [mm]
+PER_NEWTON = 6.0  # drawn length of a force [mm/N]
+POSES = 12  # around the curve
+STATURE = 24.0  # drawn length of a metre of the figure [mm]
+RING = 1.72  # of the poses, in radii of the curve
+
+
+def trajectory_and_vectors(runs: Path) -> Figure:
+    """Figure 1: a trajectory in the workspace, its tangent vectors, and the force on a hand that is pushed off it."""
+    with Recording(recording_in(runs / CYLINDER)) as recording:
+        curve = curve_of(recording)
+        start, end = pushed_lap(recording)
+        _, p, force = ticks(recording, start, end, "p", "force")
+    figure = Figure(figsize=(6.2, 4.4), layout="constrained")
+    phases = np.linspace(curve.start, curve.end, 241)
+    ring, hand = MILLIMETRES * curve.point(phases), MILLIMETRES * p
+    ax = workspace(figure, 111, np.concatenate((ring, hand)), 48.0)
+    path(ax, ring, CURVE, "trajectory φ", 1.8)
+    at = phases[:-1:12]
+    speed = MILLIMETRES * np.array([curve.velocity(phase) for phase in at])
+    arrows(ax, MILLIMETRES * curve.point(at), SECONDS * speed, TUBE, "its vectors dφ/dt", 1.8)
+    path(ax, hand, USER, "a hand that pushes", 1.1)
+    felt = slice(None, None, max(1, len(hand) // 26))
+    arrows(ax, hand[felt], PER_NEWTON * force[felt], FIELD, "force of the field")
+    ax.legend(loc="upper left", bbox_to_anchor=(-0.05, 1.02))
+    return figure
+
+
+def field_and_map(runs: Path) -> Figure:
+    """Figure 2: the field around a curve from above, and what the map makes of the places on it."""
+    with Recording(recording_in(runs / CYLINDER)) as recording:
+        curve, radius = curve_of(recording), MILLIMETRES * float(recording.array("tube_radius"))
+        start, end = pushed_lap(recording)
+        _, p, force = ticks(recording, start, end, "p", "force")
+        t, lap = ticks(recording, 0.0, curve.duration * 1.05, "p")
+        ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
+        middle = ring.mean(axis=0)[:2]
+        around = np.unwrap(np.arctan2(*(MILLIMETRES * lap[:, :2] - middle).T[::-1]))
+        wanted = around[0] + np.sign(around[-1] - around[0]) * 2.0 * np.pi * np.arange(POSES) / POSES
+        rows = np.argmin(np.abs(around[:, None] - wanted), axis=0)
+        poses = poses_at(recording, t[rows])
+    figure = Figure(figsize=(6.4, 6.2), layout="constrained")
+    ax = figure.subplots()
+    ax.add_collection(PatchCollection([Circle((float(x), float(y)), radius) for x, y in ring[:, :2]], color=PALE_TUBE))
+    ax.plot(ring[:, 0], ring[:, 1], color=CURVE, lw=1.8, label="curve φ")
+    felt = slice(None, None, max(1, len(p) // 48))
+    hand, push = MILLIMETRES * p[felt, :2], PER_NEWTON * force[felt, :2]
+    ax.plot([], [], color=PALE_TUBE, lw=7.0, label="domain of the map")
+    ax.quiver(
+        *hand.T, *push.T, color=FIELD, angles="xy", scale_units="xy", scale=1.0, width=0.0035, zorder=4,
+        label=f"force on the hand, {PER_NEWTON:g} mm for 1 N",
+    )  # fmt: skip
+    people, size = Silhouettes(), RING * float(np.linalg.norm(ring[0, :2] - middle))
+    for row, pose in zip(rows, poses, strict=True):
+        place = MILLIMETRES * lap[row, :2]
+        away = (place - middle) / np.linalg.norm(place - middle)
+        foot = middle + size * away - np.array([0.0, 0.5 * 1.75 * STATURE])
+        people.draw(ax, pose, (float(foot[0]), float(foot[1])), STATURE, facing(pose) + np.pi - 0.4)
+        ends = np.array([place + 4.0 * away, middle + (size - 0.42 * STATURE) * away])
+        ax.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": CURVE, "lw": 0.7})
+        ax.plot(*place, "o", ms=3.5, color=CURVE, zorder=5)
+    ax.annotate("h", middle + np.array([0.74 * size, 2.5]), fontsize=12, style="italic")
+    reach = size + 1.15 * STATURE
+    ax.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]), aspect="equal")
+    ax.set(xlabel="x [mm]", ylabel="y [mm]")
+    ax.grid(visible=False)
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def v_plus_u(runs: Path) -> Figure:
+    """Figure 4: a river V, a performance that left it, U of that, and the integral curve of V + U."""
+    with Recording(recording_in(runs / CYLINDER)) as recording:
+        curve, mode = curve_of(recording), config_of(recording).mode
+        start, end = pushed_lap(recording)
+        t, p = ticks(recording, start, end, "p")
+    if not isinstance(mode, Follow):
+        raise TypeError("the run of Figure 4 is one of FOLLOW")
+    river = River(curve, epsilon=0.08, tau=mode.damping / mode.stiffness, drag=mode.damping)
+    performed = performance(t, p)
+    times = t[::8] - t[0]
+    course = integrate(Edited(river, (performed,), (1.0,)).flow, performed.point(0.0), times).points
+    apart = MILLIMETRES * np.sqrt(np.mean(np.sum((course - performed.point(times)) ** 2, axis=1)))
+    figure = Figure(figsize=(7.2, 3.9), layout="constrained")
+    ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    hand, line = MILLIMETRES * p, MILLIMETRES * course
+    for ax in (left, right):
+        ax.plot(ring[:, 0], ring[:, 1], color=CURVE, lw=1.0, ls=(0, (4, 3)), label="φ")
+        ax.plot(hand[:, 0], hand[:, 1], color=USER, lw=1.4, label="performed φ'")
+        ax.set(aspect="equal", xlabel="x [mm]")
+    left.set_ylabel("y [mm]")
+    at = np.linspace(0.0, float(times[-1]), 30)
+    there = performed.point(at)
+    v = np.array([river.flow(0.0, place) for place in there])
+    u = np.array([performed.velocity(time) for time in at]) - v
+    seconds = LONGEST / (MILLIMETRES * float(np.linalg.norm(u[:, :2], axis=1).max()))
+    tips: list[Array] = []
+    for vectors, color, name in ((v, TUBE, "V"), (u, FIELD, "U")):
+        tips.append(MILLIMETRES * seconds * vectors[:, :2])
+        left.quiver(
+            *(MILLIMETRES * there[:, :2]).T, *tips[-1].T, color=color, angles="xy", scale_units="xy", scale=1.0,
+            width=0.005, zorder=4, label=name,
+        )  # fmt: skip
+    left.set_title(f"V and U along φ', {1e3 * seconds:.0f} ms of motion")
+    right.plot(line[:, 0], line[:, 1], color=FIELD, lw=4.0, alpha=0.45, label="integral curve of V + U")
+    right.set_title(f"it is {apart:.1g} mm RMS from φ'")
+    named = [ax.get_legend_handles_labels() for ax in (left, right)]
+    handles = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
+    every = np.concatenate((ring[:, :2], hand[:, :2], *(MILLIMETRES * there[:, :2] + tip for tip in tips)))
+    reach = 1.04 * np.abs(every - ring.mean(axis=0)[:2]).max()
+    middle = ring.mean(axis=0)
+    left.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
+    return figure

@@ -1,0 +1,119 @@
+"""Figures 3 and 5: the cylinder of four motions with FOLLOW, and a figure with a red and two blue inputs."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.config.maps import Cylindrical
+from experiments.paper_figures.silhouettes import Paint, Silhouettes, facing
+from experiments.paper_figures.sources import (
+    COMPOSITE,
+    CYLINDER,
+    MILLIMETRES,
+    curve_of,
+    poses_at,
+    pushed_lap,
+    recording_in,
+    ticks,
+)
+from experiments.paper_figures.space import path, workspace
+from experiments.results.folder import clips_of, config_of
+from models.mocap.clip import Clip
+from sim.recording.recording import Recording
+from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
+
+Array = npt.NDArray[np.float64]
+
+FRAMES = 9
+APART = 1.15  # between two frames [m]
+RED, BLUE, GREY = "#b8433a", "#2f6db3", "#c9ced6"
+LEGS = ("pelvis", "thigh", "shank", "foot")
+
+
+def four_motion_cylinder(runs: Path) -> Figure:
+    """Figure 3: four motions on the edges of a cylinder, the hand in FOLLOW between them, frames of what it played."""
+    with Recording(recording_in(runs / CYLINDER)) as recording:
+        config, curve = config_of(recording), curve_of(recording)
+        names = [clip.name for clip in clips_of(recording)]
+        start, end = pushed_lap(recording)
+        _, alone = ticks(recording, 0.0, start, "p")
+        t, pushed = ticks(recording, start, end, "p")
+        times = np.linspace(t[0], t[-1], FRAMES)
+        poses = poses_at(recording, times)
+    if not isinstance(config.map, Cylindrical):
+        raise TypeError("the run of Figure 3 is one of a cylindrical map")
+    reach = config.map.reach
+    ring = curve.point(np.linspace(curve.start, curve.end, 121))
+    middle = np.array([*ring.mean(axis=0)[:2], ring[0, 2]])
+    edges = [_edge(ring, middle, side * reach, height * reach) for height in (-1, 1) for side in (-1, 1)]
+    figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+    grid = figure.add_gridspec(2, 1, height_ratios=(3.1, 1.0))
+    ax = workspace(figure, grid[0], MILLIMETRES * np.concatenate(edges), 30.0, 1.1)
+    for name, edge, color in zip(names, edges, RIVERS, strict=False):
+        path(ax, MILLIMETRES * edge, color, name, 2.0)
+    for k in range(0, 120, 10):
+        corners = MILLIMETRES * np.array([edges[i][k] for i in (0, 1, 3, 2, 0)])
+        path(ax, corners, "#d9dde4", "", 0.7)
+    path(ax, MILLIMETRES * ring, CURVE, "curve φ", 1.0, (0, (4, 3)))
+    path(ax, MILLIMETRES * alone, FIELD, "hand in FOLLOW, left alone", 1.4)
+    path(ax, MILLIMETRES * pushed, USER, "hand in FOLLOW, pushing", 1.4)
+    ax.legend(loc="upper left", bbox_to_anchor=(-0.34, 1.0))
+    strip = figure.add_subplot(grid[1])
+    _strip(strip, poses, [f"{time:.1f} s" for time in times])
+    strip.set_title("frames of the animation h(p) while the hand pushes")
+    return figure
+
+
+def red_and_blue_inputs(runs: Path) -> Figure:
+    """Figure 5: the red input moves the lower body, two blue inputs the upper; what the hand mixes of them."""
+    with Recording(recording_in(runs / COMPOSITE)) as recording:
+        clips, curve = clips_of(recording), curve_of(recording)
+        start, end = pushed_lap(recording)
+        times = np.linspace(start, min(end, start + curve.duration), FRAMES)
+        poses = poses_at(recording, times)
+    rows: list[tuple[str, Array, Paint]] = [
+        (f"red input: {clips[0].name}", _lap(clips[0]), _painted(RED, GREY)),
+        (f"blue input, inside: {clips[1].name}", _lap(clips[1]), _painted(GREY, BLUE)),
+        (f"blue input, outside: {clips[2].name}", _lap(clips[2]), _painted(GREY, "#6ea3d8")),
+        ("what the hand made of them", poses, _painted(RED, BLUE)),
+    ]
+    figure = Figure(figsize=(7.2, 6.6), layout="constrained")
+    for ax, (title, row, paint) in zip(figure.subplots(len(rows), 1), rows, strict=True):
+        shown = [f"{time:.1f} s" for time in times] if row is poses else []
+        _strip(ax, row, shown, paint)
+        ax.set_title(title)
+    return figure
+
+
+def _edge(ring: Array, middle: Array, aside: float, above: float) -> Array:
+    """An edge of the cylinder: the curve's circle, wider and higher [m], shape (n, 3)."""
+    outwards = ring - middle
+    outwards[:, 2] = 0.0
+    return ring + aside * outwards / np.linalg.norm(outwards, axis=1)[:, None] + np.array([0.0, 0.0, above])
+
+
+def _lap(clip: Clip) -> Array:
+    return clip.poses[np.linspace(0, clip.n_frames - 1, FRAMES).astype(int)]
+
+
+def _painted(legs: str, rest: str) -> Paint:
+    return lambda body, _rgba: legs if body.endswith(LEGS) else rest
+
+
+def _strip(ax: Axes, poses: Array, words: list[str], paint: Paint | None = None) -> None:
+    """Poses side by side on a floor, all seen from the side to which the first faces, with words below."""
+    people = Silhouettes()
+    for k, pose in enumerate(poses):
+        azimuth = facing(pose) + np.pi - 0.5
+        if paint is None:
+            people.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth)
+        else:
+            people.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth, paint=paint)
+    for k, word in enumerate(words):
+        ax.annotate(word, (APART * k, -0.12), ha="center", va="top", fontsize=7.5)
+    ax.axhline(0.0, color="#b9bec8", lw=0.6, zorder=1)
+    ax.set(aspect="equal", xlim=(-0.7, APART * (len(poses) - 1) + 0.7), ylim=(-0.35, 2.05))
+    ax.axis("off")

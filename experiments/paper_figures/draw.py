@@ -1,0 +1,172 @@
+"""All figures of the paper: the runs that they need, the drawings as PDF and PNG, and a page of them."""
+
+import html
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from experiments.paper_figures.crossing import crossing_rivers
+from experiments.paper_figures.curves_and_fields import field_and_map, trajectory_and_vectors, v_plus_u
+from experiments.paper_figures.cylinder import four_motion_cylinder, red_and_blue_inputs
+from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRETCH, configs, recording_in
+from experiments.paper_figures.stretching import rendered_result, stretching
+from experiments.results.figures import STYLE
+from experiments.run import run
+from sim.errors import SimError
+from sim.recording.recording import Recording
+
+DPI = 170
+PAGE = "index.html"
+
+
+class Drawing(NamedTuple):
+    """A figure of the paper.
+
+    Attributes
+    ----------
+    number : int
+    title : str
+        What the paper's figure is of, in a few words.
+    shows : str
+        What is drawn here, and of what run.
+    runs : tuple of str
+        That it needs.
+    draw : callable
+        From the folder of runs to the figure.
+    """
+
+    number: int
+    title: str
+    shows: str
+    runs: tuple[str, ...]
+    draw: Callable[[Path], Figure]
+
+
+DRAWINGS = (
+    Drawing(1, "A trajectory and its vectors",
+            "The curve φ of FOLLOW with its tangent vectors; the way of a hand that pushes outwards and inwards, "
+            "and the force with which the field answered, as recorded.", (CYLINDER,), trajectory_and_vectors),
+    Drawing(2, "A field and the map to poses",
+            "From above: the recorded forces along the pushed hand's way within the domain of the map, and the poses "
+            "that h gives to twelve places of a lap.", (CYLINDER,), field_and_map),
+    Drawing(3, "Four motions on a cylinder, with FOLLOW",
+            "The angle is the frame of the motion; radius and height mix four motions, one on each edge. A hand that "
+            "is led, and then pushes; frames of the animation that came of it.", (CYLINDER,), four_motion_cylinder),
+    Drawing(4, "V + U",
+            "A river V, the performance φ' that left it, and U, what the performance added to V. Integrated again, "
+            "V + U gives the performance.", (CYLINDER,), v_plus_u),
+    Drawing(5, "Red and blue inputs",
+            "One motion moves the lower body (red), the hand mixes two others for the upper body (blue).",
+            (COMPOSITE,), red_and_blue_inputs),
+    Drawing(6, "A stretchy tube: before, after, and FOLLOW",
+            "The curve as it was given; bent by a hand that held it with the stylus switch; performed by FOLLOW, with "
+            "the largest force on the hand.", (STRETCH,), stretching),
+    Drawing(7, "The result, rendered",
+            "The bent curve performed by the physical figure, with the animation of the curve before it was bent "
+            "beside it.", (STRETCH,), rendered_result),
+    Drawing(8, "Crossing rivers",
+            "Three rivers with a motion each; a hand that pushes at a crossing goes over into another one, and the "
+            "figure with it.", (RIVERS,), crossing_rivers),
+)  # fmt: skip
+
+
+def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
+    """Draw all figures into a folder, from the runs in its folder ``runs``; those that are missing are made first.
+
+    Parameters
+    ----------
+    out : Path
+        Folder.
+    started : float
+        `time.perf_counter` when the program began.
+    overwrite : bool
+        Draw again what is there.
+
+    Returns
+    -------
+    list of Path
+        The PNG files.
+
+    Raises
+    ------
+    SimError
+        If the folder holds figures already, or a recording is not what is drawn.
+    """
+    if (out / PAGE).exists() and not overwrite:
+        raise SimError(f"{out}: holds figures; choose another --out, or --overwrite them (their runs are kept)")
+    console = Console(stderr=True)
+    runs = out / "runs"
+    wanted = configs()
+    missing = [name for name in wanted if not _recorded(runs / name)]
+    for k, name in enumerate(missing):
+        console.print(f"Run {k + 1} of {len(missing)} that are missing: {name}.", highlight=False)
+        run(wanted[name], runs / name, True, started)
+    files: list[Path] = []
+    columns = (TextColumn("drawing"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        for drawing in bar.track(DRAWINGS):
+            files.append(draw_one(drawing, runs, out))
+    (out / PAGE).write_text(_page(), encoding="utf-8")
+    console.print(f"Written to {out}: {PAGE} (open it in a browser), eight figures as PDF and PNG.", highlight=False)
+    return files
+
+
+def draw_one(drawing: Drawing, runs: Path, out: Path) -> Path:
+    """Draw a figure as PDF and PNG; returns the PNG."""
+    stem = out / f"figure-{drawing.number}"
+    with mpl.rc_context(STYLE):
+        figure = drawing.draw(runs)
+        # Without the time of day: the same recordings give the same file.
+        figure.savefig(stem.with_suffix(".pdf"), metadata={"CreationDate": None})
+        figure.savefig(stem.with_suffix(".png"), dpi=DPI)
+    return stem.with_suffix(".png")
+
+
+def _recorded(folder: Path) -> bool:
+    file = recording_in(folder)
+    if not file.exists():
+        return False
+    with Recording(file) as recording:
+        return recording.complete
+
+
+def _page() -> str:
+    """The figures one below the other, each with what it shows."""
+    parts = [
+        f'<figure id="figure-{d.number}"><a href="figure-{d.number}.pdf"><img alt="{html.escape(d.title)}" '
+        f'src="figure-{d.number}.png"></a><figcaption><b>Figure {d.number}. {html.escape(d.title)}.</b> '
+        f"{html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
+        for d in DRAWINGS
+    ]
+    return _FRAME.format(figures="\n".join(parts))
+
+
+_FRAME = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,">
+<title>The paper's figures</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 860px; padding: 1.5rem; }}
+h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
+figure {{ margin: 2.5rem 0; }}
+img {{ width: 100%; }}
+figcaption {{ font-size: .95rem; color: #566072; }}
+figcaption b {{ color: #222a38; }}
+</style>
+</head>
+<body>
+<h1>Figures 1 to 8 of the paper, from runs of this program</h1>
+<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. What each of its figures is
+of, drawn from recordings; a click gives the PDF.</p>
+{figures}
+</body>
+</html>
+"""

@@ -1,0 +1,103 @@
+"""The figure as outlines on paper: the parallel projection of its geoms, those behind drawn first."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from models.humanoid.skeleton import figure_model
+
+Array = npt.NDArray[np.float64]
+Paint = Callable[[str, Array], str | tuple[float, ...]]
+
+_CORNERS = 28  # of an outline
+_FIRST_HIDDEN_GROUP = 3
+
+
+class Outline(NamedTuple):
+    """What is seen of a geom.
+
+    Attributes
+    ----------
+    body : str
+        That it belongs to.
+    rgba : array (4,)
+        Its colour in the model.
+    depth : float
+        Of its centre, away from who looks [m].
+    corners : array (n, 2)
+        To the right, and up [m].
+    """
+
+    body: str
+    rgba: Array
+    depth: float
+    corners: Array
+
+
+class Silhouettes:
+    """Outlines of poses of the default figure."""
+
+    def __init__(self) -> None:
+        self._model = figure_model()
+        self._data = mujoco.MjData(self._model)
+
+    def outlines(self, pose: Array, azimuth: float) -> list[Outline]:
+        r"""What is seen of a pose when one looks along an azimuth [rad], the root's place at 0.
+
+        An ellipsoid with semi-axes s and rotation R is seen as the ellipse of A Aᵀ, A = P R diag(s) with P the 2 × 3
+        projection; a capsule as the hull of two discs.
+        """
+        model, data = self._model, self._data
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        c, s = np.cos(azimuth), np.sin(azimuth)
+        onto, away = np.array([[s, -c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
+        origin = np.array([pose[0], pose[1], 0.0])
+        found: list[Outline] = []
+        for geom in range(model.ngeom):
+            if model.geom_group[geom] >= _FIRST_HIDDEN_GROUP:
+                continue
+            centre, turn = data.geom_xpos[geom] - origin, data.geom_xmat[geom].reshape(3, 3)
+            size = model.geom_size[geom]
+            if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+                corners = _capsule(onto @ (size[1] * turn[:, 2]), float(size[0]))
+            else:
+                axes = size if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_ELLIPSOID else np.full(3, size[0])
+                corners = _circle() @ np.linalg.cholesky((onto @ turn * axes**2) @ (onto @ turn).T).T
+            body = model.body(model.geom_bodyid[geom]).name
+            found.append(Outline(body, model.geom_rgba[geom], float(away @ centre), onto @ centre + corners))
+        return sorted(found, key=lambda outline: -outline.depth)
+
+    def draw(
+        self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
+        paint: Paint = lambda body, rgba: tuple(rgba), zorder: float = 3.0,
+    ) -> None:  # fmt: skip
+        """Draw a pose with its root above a point of the axes, so many of their units for a metre."""
+        for outline in self.outlines(pose, azimuth):
+            color = paint(outline.body, outline.rgba)
+            corners = np.asarray(at) + scale * outline.corners
+            ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=zorder))
+
+
+def facing(pose: Array) -> float:
+    """Azimuth in which a pose's root faces [rad]."""
+    w, x, y, z = (float(value) for value in pose[3:7])
+    return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+
+def _circle() -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
+    return np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def _capsule(half: Array, radius: float) -> Array:
+    """Hull of two discs at ±half, shape (n, 2)."""
+    start = np.arctan2(half[1], half[0]) - 0.5 * np.pi
+    angle = start + np.linspace(0.0, np.pi, _CORNERS // 2)
+    cap = radius * np.column_stack((np.cos(angle), np.sin(angle)))
+    return np.concatenate((half + cap, -half - cap))

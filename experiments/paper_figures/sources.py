@@ -1,0 +1,66 @@
+"""The runs of which the paper's figures are drawn, and what the drawings read of a recording."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from experiments.config.maps import Composite, RiverClips
+from experiments.config.modes import Rivers, StretchThenFollow
+from experiments.config.run_config import RunConfig, User
+from experiments.demo import demo_config
+from sim.recording.recording import Recording
+
+Array = npt.NDArray[np.float64]
+
+CYLINDER, COMPOSITE, STRETCH, RIVERS = "cylinder", "composite", "stretch", "rivers"
+MILLIMETRES = 1e3
+
+
+def configs() -> dict[str, RunConfig]:
+    """The runs, by the name of their folder: pure data, each a run that `hvf run` makes."""
+    return {
+        CYLINDER: demo_config(),
+        COMPOSITE: RunConfig(map=Composite(), user=User(does="push"), seconds=9.0),
+        STRETCH: RunConfig(mode=StretchThenFollow()),
+        RIVERS: RunConfig(mode=Rivers(), map=RiverClips(), user=User(does="push"), seconds=8.0),
+    }
+
+
+def curve_of(recording: Recording) -> Trajectory:
+    """The curve of a recording, as it leads."""
+    start, end = (float(time) for time in recording.array("curve_span"))
+    points = recording.array("curve")
+    return Trajectory(
+        np.linspace(start, end, len(points)), points, periodic=bool(recording.array("curve_closed") > 0.5)
+    )
+
+
+def ticks(recording: Recording, start: float, end: float, *names: str) -> tuple[Array, ...]:
+    """Channels of the ticks between two times [s], the times first."""
+    t = recording.channel("ticks", "t")[:]
+    rows = slice(int(np.searchsorted(t, start)), int(np.searchsorted(t, end)))
+    return t[rows], *(recording.channel("ticks", name)[rows] for name in names)
+
+
+def pushed_lap(recording: Recording) -> tuple[float, float]:
+    """From and until when the hand pushes, and a quarter of a second about it [s]."""
+    t, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
+    pushing = t[np.linalg.norm(user, axis=1) > 0.2]
+    return max(0.0, float(pushing[0]) - 0.25), min(float(t[-1]), float(pushing[-1]) + 0.25)
+
+
+def poses_at(recording: Recording, times: Array) -> Array:
+    """The animation h(p) at times [s], shape (n, 75)."""
+    t = recording.channel("frames", "t")[:]
+    rows = np.clip(np.searchsorted(t, times), 0, len(t) - 1)
+    channel = recording.channel("frames", "reference")
+    return np.array([channel[int(row)] for row in rows])
+
+
+def recording_in(folder: Path) -> Path:
+    """The recording in a folder of a run."""
+    from experiments.results.folder import RECORDING
+
+    return folder / RECORDING

@@ -1,0 +1,211 @@
+"""A film of a run, from its recording: the workspace beside the stage, a frame after the other."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from experiments.files.curve_files import CURVE_FILE, load_curve
+from experiments.render.captions import Captions, Entry, halved
+from experiments.render.film_file import FilmFile, check_target
+from experiments.render.graphics import Canvas, Image, offscreen_backend
+from experiments.render.scenes import Camera, Stage, Workspace
+from experiments.render.shown_world import GHOST, GHOST_WHITE, ShownWorld, mixed_with_white, shown_world
+from experiments.render.timeline import Ghost, Timeline, timeline
+from experiments.results.folder import RECORDING
+from sim.errors import SimError
+from sim.recording.recording import Recording
+from sim.viewer.palette import FIELD, TUBE, USER
+
+Array = npt.NDArray[np.float64]
+Show = Literal["both", "workspace", "stage"]
+
+WORKSPACE_SHARE = 0.42  # of the width, where both are shown
+LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # on which letters can be read [pixels]
+_SHIRT = "#3d6ba1"  # of the figure in its model
+_NAMES = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
+_GHOSTS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
+
+
+@dataclass(frozen=True)
+class Film:
+    """What of a run is filmed, and how.
+
+    Attributes
+    ----------
+    show : Show
+        Workspace, stage, or both side by side.
+    camera : Camera
+        From where the stage is seen, with respect to where the figure faces.
+    ghost : Ghost
+        What stands beside the figure.
+    start : float
+        Of what is shown [s].
+    seconds : float or None
+        Of what is shown [s]; all that there is by default.
+    width, height : int
+        Of a frame [pixels], even.
+    fps : float
+        Frames per second [1/s].
+    """
+
+    show: Show = "both"
+    camera: Camera = "three-quarter"
+    ghost: Ghost = "default"
+    start: float = 0.0
+    seconds: float | None = None
+    width: int = 1280
+    height: int = 720
+    fps: float = 30.0
+
+    def __post_init__(self) -> None:
+        if self.width < LEAST_WIDTH or self.height < LEAST_HEIGHT or self.width % 2 or self.height % 2:
+            raise SimError(
+                f"--width and --height are {self.width} and {self.height}; expected even numbers of pixels, "
+                f"{LEAST_WIDTH} x {LEAST_HEIGHT} or more"
+            )
+        if not 1.0 <= self.fps <= 240.0:
+            raise SimError(f"--fps is {self.fps:g}; expected 1 to 240 frames per second")
+        if self.seconds is not None and not self.seconds > 0.0:
+            raise SimError(f"--seconds is {self.seconds:g} s; expected a time greater than 0")
+
+
+class Frames:
+    """Frames of a film, drawn when they are asked for.
+
+    Parameters
+    ----------
+    recording : Recording
+    folder : Path
+        Where it lies.
+    film : Film
+    backend : str
+        As `offscreen_backend` gives it.
+    """
+
+    def __init__(self, recording: Recording, folder: Path, film: Film, backend: str):
+        self._film = film
+        self._bent_from, bent = _bent(recording, folder)
+        self._world = shown_world(recording, film.width, film.height, bent)
+        self.moments: Timeline = timeline(
+            recording, folder, self._world, film.fps, film.start, film.seconds, film.ghost
+        )
+        left = round(WORKSPACE_SHARE * film.width / 2) * 2
+        # A run without a figure has a workspace only.
+        show = "workspace" if self._world.kind == "none" else film.show
+        widths = {"both": (left, film.width - left), "workspace": (film.width, 0), "stage": (0, film.width)}
+        self._left, self._right = widths[show]
+        self._workspace = Workspace(recording, self._world, self.moments)
+        self.stage = Stage(recording, self._world, self.moments, film.camera, max(self._right, 1) / film.height)
+        self._captions = Captions(film.height)
+        self._canvas = Canvas(self._world.model, backend)
+
+    def __len__(self) -> int:
+        return len(self.moments.t)
+
+    def frame(self, row: int) -> Image:
+        """The frame of a row, shape (height, width, 3)."""
+        self.stage.put(row)
+        self._world.show_bent(bool(self.moments.t[row] >= self._bent_from))
+        height, time = self._film.height, f"{self.moments.t[row]:.1f} s"
+        parts: list[Image] = []
+        if self._left:
+            bare = self._workspace.picture(self._canvas, row, self._left, height)
+            field, user = self._workspace.newtons(row)
+            legend = (Entry(FIELD, f"field {field:.1f} N"), Entry(USER, f"hand {user:.1f} N"))
+            parts.append(self._captions.on(bare, "workspace", "" if self._right else time, legend))
+        if self._right:
+            bare = self.stage.picture(self._canvas, row, self._right, height)
+            parts.append(self._captions.on(bare, "stage", time, _cast(self._world, self.moments.kind), True))
+        picture = np.concatenate(parts, axis=1)
+        if len(parts) == 2:
+            picture[:, self._left - 1 : self._left + 1] = 255
+        return picture
+
+    def close(self) -> None:
+        """Give the buffers back."""
+        self._canvas.close()
+
+
+def _bent(recording: Recording, folder: Path) -> tuple[float, Array | None]:
+    """From when a bent curve is performed [s], and its points; never, and none, where there is none."""
+    told = (recording.summary or {}).get("performance")
+    if not isinstance(told, dict) or not (folder / CURVE_FILE).exists():
+        return np.inf, None
+    curve = load_curve(folder / CURVE_FILE)
+    return float(cast(dict[str, float], told)["start"]), curve.point(np.linspace(curve.start, curve.end, 400))
+
+
+def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
+    """Who is on the stage."""
+    actors = (Entry(_SHIRT, _NAMES[world.kind]),)
+    if not world.has_figure or ghost == "none":
+        return actors
+    red, green, blue, _ = (round(255 * share) for share in mixed_with_white(TUBE, GHOST_WHITE))
+    return (*actors, Entry(f"#{red:02x}{green:02x}{blue:02x}", _GHOSTS[ghost]))
+
+
+def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite: bool = False) -> None:
+    """Write the film of a run, and say what of it is to be known.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a run.
+    target : Path
+        ``.mp4`` or ``.gif``.
+    film : Film
+    gif : bool
+        Write a GIF beside it as well: half as large, every second frame.
+    overwrite : bool
+        Replace what exists.
+
+    Raises
+    ------
+    SimError
+        If the recording, the target or this machine's graphics do not do.
+    """
+    beside = target.with_suffix(".gif") if gif and target.suffix.lower() != ".gif" else None
+    targets = (target,) if beside is None else (target, beside)
+    for file in targets:
+        check_target(file, overwrite)
+    console = Console(stderr=True)
+    with Recording(folder / RECORDING) as recording, ExitStack() as files:
+        frames = Frames(recording, folder, film, offscreen_backend())
+        files.callback(frames.close)
+        whole = files.enter_context(FilmFile(target, film.width, film.height, film.fps))
+        half = beside and files.enter_context(FilmFile(beside, film.width // 2, film.height // 2, film.fps / 2.0))
+        for row in _told(range(len(frames)), console):
+            picture = frames.frame(row)
+            whole.add(picture)
+            if half and row % 2 == 0:
+                half.add(halved(picture))
+        complete = recording.complete
+    if not complete:
+        console.print(f"The run was cut short: the film shows the {frames.moments.t[-1]:.1f} s that are recorded.")
+    for line in clearance_lines(frames.stage):
+        print(line)
+    console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
+
+
+def _told(rows: range, console: Console) -> Iterator[int]:
+    """Rows, while a bar tells how long it still takes."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        yield from bar.track(rows, description="drawing")
+
+
+def clearance_lines(stage: Stage) -> list[str]:
+    """How low the figures reach, a line each."""
+    lines: list[str] = []
+    for prefix, (lowest, at) in stage.clearance.items():
+        name = "ghost" if prefix == GHOST else "figure"
+        drawn = ", and was drawn higher by that" if lowest < 0.0 else ""
+        lines.append(f"The lowest point of the {name} was {1e3 * lowest:+.1f} mm from the floor at {at:.1f} s{drawn}.")
+    return lines

@@ -1,0 +1,92 @@
+"""A film being written: as H.264 or GIF, by ffmpeg, under its own name only when it is whole."""
+
+from collections.abc import Generator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from experiments.render.graphics import Image
+from sim.errors import SimError
+
+SUFFIXES = (".mp4", ".gif")
+_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
+# One palette for all frames, chosen for what changes between them.
+_PALETTE = "split[a][b];[a]palettegen=stats_mode=diff:max_colors=160[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"
+
+
+def check_target(target: Path, overwrite: bool) -> None:
+    """Refuse a film that cannot be written, or may not be replaced.
+
+    Raises
+    ------
+    SimError
+        Saying what would be right.
+    """
+    if target.suffix.lower() not in SUFFIXES:
+        raise SimError(f"{target}: films are written as {' or '.join(SUFFIXES)}; expected a name that ends so")
+    if target.is_dir():
+        raise SimError(f"{target}: is a folder; expected a file to write")
+    if target.exists() and not overwrite:
+        raise SimError(f"{target}: is there already; choose another name, or --overwrite it")
+
+
+class FilmFile:
+    """A film to which frames are added; what is left half done is removed.
+
+    Parameters
+    ----------
+    target : Path
+        ``.mp4`` or ``.gif``.
+    width, height : int
+        Of a frame [pixels]; even for ``.mp4``.
+    fps : float
+        Frames per second [1/s].
+
+    Raises
+    ------
+    SimError
+        If ffmpeg is not installed.
+    """
+
+    def __init__(self, target: Path, width: int, height: int, fps: float):
+        self._target, self._part = target, target.with_name(f".{target.stem}.part{target.suffix.lower()}")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        self._pen = _pen(self._part, width, height, fps)
+        self._pen.send(None)
+
+    def add(self, frame: Image) -> None:
+        """Add a frame, shape (height, width, 3)."""
+        self._pen.send(np.ascontiguousarray(frame))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pen.close()
+        if kind is None:
+            self._part.replace(self._target)
+        else:
+            self._part.unlink(missing_ok=True)
+
+
+def _pen(file: Path, width: int, height: int, fps: float) -> Generator[None, Any, None]:
+    try:
+        from imageio_ffmpeg import write_frames
+    except ImportError:
+        raise SimError(
+            "films are written by ffmpeg, which is not installed; expected pip install 'haptic-vector-fields[video]'"
+        ) from None
+    # Without types: it takes fractions of frames a second, and no quality where there are parameters for it.
+    write: Any = write_frames
+    if file.suffix == ".gif":
+        return write(
+            str(file), (width, height), fps=fps, codec="gif", pix_fmt_out="pal8", quality=None, bitrate=None,
+            macro_block_size=1, output_params=["-filter_complex", _PALETTE, "-loop", "0"],
+        )  # fmt: skip
+    return write(
+        str(file), (width, height), fps=fps, codec="libx264", quality=None, macro_block_size=1, output_params=_QUALITY
+    )

@@ -1,0 +1,174 @@
+"""Drawing without a display: which off-screen OpenGL a machine has, and a canvas on which MuJoCo draws with it."""
+
+import os
+import subprocess
+import sys
+from importlib import import_module
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from sim.errors import SimError
+
+Image = npt.NDArray[np.uint8]
+
+OFFSCREEN = ("egl", "osmesa")  # a graphics card or Mesa's software; Mesa's software alone
+INSTALL = "apt-get install libegl1 libgl1-mesa-dri, or libosmesa6"
+_SECONDS = 60.0  # a driver that has not answered by then does not
+_TRIAL = """
+import mujoco, sys
+from importlib import import_module
+context = import_module("mujoco." + sys.argv[1]).GLContext(64, 64)
+context.make_current()
+mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), mujoco.mjtFontScale.mjFONTSCALE_100)
+print("drawn")
+sys.stdout.flush()
+import os; os._exit(0)
+"""
+
+
+SUN = (38.0, -52.0)  # where its light goes: azimuth to that of the view, elevation [degrees]
+SUN_DISTANCE = 9.0  # of its shadow map from what is looked at [m]
+
+
+class NoGraphics(SimError):
+    """A machine on which nothing can be drawn."""
+
+
+def offscreen_backend() -> str:
+    """The first of `OFFSCREEN` that draws here, tried in a process of its own; `MUJOCO_GL` names the only one to try.
+
+    Raises
+    ------
+    NoGraphics
+        If none does; the message says what to install.
+    """
+    asked = os.environ.get("MUJOCO_GL", "").lower().strip()
+    candidates = (asked,) if asked in OFFSCREEN else OFFSCREEN
+    said: list[str] = []
+    for name in candidates:
+        failure = _failure(name)
+        if not failure:
+            return name
+        said.append(f"{name}: {failure}")
+    raise NoGraphics(f"nothing can be drawn on this machine ({'; '.join(said)}); expected EGL or OSMesa: {INSTALL}")
+
+
+def _failure(backend: str) -> str:
+    """What a backend dies of, in a few words; empty if it draws."""
+    try:
+        tried = subprocess.run(
+            [sys.executable, "-c", _TRIAL, backend], capture_output=True, text=True, timeout=_SECONDS, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"no answer in {_SECONDS:g} s"
+    if "drawn" in tried.stdout:
+        return ""
+    lines = tried.stderr.strip().splitlines()
+    return lines[-1][:120] if lines else f"exit code {tried.returncode}"
+
+
+class View(NamedTuple):
+    """From where a world is seen.
+
+    Attributes
+    ----------
+    lookat : tuple of float
+        Point in the middle of the picture [m].
+    distance : float
+        From it [m].
+    azimuth, elevation : float
+        Direction in which one looks [degrees]: along +x at 0, along +y at 90; negative downwards.
+    """
+
+    lookat: tuple[float, float, float]
+    distance: float
+    azimuth: float
+    elevation: float
+
+    def camera(self) -> mujoco.MjvCamera:
+        """The same for MuJoCo."""
+        camera = mujoco.MjvCamera()
+        camera.lookat[:], camera.distance = self.lookat, self.distance
+        camera.azimuth, camera.elevation = self.azimuth, self.elevation
+        return camera
+
+    def direction(self, azimuth: float, elevation: float) -> npt.NDArray[np.float64]:
+        """Unit vector at an azimuth from the view's own, and an elevation [degrees]."""
+        a, e = np.deg2rad(self.azimuth + azimuth), np.deg2rad(elevation)
+        return np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+
+
+class Canvas:
+    """Pictures of a world from a camera.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        The world; its ``vis.global_`` says how large a picture may be.
+    backend : str
+        As `offscreen_backend` gives it.
+    most_geoms : int
+        Room for geoms in a picture.
+    """
+
+    def __init__(self, model: mujoco.MjModel, backend: str, most_geoms: int = 2000):
+        size = model.vis.global_
+        self._gl: Any = import_module(f"mujoco.{backend}").GLContext(size.offwidth, size.offheight)
+        self._gl.make_current()
+        self._context: mujoco.MjrContext = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self._model, self._option, self._perturbed = model, mujoco.MjvOption(), mujoco.MjvPerturb()
+        self.scene = mujoco.MjvScene(model, most_geoms)
+
+    def look(self, data: mujoco.MjData, view: "View", group: int) -> None:
+        """Take the geoms of a group, as the world is and seen from a view, into the scene."""
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[group] = 1
+        mujoco.mjv_updateScene(
+            self._model, data, self._option, self._perturbed, view.camera(), mujoco.mjtCatBit.mjCAT_ALL, self.scene
+        )
+        # The sun stands behind the left shoulder of whoever looks, so that what is looked at is lit.
+        for light in self.scene.lights[: self.scene.nlight]:
+            if light.castshadow:
+                light.dir[:] = view.direction(*SUN)
+                light.pos[:] = np.asarray(view.lookat) - SUN_DISTANCE * light.dir
+
+    def add(self, data: mujoco.MjData) -> None:
+        """Add what moves, as the world is now, to the scene that was looked at."""
+        mujoco.mjv_addGeoms(
+            self._model, data, self._option, self._perturbed, mujoco.mjtCatBit.mjCAT_DYNAMIC, self.scene
+        )
+
+    def connect(
+        self, kind: mujoco.mjtGeom, start: npt.ArrayLike, end: npt.ArrayLike, width: float, color: tuple[float, ...]
+    ) -> None:
+        """Add a rod or an arrow between two points of the world to the scene."""
+        geom = self.scene.geoms[self.scene.ngeom]
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(color, dtype=np.float32))
+        mujoco.mjv_connector(geom, kind, width, np.asarray(start, dtype=float), np.asarray(end, dtype=float))
+        self.scene.ngeom += 1
+
+    def picture(self, width: int, height: int) -> Image:
+        """The scene, shape (height, width, 3)."""
+        rectangle, rows = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), dtype=np.uint8)
+        mujoco.mjr_render(rectangle, self.scene, self._context)
+        mujoco.mjr_readPixels(rows, None, rectangle, self._context)  # pyright: ignore[reportArgumentType]
+        return rows[::-1]
+
+    def close(self) -> None:
+        """Give the buffers back."""
+        self._gl.make_current()
+        self._context.free()
+        self._gl.free()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

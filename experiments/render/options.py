@@ -1,0 +1,47 @@
+"""What ``hvf render`` is told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Render:
+    """Film a run from its recording: the workspace with its forces beside the figure and the default animation."""
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    """Folder of a run."""
+    out: Path | None = None
+    """Film to write, .mp4 or .gif; film.mp4 in the run's folder by default."""
+    gif: bool = False
+    """Write a GIF beside it as well, half as large, every second frame."""
+    show: Literal["both", "workspace", "stage"] = "both"
+    """What is seen."""
+    camera: Literal["three-quarter", "front", "side", "back", "above"] = "three-quarter"
+    """From where the figure is seen, with respect to where it faces."""
+    ghost: Literal["default", "animation", "none"] = "default"
+    """What stands beside the figure: the curve's own animation, that of the hand's path, or nobody."""
+    start: float = 0.0
+    """Of what is shown [s]."""
+    seconds: float | None = None
+    """Of what is shown [s]; to the end by default."""
+    width: int = 1280
+    """Of a frame [pixels]."""
+    height: int = 720
+    """Of a frame [pixels]."""
+    fps: float = 30.0
+    """Frames per second."""
+    overwrite: bool = False
+    """Replace the film if it exists."""
+
+    def __call__(self) -> int:
+        """Render."""
+        from experiments.render.film import Film, render
+
+        film = Film(
+            self.show, self.camera, self.ghost, self.start, self.seconds, self.width, self.height, self.fps
+        )  # fmt: skip
+        render(self.folder, self.out or self.folder / "film.mp4", film, self.gif, self.overwrite)
+        return 0

@@ -1,0 +1,81 @@
+"""A picture of a run from its recording: the Phantom at the hardest push, moments of the figure beside its ghost."""
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import numpy.typing as npt
+
+from experiments.render.graphics import Canvas, Image, View, offscreen_backend
+from experiments.render.scenes import Stage, Workspace
+from experiments.render.shown_world import STAGE, ShownWorld, shown_world
+from experiments.render.timeline import Timeline, timeline
+from experiments.results.folder import RECORDING
+from models.humanoid.skeleton import N_POSE
+from models.mocap.clip import PlanarDisplacement
+from sim.recording.recording import Recording
+
+Array = npt.NDArray[np.float64]
+
+WIDTH, HEIGHT, FPS = 1440, 600, 30.0
+DEVICE_SHARE = 0.34  # of the width
+MOMENTS = 5  # of the figure, evenly over the second half of the run
+SPACING = 1.1  # between them [m]
+GHOST_AT = np.array([-0.6, 0.35])  # from the figure: behind it, to its left [m]
+_VIEW = View((-0.2, 0.1, 0.85), 6.9, 180.0, -10.0)
+
+
+def draw_picture(folder: Path, target: Path) -> None:
+    """Render the picture of a run into a PNG file.
+
+    Raises
+    ------
+    SimError
+        If the recording or this machine's graphics do not do.
+    """
+    with Recording(folder / RECORDING) as recording:
+        world = shown_world(recording, WIDTH, HEIGHT)
+        moments = timeline(recording, folder, world, FPS, 0.0, None, "default")
+        left = round(DEVICE_SHARE * WIDTH) if world.has_figure else WIDTH
+        with Canvas(world.model, offscreen_backend(), 20_000) as canvas:
+            picture = _device(recording, world, moments, canvas, left)
+            if world.has_figure:
+                picture = np.hstack((picture, _figures(recording, world, moments, canvas, WIDTH - left)))
+    matplotlib.image.imsave(target, picture)
+
+
+def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
+    """The workspace at the hardest push."""
+    user = recording.channel("ticks", "user")
+    row = int(np.argmax([np.linalg.norm(user[int(tick)]) for tick in moments.ticks]))
+    Stage(recording, world, moments, "front", 1.0).put(row)
+    return Workspace(recording, world, moments).picture(canvas, row, width, HEIGHT)
+
+
+def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
+    """Moments side by side, turned to the camera together with their ghosts."""
+    qpos, at = recording.channel("frames", "qpos"), world.figure_at
+    n, across = len(moments.t), 0.5 * (MOMENTS - 1) * SPACING
+    for k, row in enumerate(np.linspace(n // 2, n - 1, MOMENTS).astype(int)):
+        state = qpos[int(moments.frames[row])].copy()
+        pose, place = state[at : at + N_POSE].copy(), np.array([0.0, across - k * SPACING])
+        ghost = None if moments.ghost is None else moments.ghost[row]
+        state[at : at + N_POSE] = _facing_the_camera(pose, place).moved(pose)
+        if ghost is not None:
+            ghost = _facing_the_camera(ghost, place + GHOST_AT).moved(ghost)
+        world.put(state, ghost)
+        if k == 0:
+            canvas.look(world.data, _VIEW, STAGE)
+        else:
+            canvas.add(world.data)
+    return canvas.picture(width, HEIGHT)
+
+
+def _facing_the_camera(pose: Array, place: Array) -> PlanarDisplacement:
+    """The move over the floor that puts a pose at a place, facing +x."""
+    w, x, y, z = pose[3:7]
+    yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    c, s = np.cos(-yaw), np.sin(-yaw)
+    return PlanarDisplacement(
+        float(place[0] - c * pose[0] + s * pose[1]), float(place[1] - s * pose[0] - c * pose[1]), -yaw
+    )

@@ -1,0 +1,119 @@
+"""Which rows of a recording a film shows, where its camera goes, and how high figures stand over the floor."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.render.shown_world import ShownWorld
+from experiments.results.folder import DEFAULT
+from models.mocap.library import load_clip
+from sim.errors import SimError
+from sim.recording.recording import Recording
+from sim.viewer.framing import followed
+
+Array = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
+Ghost = Literal["default", "animation", "none"]
+"""The animation of the curve as it was, that of the hand's path, or nobody."""
+
+TURN_SECONDS = 4.0  # over which the figure's heading is averaged
+FASTEST_TURN = 30.0  # of a camera that goes round with the figure [°/s]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """A film's moments.
+
+    Attributes
+    ----------
+    t : array (n,)
+        Time in the recording [s].
+    ticks, frames : array (n,)
+        Rows of its two groups.
+    ghost : array (n, 75) or None
+        Pose of the ghost.
+    kind : Ghost
+        What it is.
+    floor : array (n, 2)
+        Path of the camera over the floor [m].
+    heading : array (n,)
+        Where the figure faces, slowly [degrees].
+    """
+
+    t: Array
+    ticks: Rows
+    frames: Rows
+    ghost: Array | None
+    kind: Ghost
+    floor: Array
+    heading: Array
+
+
+def timeline(
+    recording: Recording, folder: Path, world: ShownWorld, fps: float, start: float, seconds: float | None, ghost: Ghost
+) -> Timeline:
+    """The moments of a film.
+
+    Parameters
+    ----------
+    recording : Recording
+    folder : Path
+        Where it lies, with the default animation beside it.
+    world : ShownWorld
+    fps : float
+        Of the film [1/s].
+    start : float
+        Of what is shown [s].
+    seconds : float or None
+        Of what is shown; all that there is by default [s].
+    ghost : Ghost
+        What is wanted; a run that was cut short has no default animation, and gets the other.
+
+    Raises
+    ------
+    SimError
+        If nothing was recorded at that time.
+    """
+    ticks_t, frames_t = (recording.channel(group, "t")[:] for group in ("ticks", "frames"))
+    end = float(ticks_t[-1])
+    if not 0.0 <= start < end:
+        raise SimError(f"--start is {start:g} s; expected a time from 0 to {end:.3g} s, which are recorded")
+    until = end if seconds is None else min(end, start + seconds)
+    t = start + np.arange(int((until - start) * fps) + 1) / fps
+    ticks, frames = (np.clip(np.searchsorted(of, t), 0, len(of) - 1) for of in (ticks_t, frames_t))
+    if not world.has_figure:
+        return Timeline(t, ticks, frames, None, "none", np.zeros((len(t), 2)), np.zeros(len(t)))
+    qpos, at = recording.channel("frames", "qpos"), world.figure_at
+    roots = np.array([qpos[int(k)][at : at + 7] for k in frames])
+    path = followed(roots[:, :2], fps)
+    middle = np.zeros(2) if np.any(path) else np.median(roots[:, :2], axis=0)
+    heading = _slow_heading(roots[:, 3:7], fps)
+    return Timeline(t, ticks, frames, *_ghost(recording, folder, frames, ghost), path + middle, heading)
+
+
+def _ghost(recording: Recording, folder: Path, frames: Rows, wanted: Ghost) -> tuple[Array | None, Ghost]:
+    """Poses of the ghost at rows of the recording's frames, and what it is."""
+    if wanted == "none":
+        return None, wanted
+    file = folder / DEFAULT
+    if wanted == "animation" or not file.exists():
+        reference = recording.channel("frames", "reference")
+        return np.array([reference[int(k)] for k in frames]), "animation"
+    clip = load_clip(file)
+    stride = max(1, round(recording.rates["frames"] / clip.fps))
+    return clip.poses[np.minimum(frames // stride, clip.n_frames - 1)], "default"
+
+
+def _slow_heading(q: Array, fps: float) -> Array:
+    """Where roots (n, 4) face [degrees], averaged; where that turns too fast for a camera, what it is at first."""
+    w, x, y, z = q.T
+    turns = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    window = int(TURN_SECONDS * fps) | 1
+    padded = np.pad(turns, window // 2, mode="reflect", reflect_type="odd") if len(turns) > 1 else turns
+    slow = np.rad2deg(np.convolve(padded, np.full(window, 1.0 / window), mode="valid")) if len(turns) > 1 else turns
+    if len(slow) > 1 and np.max(np.abs(np.diff(slow))) * fps > FASTEST_TURN:
+        return np.full(len(slow), np.rad2deg(turns[0]))
+    return slow

@@ -1,0 +1,106 @@
+"""Plots on a run's page that can be zoomed, with a line where the replay is; drawn by a script in the page."""
+
+import html
+import json
+from importlib.resources import files
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.recording.recording import Recording
+from sim.viewer.palette import CURVE, FIELD, USER
+
+Array = npt.NDArray[np.float64]
+
+POINTS = 1500  # of a line at most: of a longer run, each is the largest value of its share of the time
+
+
+class Line(NamedTuple):
+    """A line of a plot: its name, its colour and its values at equal steps of time."""
+
+    name: str
+    color: str
+    values: Array
+
+
+class Plot(NamedTuple):
+    """Lines over the time of a run, in one unit."""
+
+    title: str
+    unit: str
+    lines: tuple[Line, ...]
+
+
+def plots_html(recording: Recording) -> str:
+    """A section of a page with the plots of a recording; an empty text if it has none."""
+    t = recording.channel("ticks", "t")
+    plots = _plots(recording)
+    if not plots:
+        return ""
+    data = {
+        "start": float(t[0]), "end": float(t[-1]),
+        "plots": [
+            {"unit": plot.unit, "lines": [{"name": n, "color": c, "y": _short(values)} for n, c, values in plot.lines]}
+            for plot in plots
+        ],
+    }  # fmt: skip
+    canvases = "".join(
+        f'<div class="over-time"><b>{html.escape(plot.title)}</b> [{html.escape(plot.unit)}] '
+        + " ".join(f'<span style="color:{line.color}">{html.escape(line.name)}</span>' for line in plot.lines)
+        + " <output></output></div>"
+        + f'<canvas class="plot" role="img" aria-label="{html.escape(plot.title)}"></canvas>'
+        for plot in plots
+    )
+    script = files("experiments.results").joinpath("plots.js").read_text(encoding="utf-8")
+    # A text in a script must not end it.
+    numbers = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
+    return (
+        f"{_STYLE}<h2>Over time</h2>{canvases}<p>Wheel or two fingers zoom, dragging moves, "
+        '<button id="plot-all">all</button> shows the whole run; the red line is where the replay is.</p>'
+        f'<script type="application/json" id="plot-data">{numbers}</script><script>{script}</script>'
+    )
+
+
+_STYLE = """<style>
+canvas.plot { width: 100%; height: 9rem; touch-action: pan-y; }
+.over-time { font-size: .9rem; margin-top: .8rem; color: #566072; }
+.over-time b { color: #222a38; }
+.over-time output { float: right; font-variant-numeric: tabular-nums; }
+</style>
+"""
+
+
+def _plots(recording: Recording) -> list[Plot]:
+    """Distance, forces, and of a physical figure how well it follows."""
+    ticks, frames = recording.groups["ticks"], recording.groups.get("frames", {})
+    found: list[Plot] = []
+    if "distance" in ticks:
+        source = recording.texts.get("distance_from", "the curve")
+        distance = Line("distance", CURVE, 1e3 * _largest(ticks["distance"][:]))
+        found.append(Plot(f"distance of the hand from {source}", "mm", (distance,)))
+    forces = (("force", "field", FIELD), ("user", "hand", USER))
+    lines = [
+        Line(name, color, _largest(np.linalg.norm(ticks[channel][:], axis=1)))
+        for channel, name, color in forces
+        if channel in ticks
+    ]
+    found += [Plot("forces", "N", tuple(lines))] * bool(lines)
+    if "joint_error" in frames and "body_weight" in recording.arrays:
+        weight = float(recording.array("body_weight"))
+        residual = 100.0 * _largest(np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
+        error = np.rad2deg(_largest(frames["joint_error"][:]))
+        found.append(Plot("residual force at the root", "% body weight", (Line("residual", CURVE, residual),)))
+        found.append(Plot("joints, RMS angle to the animation", "°", (Line("angle", CURVE, error),)))
+    return found
+
+
+def _largest(values: Array) -> Array:
+    """Values as they are, or of each of `POINTS` shares of a longer row the largest, so that no peak is lost."""
+    if len(values) <= POINTS:
+        return values
+    return np.maximum.reduceat(values, np.linspace(0, len(values), POINTS, endpoint=False).astype(int))
+
+
+def _short(values: Array) -> list[float]:
+    return [float(f"{value:.4g}") for value in np.nan_to_num(values)]

@@ -1,0 +1,83 @@
+"""A line that tells how long something still takes, by how long it took the last time on this machine."""
+
+import json
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import cast
+
+from rich.console import Console
+from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn
+from rich.text import Text
+
+from sim.compilation.unit_cache import cache_folder
+
+_WORTH_KEEPING = 2.0  # [s]
+
+
+class _Left(ProgressColumn):
+    """Time so far, and what is left of the expected."""
+
+    def __init__(self, expected: float | None):
+        super().__init__()
+        self._expected = expected
+
+    def render(self, task: Task) -> Text:
+        """As ``12 s, about 18 s left``."""
+        return Text(left(task.elapsed or 0.0, self._expected))
+
+
+def left(elapsed: float, expected: float | None) -> str:
+    """In words: how long it has taken and, if it was ever measured, takes still."""
+    if expected is None:
+        return f"{elapsed:.0f} s"
+    if elapsed > expected:
+        return f"{elapsed:.0f} s, longer than the {expected:.0f} s of the last time"
+    return f"{elapsed:.0f} s, about {expected - elapsed:.0f} s left"
+
+
+@contextmanager
+def working(what: str, share: float = 1.0) -> Generator[None]:
+    """Tell on stderr, where a person looks, what is done and how long it still takes.
+
+    Parameters
+    ----------
+    what : str
+        Such as ``lifting``; the time is kept under it.
+    share : float
+        How much of it there is, in units of its own, such as clips: time is taken to grow with it.
+    """
+    console, began = Console(stderr=True), time.perf_counter()
+    seconds = _kept().get(what)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), _Left(seconds and share * seconds))
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        bar.add_task(what, total=None)
+        yield
+    taken = time.perf_counter() - began
+    if taken > _WORTH_KEEPING:
+        _keep(what, taken / share)
+
+
+def _file() -> Path:
+    return cache_folder() / "durations.json"
+
+
+def _kept() -> dict[str, float]:
+    """Seconds by name; what is kept is a help, and never in the way."""
+    try:
+        kept = json.loads(_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(kept, dict):
+        return {}
+    items = cast(dict[str, object], kept).items()
+    return {name: float(value) for name, value in items if isinstance(value, int | float) and value > 0.0}
+
+
+def _keep(what: str, seconds: float) -> None:
+    try:
+        _file().parent.mkdir(parents=True, exist_ok=True)
+        _file().write_text(json.dumps(_kept() | {what: round(seconds, 2)}), encoding="utf-8")
+    except OSError:
+        return

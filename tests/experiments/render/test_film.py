@@ -1,0 +1,220 @@
+"""Films: from any kind of run, whole or not at all, with nobody seen below the floor."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from experiments.render.film import Film, Frames, Show, render
+from experiments.render.film_file import FilmFile, check_target
+from experiments.render.graphics import NoGraphics, offscreen_backend
+from experiments.render.lowest_point import lowest_point, seen_geoms
+from experiments.render.shown_world import GHOST
+from experiments.render.timeline import Ghost
+from models.humanoid.skeleton import N_POSE, rest_pose
+from models.mocap.clip import Clip
+from models.mocap.readers.own_bvh import write_bvh
+from models.scene import P_WH
+from sim.errors import SimError
+from sim.recording.recorder import Group, Recorder
+from sim.recording.recording import Recording
+from sim.world.world import World
+
+Colours = npt.NDArray[np.int64]
+
+SMALL = Film(width=160, height=120, fps=10.0)
+SECONDS, RATE, FRAME_RATE = 1.0, 1000.0, 125.0
+
+
+@pytest.fixture(scope="module")
+def backend() -> str:
+    try:
+        return offscreen_backend()
+    except NoGraphics as error:
+        pytest.skip(str(error))
+
+
+@dataclass
+class Told:
+    """What a run of a second did: how deep its figure was under the floor, and how far it went."""
+
+    kind: str = "physical"
+    depth: float = 0.0
+    travel: float = 0.0
+    force: float = 0.7
+    complete: bool = True
+
+
+def write_run(folder: Path, told: Told) -> Path:
+    """A recording in which the figure stands, or goes along x, and the stylus is pushed."""
+    world = World(kind=told.kind)
+    world.reset(np.zeros(3), rest_pose())
+    n, m = round(SECONDS * RATE), round(SECONDS * FRAME_RATE)
+    poses = np.tile(rest_pose(), (m, 1))
+    poses[:, 0] = told.travel * np.linspace(0.0, 1.0, m)
+    poses[:, 2] -= told.depth
+    qpos = np.tile(world.data.qpos, (m, 1))
+    if told.kind == "kinematic":
+        qpos = np.hstack((qpos, poses))
+    elif told.kind == "physical":
+        qpos[:, world.pose_at : world.pose_at + N_POSE] = poses
+    angle = np.linspace(0.0, 2.0 * np.pi, 241)
+    static = {
+        "curve": 0.05 * np.column_stack((np.cos(angle) - 1.0, np.sin(angle), 0.0 * angle)), "tube_radius": 0.02,
+        "p_WH": P_WH, "scene": np.array([1.75, 75.0, 1e-3, 1.25e-4]), "figure": told.kind,
+    }  # fmt: skip
+    frames: dict[str, tuple[int, ...]] = {"t": (), "qpos": (qpos.shape[1],)}
+    rows = {"t": np.arange(m) / FRAME_RATE, "qpos": qpos}
+    if told.kind != "none":
+        frames["reference"], rows["reference"] = (N_POSE,), poses
+    ticks = {
+        "t": np.arange(n) / RATE,
+        "p": np.zeros((n, 3)),
+        "force": np.tile(told.force * np.array([0.6, -0.8, 0.0]), (n, 1)),
+        "user": np.zeros((n, 3)),
+    }
+    shapes = {"t": (), "p": (3,), "force": (3,), "user": (3,)}
+    folder.mkdir()
+    groups = {"ticks": Group(RATE, shapes), "frames": Group(FRAME_RATE, frames)}
+    with Recorder(folder / "run.h5", {}, 1, groups, static) as recorder:
+        recorder.append("ticks", ticks)
+        recorder.append("frames", rows)
+        if told.complete:
+            recorder.close({"lines": []})
+            write_bvh(Clip(poses[::5], FRAME_RATE / 5, "default"), folder / "default.bvh")
+    return folder
+
+
+@pytest.mark.parametrize("kind", ["physical", "kinematic", "none"])
+def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, backend: str) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"
+    render(run, target, SMALL, gif=True)
+    frames, seconds = ffmpeg.count_frames_and_secs(str(target))
+    assert (frames, seconds) == (10, pytest.approx(1.0, abs=0.11))
+    assert ffmpeg.count_frames_and_secs(str(target.with_suffix(".gif")))[0] == 5
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.gif", "film.mp4", "run"]
+
+
+@pytest.mark.parametrize("kind", ["physical", "kinematic"])
+def test_nobody_is_drawn_below_the_floor_and_it_is_said_how_deep_they_were(
+    kind: str, tmp_path: Path, backend: str
+) -> None:
+    run = write_run(tmp_path / "run", Told(kind, depth=0.03))
+    with Recording(run / "run.h5") as recording:
+        frames = Frames(recording, run, SMALL, backend)
+        frames.frame(5)
+        world = frames.stage.world
+        for prefix in (world.prefix, GHOST):
+            assert lowest_point(world.model, world.data, seen_geoms(world.model, prefix)) >= -1e-9
+            assert frames.stage.clearance[prefix].lowest == pytest.approx(-0.03, abs=1e-3)
+        frames.close()
+
+
+def test_a_figure_that_travels_stays_in_the_picture(tmp_path: Path, backend: str) -> None:
+    run = write_run(tmp_path / "run", Told(travel=8.0))
+    with Recording(run / "run.h5") as recording:
+        frames = Frames(recording, run, Film(show="stage", ghost="none", width=160, height=120, fps=10.0), backend)
+        for row in (0, 5, 9):
+            picture = frames.frame(row)
+            # Trousers and shoes are the only dark things on the floor.
+            columns = np.nonzero(picture[30:100].max(axis=2) < 70)[1]
+            assert len(columns) > 20
+            assert 30 < columns.mean() < 130
+        frames.close()
+
+
+def drawn(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
+    """A frame below its words, as numbers."""
+    with Recording(run / "run.h5") as recording:
+        frames = Frames(recording, run, Film(show=show, ghost=ghost, width=320, height=240, fps=10.0), backend)
+        picture = frames.frame(3)[60:].astype(np.int64)
+        frames.close()
+    return picture
+
+
+def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(tmp_path: Path, backend: str) -> None:
+    run, rest = write_run(tmp_path / "run", Told()), write_run(tmp_path / "rest", Told(force=0.0))
+    for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):
+        red, _, blue = np.moveaxis(drawn(run, "stage", ghost, backend), 2, 0)
+        assert least <= np.count_nonzero((blue > red + 40) & (red > 90)) <= most, ghost
+    difference = drawn(run, "workspace", "none", backend) - drawn(rest, "workspace", "none", backend)
+    changed = np.abs(difference).max(axis=2) > 20
+    assert 60 < np.count_nonzero(changed) < 3000
+    assert np.count_nonzero(changed & (difference[..., 1] > difference[..., 0])) > 40  # it is green
+
+
+def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
+    tmp_path: Path, backend: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    run = write_run(tmp_path / "run", Told(complete=False))
+    render(run, tmp_path / "film.mp4", SMALL)
+    said = capsys.readouterr()
+    assert "cut short" in said.err
+    assert "lowest point of the figure" in said.out
+    with Recording(run / "run.h5") as recording:
+        frames = Frames(recording, run, SMALL, backend)
+        assert frames.moments.kind == "animation"
+        frames.close()
+
+
+def test_a_film_is_not_replaced_unasked_nor_written_in_a_format_that_is_none(tmp_path: Path) -> None:
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"mine")
+    with pytest.raises(SimError, match="--overwrite"):
+        check_target(film, overwrite=False)
+    check_target(film, overwrite=True)
+    with pytest.raises(SimError, match=r"\.mp4 or \.gif"):
+        check_target(tmp_path / "film.avi", overwrite=False)
+
+
+@pytest.mark.parametrize("wrong", [{"width": 161}, {"height": 20}, {"fps": 0.0}, {"seconds": 0.0}])
+def test_sizes_and_rates_that_make_no_film_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(SimError, match="expected"):
+        Film(**wrong)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"the old one")
+
+    def stopped() -> None:
+        with FilmFile(film, 160, 120, 10.0) as file:
+            file.add(np.zeros((120, 160, 3), dtype=np.uint8))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert film.read_bytes() == b"the old one"
+    assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
+
+
+@pytest.mark.slow
+def test_ctrl_c_on_the_command_leaves_nothing(tmp_path: Path, backend: str) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    run, film = write_run(tmp_path / "run", Told()), tmp_path / "films" / "film.mp4"
+    command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    deadline = time.monotonic() + 60.0
+    while not list(film.parent.glob(".*.mp4")) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=30)[1]
+    assert process.returncode == 130, said
+    assert "Traceback" not in said
+    assert not list(film.parent.iterdir())
+
+
+def test_without_graphics_it_says_in_a_line_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.render.graphics.OFFSCREEN", ("nothing_of_that_name",))
+    with pytest.raises(NoGraphics, match=r"^[^\n]*libegl1[^\n]*libosmesa6[^\n]*$"):
+        offscreen_backend()

@@ -1,0 +1,54 @@
+"""The lowest point of what is seen of a body, against the vertices of fine meshes of its geoms."""
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from mjviser.conversions import create_primitive_mesh
+
+from experiments.render.lowest_point import lowest_point, seen_geoms
+from models.humanoid.skeleton import figure_model, rest_pose
+
+_GEOMS = {
+    "sphere": "<geom type='sphere' size='.2'/>",
+    "capsule": "<geom type='capsule' size='.1 .3'/>",
+    "ellipsoid": "<geom type='ellipsoid' size='.1 .2 .35'/>",
+    "box": "<geom type='box' size='.1 .2 .3'/>",
+    "cylinder": "<geom type='cylinder' size='.1 .3'/>",
+    "mesh": "<geom type='mesh' mesh='wedge'/>",
+}
+_WEDGE = "<mesh name='wedge' vertex='0 0 0  1 0 0  0 1 0  0 0 2'/>"
+
+
+@pytest.mark.parametrize("kind", _GEOMS)
+@pytest.mark.parametrize("seed", range(3))
+def test_it_is_that_of_the_surface_however_it_is_turned(kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    q, p = rng.normal(size=4), rng.normal(size=3)
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><asset>{_WEDGE}</asset>"
+        f"<worldbody><body name='b'><freejoint/>{_GEOMS[kind]}</body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    data.qpos[:3], data.qpos[3:7] = p, q / np.linalg.norm(q)
+    mujoco.mj_kinematics(model, data)
+    if kind == "mesh":
+        vertices, expected_error = model.mesh_vert.astype(float), 1e-6
+    else:
+        mesh: trimesh.Trimesh = create_primitive_mesh(model, 0)
+        while len(mesh.vertices) < 3000 and kind not in ("box", "cylinder"):
+            mesh = mesh.subdivide()
+        vertices, expected_error = np.asarray(mesh.vertices), 0.02
+    surface = data.geom_xpos[0] + vertices @ data.geom_xmat[0].reshape(3, 3).T
+    found = lowest_point(model, data, seen_geoms(model, "b"))
+    assert found <= surface[:, 2].min() + 1e-6
+    assert found == pytest.approx(surface[:, 2].min(), abs=expected_error)
+
+
+def test_a_figure_at_rest_stands_on_its_soles_and_its_contact_spheres_are_not_seen() -> None:
+    model = figure_model()
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest_pose()
+    mujoco.mj_kinematics(model, data)
+    assert lowest_point(model, data, seen_geoms(model, "")) == pytest.approx(0.0, abs=1e-3)
+    assert len(seen_geoms(model, "left_foot")) == 3
