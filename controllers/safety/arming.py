@@ -65,7 +65,7 @@ def next_state(state: int, event: int) -> int:
 @njit
 def pushes(state: int) -> bool:
     """Whether the motors are on."""
-    return state == RAMPING or state == ACTIVE
+    return state in (RAMPING, ACTIVE)
 
 
 def mermaid() -> str:
