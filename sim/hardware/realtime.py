@@ -27,19 +27,19 @@ def become_realtime() -> list[str]:
     said: list[str] = []
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-        said.append(f"scheduled before others (SCHED_FIFO, priority {PRIORITY})")
+        said.append(f"The servo runs before other processes (SCHED_FIFO, priority {PRIORITY}).")
     except (OSError, AttributeError) as error:
         said.append(
-            f"scheduled like any process, so it will be late now and then: SCHED_FIFO was refused ({error}); expected "
-            "CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf"
+            f"The servo runs like any process, and will be late now and then: SCHED_FIFO was refused ({error}); expected "
+            "CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf."
         )
     libc = ctypes.CDLL(None, use_errno=True)
     # Both at once: on its own a lock of what is to come would make later allocations fail at the limit.
     if hasattr(libc, "mlockall") and libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0:
-        said.append("its memory stays in RAM (mlockall)")
+        said.append("Its memory stays in RAM (mlockall).")
     else:
         reason = os.strerror(ctypes.get_errno())
-        said.append(f"its memory may be swapped out: mlockall was refused ({reason}); expected a higher memlock limit")
+        said.append(f"Its memory may be swapped out: mlockall was refused ({reason}); expected a higher memlock limit.")
     return said
 
 

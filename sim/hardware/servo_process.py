@@ -144,8 +144,8 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         broken = traceback.format_exc()
     finally:
         parts.driver.let_go()
-        parts.driver.close()
         channels.told.send(process.ended(broken))
+        parts.driver.close()
 
 
 def _leave(number: int, frame: object) -> None:
@@ -165,7 +165,7 @@ class _ServoProcess:
         """Compile and warm up with the motors off, and take precedence."""
         for _ in range(3):
             self._ticker.tick(0)
-        said = become_realtime() if self._clock.realtime else ["scheduled like any process, as it was asked to be"]
+        said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._channels.told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:

@@ -1,0 +1,1 @@
+"""Real devices: running one, and finding out what it is."""
