@@ -30,8 +30,8 @@ def become_realtime() -> list[str]:
         said.append(f"The servo runs before other processes (SCHED_FIFO, priority {PRIORITY}).")
     except (OSError, AttributeError) as error:
         said.append(
-            f"The servo runs like any process, and will be late now and then: SCHED_FIFO was refused ({error}); expected "
-            "CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf."
+            f"The servo runs like any process, and will be late now and then: SCHED_FIFO was refused "
+            f"({error}); expected CAP_SYS_NICE, or an rtprio for this user in /etc/security/limits.conf."
         )
     libc = ctypes.CDLL(None, use_errno=True)
     # Both at once: on its own a lock of what is to come would make later allocations fail at the limit.
