@@ -15,9 +15,10 @@ from models.scene import P_WH, PHANTOM, SceneConfig
 from sim.devices.device import DeviceState
 from sim.devices.driver import Driver
 from sim.devices.exchange import exchange
-from sim.hardware.emulated import EmulatedPhantom, Linkage
+from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import GatedServo
+from sim.world.linkage import Linkage
 from sim.world.world import World
 
 

@@ -28,11 +28,11 @@ from experiments.setups.defaults import resolved
 from models.scene import SceneConfig
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun, Look
-from sim.hardware.emulated import Linkage
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
+from sim.world.linkage import Linkage
 
 _POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 

@@ -4,73 +4,26 @@ Its clock runs by its own steps, one a command, so that a run with it is the sam
 a tremor, until the motors have been on for a while, and then lets go.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, gimbal_reading
-from models.phantom.parameters import PREMIUM_1_5
-from models.scene import PHANTOM, SceneConfig
+from models.scene import SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.devices.driver import READ, TELEMETRY_SIZE, TEMPERATURE, DeviceIdentity
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
 from sim.errors import SimError
 from sim.users.arm import Arm
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, phantom_port
+from sim.world.linkage import Linkage
+from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
 from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
-Triple = tuple[float, float, float]
 
 TREMOR, TREMOR_FREQUENCY = 1e-4, 10.0
 """Physiological tremor of a hand at rest: some 0.1 mm [m] at 8 to 12 Hz."""
-
-
-@dataclass(frozen=True)
-class Linkage:
-    """What a device is beside its geometry and weights.
-
-    Parameters
-    ----------
-    coulomb : three floats
-        Friction of the joints [N m].
-    viscous : three floats
-        [N m s/rad]
-    inertia : three floats
-        Added to the published one at the joints, as a rotor's or a handle's [kg m²]; may be negative.
-    delay : float
-        From a command to the motors' torque [s], below a servo period; in steps of the physics.
-    offset : three floats
-        Encoder reading minus angle [rad].
-
-    Raises
-    ------
-    SimError
-        If a friction is negative, or takes the rotors more than their inertia.
-    """
-
-    coulomb: Triple = PREMIUM_1_5.coulomb_friction
-    viscous: Triple = PREMIUM_1_5.viscous_friction
-    inertia: Triple = (0.0, 0.0, 0.0)
-    delay: float = 0.0
-    offset: Triple = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if min(*self.coulomb, *self.viscous, self.delay) < 0.0:
-            raise SimError(f"friction {self.coulomb}, {self.viscous} and delay {self.delay} must not be negative")
-        if min(np.add(self.inertia, PREMIUM_1_5.armature)) < 0.0:
-            raise SimError(f"an added inertia of {self.inertia} kg m² is more than the rotors have to give")
-
-    def into(self, world: World) -> None:
-        """Give a world's Phantom these numbers; delay and offset are not the world's."""
-        model = world.model
-        for axis, name in enumerate(ARM_JOINTS):
-            place = int(model.joint(PHANTOM + name).dofadr[0])
-            model.dof_frictionloss[place], model.dof_damping[place] = self.coulomb[axis], self.viscous[axis]
-            model.dof_armature[place] = PREMIUM_1_5.armature[axis] + self.inertia[axis]
 
 
 @entry_point

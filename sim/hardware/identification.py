@@ -17,11 +17,13 @@ between two commands is constant. What is left is linear in J, b, f_c, and nearl
 A window in which a joint comes to rest tells nothing of its friction's direction, and is left out for that joint. The
 offset of θ1 changes neither weight nor inertia, so no motion tells it: it is found at the joint's stop.
 
-Intervals have two parts. What noise does is read from the estimating equations themselves (Huber 1967; Newey & West,
-Econometrica 55, 1987, for windows that overlap), wide enough for all parameters at once (Bonferroni). With thousands of
-readings that is little; what the published masses are off by is more: it is what the parameters move by when the weight
-of each pair of bars is wrong by `MASS_ERROR`. All are in units of the commanded torque: a wrong torque constant scales
-them.
+The weights' torques W₂ cos θ₂ and W₃ sin θ₃ are found as well, for they are small differences of large masses: one
+percent of a published mass would else be an offset of a degree. All are in units of the commanded torque: a wrong
+torque constant scales them.
+
+Intervals are from the estimating equations themselves (Huber 1967; Newey & West, Econometrica 55, 1987, for windows
+that overlap), wide enough for all parameters at once (Bonferroni), and never narrower than `FLOOR` of the torque explains:
+what a sampled model of a linkage leaves out.
 """
 
 from collections.abc import Sequence
@@ -32,18 +34,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
-from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
+from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
 
 Array = npt.NDArray[np.float64]
 
 NAMES = (
     *(f"coulomb{i}" for i in (1, 2, 3)), *(f"viscous{i}" for i in (1, 2, 3)), *(f"inertia{i}" for i in (1, 2, 3)),
-    "delay", "offset2", "offset3",
+    "delay", "offset2", "offset3", "weight2", "weight3",
 )  # fmt: skip
-"""Of the parameters: [N m], [N m s/rad], added [kg m²], [s], [rad]."""
-_DELAY, _OFFSET = 9, 10
+"""Of the parameters: [N m], [N m s/rad], added [kg m²], [s], [rad], W₂ and W₃ [N m]."""
+_DELAY, _OFFSET, _WEIGHT = 9, 10, 12
 
 WINDOW = 0.12
 """Length of ψ [s]: its bandwidth, some 15 Hz, is above the motion's and below the encoders' noise."""
@@ -54,16 +56,8 @@ _STEPS = 12  # of Gauss–Newton
 _LAGS = 8  # windows that share noise with one: four overlap
 CONFIDENCE = 0.95
 """Of all intervals together."""
-MASS_ERROR = 0.01
-"""How far the masses of a device may be from the published ones, as a share: an assumption."""
-
-
-def _weight_errors() -> tuple[float, float]:
-    """What `MASS_ERROR` of every mass, each by itself, makes of the weights' torques about θ2 and θ3 [N m]."""
-    p = PREMIUM_1_5
-    second = np.linalg.norm([p.l1 * p.m_a, p.l5 * p.m_be, 0.5 * p.l1 * p.m_c])
-    third = np.linalg.norm([0.5 * p.l2 * p.m_a, p.l3 * p.m_c, p.l6 * p.m_df])
-    return float(MASS_ERROR * GRAVITY * second), float(MASS_ERROR * GRAVITY * third)
+FLOOR = 1e-3
+"""Share of the torque that the equations are trusted to: stiction's onset, the shape of a period, a bar that bends."""
 
 
 class Motion(NamedTuple):
@@ -91,9 +85,7 @@ class Identified:
     Attributes
     ----------
     values, margins : Array
-        Of the parameters, by `NAMES`, and half of their intervals, shape (12,).
-    noise : Array
-        What of the margins is noise; the rest is the masses', shape (12,).
+        Of the parameters, by `NAMES`, and half of their intervals, shape (14,).
     windows : int
         That were used, all joints together.
     unexplained : float
@@ -102,7 +94,6 @@ class Identified:
 
     values: Array
     margins: Array
-    noise: Array
     windows: int
     unexplained: float
 
@@ -181,29 +172,27 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
     left, sensitivity = _residuals(equations, values)
     quantile = float(norm.ppf(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
     noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, left, scale)))
-    margins = noise + _moved_by_weights(equations, values, sensitivity, scale)
-    explained = np.sqrt(np.mean(equations.torque**2))
-    unexplained = np.sqrt(np.mean([np.mean(left[equations.usable[:, i], i] ** 2) for i in range(3)]))
-    return Identified(values, margins, noise, int(counts.sum()), float(unexplained / explained))
+    sizes = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
+    margins = np.hypot(noise, _moved_by(FLOOR * sizes, equations, sensitivity, scale))
+    unexplained = [np.mean(left[equations.usable[:, i], i] ** 2) / sizes[i] ** 2 for i in range(3)]
+    return Identified(values, margins, int(counts.sum()), float(np.sqrt(np.mean(unexplained))))
 
 
-def _moved_by_weights(equations: _Equations, values: Array, sensitivity: Array, scale: Array) -> Array:
-    """By how much the parameters may move when the weights are wrong as `_weight_errors` says, shape (12,)."""
-    offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
-    theta = np.moveaxis(equations.middles - offset, -1, 0)
-    moved = np.zeros(len(NAMES))
-    shapes = np.cos(theta[1]) @ equations.weights, np.sin(theta[2]) @ equations.weights
-    for axis, (error, shape) in enumerate(zip(_weight_errors(), shapes, strict=True), start=1):
-        change = np.zeros(sensitivity.shape[:2])
-        change[:, axis] = -error * shape
-        rows, targets = _stacked(equations, sensitivity, change, scale)
-        moved += np.abs(np.linalg.lstsq(rows, -targets, rcond=None)[0])
-    return moved
+def _moved_by(torque: Array, equations: _Equations, sensitivity: Array, scale: Array) -> Array:
+    """How far torques at the joints of a size (3,) [N m] that are not in the equations move each parameter at most.
+
+    The worst of all shapes in time that have this RMS: by Cauchy and Schwarz the norm of the parameter's row of the
+    pseudo-inverse, times √n.
+    """
+    sizes = np.broadcast_to(torque / scale, equations.usable.shape)[equations.usable]
+    rows, _ = _stacked(equations, sensitivity, np.zeros(equations.usable.shape), scale)
+    return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows) * sizes, axis=1)
 
 
 def _first_guess() -> Array:
     values = np.zeros(len(NAMES))
     values[:3], values[3:6] = PREMIUM_1_5.coulomb_friction, PREMIUM_1_5.viscous_friction
+    values[_WEIGHT:] = WEIGHT_2, WEIGHT_3
     return values
 
 
@@ -245,8 +234,9 @@ def _mean_torque(equations: _Equations, delay: float) -> Array:
     return np.stack([w @ blended, w @ ((old - new) / equations.period)], axis=1)
 
 
-def _mechanics(equations: _Equations, offset: Array) -> Array:
-    """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) at an offset of the encoders (3,), shape (windows, 3)."""
+def _mechanics(equations: _Equations, values: Array) -> Array:
+    """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) with the offset and the weights of `values`, shape (windows, 3)."""
+    offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
     theta, rate = np.moveaxis(equations.middles - offset, -1, 0), np.moveaxis(equations.rates, -1, 0)
     zero = np.zeros_like(theta[0])
 
@@ -257,33 +247,29 @@ def _mechanics(equations: _Equations, offset: Array) -> Array:
     angles, speeds = (theta[0], theta[1], theta[2]), (rate[0], rate[1], rate[2])
     momentum = times(mass_matrix.py_func(angles), False)
     turned = times(coriolis_matrix.py_func(angles, speeds), True)
-    weight = [np.asarray(n) + zero for n in gravity_torques.py_func(angles)]
+    weight = zero, values[_WEIGHT] * np.cos(theta[1]), values[_WEIGHT + 1] * np.sin(theta[2])
     w, v = equations.weights, equations.slopes
     return np.stack([p @ v + (c - n) @ w for p, c, n in zip(momentum, turned, weight, strict=True)], axis=1)
 
 
 def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
-    """What is left of the equations, shape (windows, 3), and its derivatives, shape (windows, 3, 12)."""
+    """What is left of the equations, shape (windows, 3), and its derivatives, shape (windows, 3, 14)."""
     coulomb, viscous, inertia = values[:3], values[3:6], values[6:9]
-    offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
     torque = _mean_torque(equations, float(values[_DELAY]))
-    base, step = _mechanics(equations, offset), 1e-5
+    base, step = _mechanics(equations, values), 1e-5
     turning = np.einsum("k,wki->wi", equations.weights, equations.rates)
     sign = np.einsum("k,wki->wi", equations.weights, equations.signs)
     swing = np.einsum("k,wki->wi", equations.slopes, equations.rates)
     left = torque[:, 0] + base + inertia * swing - viscous * turning - coulomb * sign
     sensitivity = np.zeros((*left.shape, len(NAMES)))
     for i in range(3):
-        sensitivity[:, i, i], sensitivity[:, i, 3 + i], sensitivity[:, i, 6 + i] = (
-            -sign[:, i],
-            -turning[:, i],
-            swing[:, i],
-        )
+        sensitivity[:, i, i], sensitivity[:, i, 3 + i] = -sign[:, i], -turning[:, i]
+        sensitivity[:, i, 6 + i] = swing[:, i]
     sensitivity[:, :, _DELAY] = torque[:, 1]
-    for k in (1, 2):
-        moved = offset.copy()
+    for k in range(_OFFSET, len(NAMES)):
+        moved = values.copy()
         moved[k] += step
-        sensitivity[:, :, _OFFSET + k - 1] = (_mechanics(equations, moved) - base) / step
+        sensitivity[:, :, k] = (_mechanics(equations, moved) - base) / step
     return left, sensitivity
 
 

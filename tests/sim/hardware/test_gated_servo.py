@@ -7,8 +7,9 @@ from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import FAULT_RAMP, Fault
 from controllers.safety.oscillation import OscillationDetector
 from sim.errors import SimError
-from sim.hardware.emulated import EmulatedPhantom, Linkage
+from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker
+from sim.world.linkage import Linkage
 from tests.sim.bare_servos import bare_servo, device_world, follow_program, simulated
 from tests.sim.bare_servos import run as run_bare
 from tests.sim.hardware.emulation import (
