@@ -8,6 +8,7 @@ from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import verify_certificate
+from experiments.files.device_files import linkage_of
 from models.mocap.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -34,9 +35,15 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     ChangedInputs
         If it is of another field, device, delay or code.
     SimError
-        If it does not say that the loop is stable.
+        If it does not say that the loop is stable, or not for the delay of the device's file.
     """
     file = certificate / "certificate.json" if certificate.is_dir() else certificate
+    found_delay = linkage_of(config.device).delay
+    if delay < found_delay:
+        raise SimError(
+            f"the device file tells of a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
+            "here and in hvf certify"
+        )
     clips: tuple[Clip, ...] = ()
     if config.map.kind in ("led", "file"):
         config, clips = run_and_clips(None, config)

@@ -17,6 +17,7 @@ from controllers.safety.gate import Gate
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
+from experiments.files.device_files import linkage_of
 from experiments.files.json_text import json_text
 from experiments.hardware.outcome import Outcome, outcome_of
 from experiments.hardware.page import show_status
@@ -32,7 +33,6 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
-from sim.world.linkage import Linkage
 
 _POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 
@@ -79,11 +79,12 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         SceneConfig(servo_period=period, physics_step=config.clock.physics_step),
     )  # fmt: skip
     with contextlib.ExitStack() as stack:
-        make = MakeServo(serving, options.name, gate)
+        linkage = linkage_of(config.device)
+        make = MakeServo(serving, options.name, gate, linkage.offset)
         if options.name == EMULATED:
             scene = SceneConfig(servo_period=period, physics_step=config.clock.physics_step)
-            packets = stack.enter_context(emulated(MakeEmulated(scene, start_of(session), Linkage()), options.realtime))
-            make = MakeServo(serving, options.name, gate, packets=packets)
+            packets = stack.enter_context(emulated(MakeEmulated(scene, start_of(session), linkage), options.realtime))
+            make = MakeServo(serving, options.name, gate, linkage.offset, packets)
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, period, clock, job))
         ready = run.start()

@@ -22,8 +22,6 @@ class RunHardware:
     """Folder or certificate.json of `hvf certify` for this very field; only the emulated device runs without."""
     delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
     """Of the motors' torques, as it was certified [s]."""
-    device_file: Path | None = None
-    """What `hvf hardware identify` wrote of this device: its encoders' offset is taken off, its delay is asked for."""
     out: Path = Path("runs/hardware")
     """Folder to write."""
     overwrite: bool = False

@@ -10,6 +10,7 @@ from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
+from experiments.files.device_files import linkage_of
 from experiments.setups.defaults import resolved
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
@@ -83,6 +84,8 @@ def wire(
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     check_rates(config)
     world = World(config.scene, config.figure.kind)
+    if config.device.device_file:
+        linkage_of(config.device).into(world)
     return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready, device)
 
 

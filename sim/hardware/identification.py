@@ -22,8 +22,8 @@ percent of a published mass would else be an offset of a degree. All are in unit
 torque constant scales them.
 
 Intervals are from the estimating equations themselves (Huber 1967; Newey & West, Econometrica 55, 1987, for windows
-that overlap), wide enough for all parameters at once (Bonferroni), and never narrower than `FLOOR` of the torque explains:
-what a sampled model of a linkage leaves out.
+that overlap), wide enough for all parameters at once (Bonferroni), and never narrower than a torque of a share `FLOOR`
+that the equations leave out would explain.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5
@@ -56,7 +56,7 @@ _STEPS = 12  # of Gauss–Newton
 _LAGS = 8  # windows that share noise with one: four overlap
 CONFIDENCE = 0.95
 """Of all intervals together."""
-FLOOR = 1e-3
+FLOOR = 2e-4
 """Share of the torque that the equations are trusted to: stiction's onset, the shape of a period, a bar that bends."""
 
 
@@ -170,7 +170,7 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
         values = values + step
         values[_DELAY] = max(-1e-3, values[_DELAY])
     left, sensitivity = _residuals(equations, values)
-    quantile = float(norm.ppf(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
+    quantile = float(ndtri(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
     noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, left, scale)))
     sizes = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
     margins = np.hypot(noise, _moved_by(FLOOR * sizes, equations, sensitivity, scale))

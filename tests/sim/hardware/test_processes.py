@@ -20,6 +20,7 @@ from models.scene import SceneConfig
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun, Look
 from sim.hardware.emulated_process import SHOWN_SIZE, SHOWN_TORQUE, SHOWN_TRIPS, EmulatedEnd, host_device
+from sim.hardware.gated_servo import ROW_SIZE
 from sim.hardware.recorder_process import RecordingJob, record_rows
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
@@ -110,6 +111,29 @@ def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> Non
     assert ended.compute.count == ended.ticks
     assert ended.compute.p50 <= ended.compute.p99 <= ended.compute.p999 <= ended.compute.longest
     assert ended.descriptors == 0
+
+
+def bystander(status: SharedNumbers, began: SharedNumbers) -> None:
+    """Reads the servo's row for ever, as a page does."""
+    row = np.zeros(ROW_SIZE)
+    while True:
+        status.read(row)
+        began.write(np.ones(1))
+
+
+def test_a_page_that_is_frozen_and_killed_is_not_waited_for() -> None:
+    began, seen = SharedNumbers(1), np.zeros(1)
+    context = multiprocessing.get_context("spawn")
+    with running() as run:
+        page = context.Process(target=bystander, args=(run.status, began), daemon=True)
+        page.start()
+        until(run, lambda look: began.read(seen) and seen[0] > 0.0)
+        assert page.pid is not None
+        for sent in (signal.SIGSTOP, signal.SIGKILL):
+            os.kill(page.pid, sent)
+            goes_on(run)
+        page.join()
+    began.close()
 
 
 def limited(size: int, *arguments) -> None:
