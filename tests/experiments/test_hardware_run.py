@@ -67,7 +67,7 @@ def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: 
             assert verified(tmp_path, RunConfig(), 0.0) is certificate
     save_device(device_json(found(delay=8e-4), []), tmp_path / "device.json")
     config = RunConfig(device=Phantom(device_file=str(tmp_path / "device.json")))
-    with pytest.raises(SimError, match="a delay of 0.0008 s"):
+    with pytest.raises(SimError, match=r"a delay of 0\.0008 s"):
         verified(tmp_path, config, 0.0)
     assert verified(tmp_path, config, 1e-3)
 
