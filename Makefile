@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint format bench gate fuzz clean
+.PHONY: setup demo test test-all lint format bench gate fuzz hil-vm clean
 
 setup: $(READY)
 
@@ -42,6 +42,10 @@ gate: $(READY)
 fuzz: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
 	$(BIN)/python tests/models/mocap/fuzz_readers.py -max_total_time=300
+
+# The HID driver on Linux's own hidraw, in a virtual machine whose kernel has uhid; needs qemu-system-x86 and busybox-static.
+hil-vm: $(READY)
+	$(BIN)/python -m tests.hil.vm
 
 clean:
 	rm -rf .venv runs

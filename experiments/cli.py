@@ -29,7 +29,7 @@ from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
-from experiments.hardware.run_options import IdentifyHardware, RunHardware  # noqa: E402
+from experiments.hardware.command import Hardware  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
@@ -343,22 +343,6 @@ class Clips:
         for clip in found:
             print(f"{clip.name:14} {clip.duration:5.2f} s  {'closed' if clip.closes() else 'open'}")
         return 0
-
-
-HardwareCommand = (
-    Annotated[RunHardware, tyro.conf.subcommand("run")] | Annotated[IdentifyHardware, tyro.conf.subcommand("identify")]
-)
-
-
-@dataclass(frozen=True)
-class Hardware:
-    """Real devices: run a field on one, find out what one is."""
-
-    command: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[HardwareCommand]]
-
-    def __call__(self) -> int:
-        """Do it."""
-        return self.command()
 
 
 Command = (

@@ -1,1 +1,1 @@
-"""Devices that the loop runs with: the simulated Phantom, a replayed hand, and a driver behind two arrays."""
+"""Devices that the loop runs with: the simulated Phantom, a replayed hand, and real ones by their drivers."""

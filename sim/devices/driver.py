@@ -28,10 +28,12 @@ class DriverFault(SimError):
         Which.
     value : float
         What was seen, in the fault's unit.
+    detail : str
+        What the device says of it, where it has words.
     """
 
-    def __init__(self, fault: Fault, value: float = 0.0):
-        super().__init__(fault.words(value))
+    def __init__(self, fault: Fault, value: float = 0.0, detail: str = ""):
+        super().__init__(f"{fault.words(value)} ({detail})" if detail else fault.words(value))
         self.fault, self.value = fault, value
 
 
@@ -59,8 +61,17 @@ class DeviceIdentity(NamedTuple):
     calibrated: bool
 
 
-TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7
-"""Motors' temperatures [°C] (NaN where there is no sensor), last round trip [s], readings lost, read and refused."""
+TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, JITTER, STALENESS, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7, 8, 9
+"""Motors' temperatures [°C] (NaN where there is no sensor), last round trip [s], readings lost, read and refused,
+the arrival's jitter [s] (RFC 3550, section 6.4.1), and how much later than the quickest the last one came [s].
+What a transport cannot tell is NaN."""
+
+
+def fresh_telemetry() -> Array:
+    """Telemetry of a device that has told nothing yet: nothing read, lost or refused, all else not known."""
+    telemetry = np.full(TELEMETRY_SIZE, np.nan)
+    telemetry[[LOST, READ, BAD]] = 0.0
+    return telemetry
 
 
 class Driver(Protocol):
@@ -71,7 +82,7 @@ class Driver(Protocol):
     identity : DeviceIdentity
         Who the device is.
     telemetry : Array
-        See `TEMPERATURE`, shape (7,); rewritten in place by `read`.
+        See `TEMPERATURE`, of `TELEMETRY_SIZE`; rewritten in place by `read`.
     """
 
     identity: DeviceIdentity

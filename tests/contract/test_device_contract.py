@@ -20,6 +20,7 @@ from sim.recording.recording import Recording
 from sim.users.arm import Arm
 from sim.users.intent import Push
 from sim.world.world import World
+from tests.devices.drivers import KINDS, NODE_KINDS, made_rig
 from tests.sim.bare_servos import CUTOFF, Driver, bare_servo, device_world, follow_program, run, simulated
 
 TICKS = 400
@@ -61,8 +62,8 @@ def driven(device: Exchange) -> Callable[[int], None]:
     return before_tick
 
 
-@pytest.fixture(params=["simulated", "replayed", "exchange"])
-def make(request: pytest.FixtureRequest, rows: np.ndarray) -> Callable[..., Made]:
+@pytest.fixture(params=["simulated", "replayed", "exchange", *KINDS, *NODE_KINDS])
+def make(request: pytest.FixtureRequest, rows: np.ndarray, tmp_path: Path) -> Callable[..., Made]:
     def made(**parts) -> Made:
         world = device_world()
         if request.param == "simulated":
@@ -70,7 +71,11 @@ def make(request: pytest.FixtureRequest, rows: np.ndarray) -> Callable[..., Made
         if request.param == "replayed":
             return Made(bare_servo(world, replayed_hand(rows, world), **parts), world)
         device = exchange(world, CUTOFF)
-        return Made(bare_servo(world, device, **parts), world, driven(device))
+        if request.param == "exchange":
+            return Made(bare_servo(world, device, **parts), world, driven(device))
+        rig = made_rig(request.param, device, ARM, tmp_path)
+        request.addfinalizer(rig.driver.close)
+        return Made(bare_servo(world, device, **parts), world, rig)
 
     return made
 

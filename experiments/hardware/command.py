@@ -1,0 +1,103 @@
+"""``hvf hardware``: real devices from the command line."""
+
+from dataclasses import asdict, dataclass
+from typing import Annotated
+
+import tyro
+
+from experiments.config.part import above, part
+from experiments.files.json_text import json_text
+from experiments.hardware.run_options import IdentifyHardware, RunHardware
+
+
+@dataclass(frozen=True)
+class ListDevices:
+    """Name every device that this machine sees, and how to open it; nothing is sent to any."""
+
+    json: bool = False
+    """Print them as JSON."""
+
+    def __call__(self) -> int:
+        """Name them."""
+        from sim.devices.hardware_list import found_devices
+
+        devices = found_devices()
+        if self.json:
+            print(json_text([asdict(device) for device in devices]))
+            return 0
+        for device in devices:
+            ids = f"{device.vendor_id:04x}:{device.product_id:04x}" if device.vendor_id else "-"
+            print(f"{device.name or '-':24} {device.bus or '-':9} {ids:9} {device.transport:7} {device.path}")
+            print(f"{'':24} {' '.join(filter(None, (device.vendor, device.product)))}: {device.note}")
+        if not devices:
+            print("no device found; `hvf hardware doctor` says what may be missing")
+        return 0
+
+
+@part
+class Doctor:
+    """Say what is missing to drive a device from this machine, and measure how late the machine is."""
+
+    device: str | None = None
+    """Also open this device, and measure how it answers with its motors off; a name of `hvf hardware list`."""
+    seconds: Annotated[float, above(0.0, unit="s")] = 1.0
+    """How long to measure [s]."""
+    json: bool = False
+    """Print the findings as JSON."""
+
+    def __call__(self) -> int:
+        """Look, measure and say."""
+        from experiments.hardware.doctor import findings, measured_lateness, measured_link
+        from sim.devices.hardware_list import found_devices, open_device
+
+        devices = found_devices()
+        looked, late = findings(devices), measured_lateness(self.seconds)
+        link = identity = None
+        if self.device is not None:
+            driver = open_device(self.device)
+            try:
+                identity, link = driver.identity, measured_link(driver, self.seconds)
+            finally:
+                driver.close()
+        if self.json:
+            told = {
+                "devices": [asdict(device) for device in devices], "findings": [asdict(finding) for finding in looked],
+                "lateness": late._asdict(), "device": identity and identity._asdict(), "link": link and link._asdict(),
+            }  # fmt: skip
+            print(json_text(told))
+            return 0
+        for device in devices:
+            print(f"device   {device.name or device.path}: {device.vendor} {device.product}; {device.note}")
+        for finding in looked:
+            print("\n".join(finding.lines()))
+        print(
+            f"timing   a loop of 1 kHz, {late.loops} times: late by {late.p50 * 1e6:.0f} µs (p50), "
+            f"{late.p99 * 1e6:.0f} (p99), {late.p999 * 1e6:.0f} (p99.9), {late.worst * 1e6:.0f} at worst; "
+            f"{late.missed} deadlines missed"
+        )
+        if identity is not None and link is not None:
+            watchdog = "" if identity.watchdog or not identity.forces else "; no watchdog of its own"
+            calibrated = "" if identity.calibrated else "; not calibrated"
+            print(f"link     {identity.name} {identity.serial} ({identity.transport}){watchdog}{calibrated}")
+            for line in link.lines():
+                print(f"{'':9}{line}")
+        return 0
+
+
+Which = (
+    Annotated[ListDevices, tyro.conf.subcommand("list")]
+    | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+    | Annotated[RunHardware, tyro.conf.subcommand("run")]
+    | Annotated[IdentifyHardware, tyro.conf.subcommand("identify")]
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
+
+    which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
+
+    def __call__(self) -> int:
+        """Do it."""
+        return self.which()

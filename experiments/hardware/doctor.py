@@ -1,0 +1,227 @@
+"""What stands between this machine and a device: libraries, permissions, the system's limits, and how late it is."""
+
+import os
+import platform
+import sys
+import time
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.devices.dhd import find_dhd
+from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, Driver
+from sim.devices.exchange import READING_SIZE
+from sim.devices.hardware_list import RULES_FILE, FoundDevice
+from sim.devices.hdapi import find_hdapi
+
+Array = npt.NDArray[np.float64]
+
+PERIOD = 1e-3
+"""Of the loop whose lateness is measured [s]."""
+OK, WEAK, MISSING = "ok", "weak", "missing"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Parameters
+    ----------
+    what : str
+        Such as ``memory lock``.
+    state : str
+        ``ok``, ``weak`` (it goes, less well) or ``missing``.
+    says : str
+        What was found.
+    remedy : str
+        What would make it right; empty if it is.
+    """
+
+    what: str
+    state: str
+    says: str
+    remedy: str = ""
+
+    def lines(self) -> list[str]:
+        """In lines for a person."""
+        return [f"{self.state:8} {self.what}: {self.says}", *([f"{'':9}{self.remedy}"] if self.remedy else [])]
+
+
+class Lateness(NamedTuple):
+    """How much later than it was due a loop of 1 kHz woke up [s], and how many deadlines it missed by a period."""
+
+    loops: int
+    p50: float
+    p99: float
+    p999: float
+    worst: float
+    missed: int
+
+
+class Link(NamedTuple):
+    """How a device answers, with its motors off: medians of the times [s]; NaN where it does not tell."""
+
+    seconds: float
+    readings: int
+    lost: int
+    refused: int
+    round_trip: float
+    round_trip_p99: float
+    jitter: float
+    staleness_p99: float
+
+    def lines(self) -> list[str]:
+        """In lines for a person."""
+        return [
+            f"{self.readings} readings in {self.seconds:.2f} s, {self.lost} lost, {self.refused} refused",
+            f"round trip {_us(self.round_trip)} (p99 {_us(self.round_trip_p99)}), jitter {_us(self.jitter)}, "
+            f"p99 {_us(self.staleness_p99)} later than the quickest",
+        ]
+
+
+def _us(seconds: float) -> str:
+    return "not told" if np.isnan(seconds) else f"{seconds * 1e6:.0f} µs"
+
+
+def findings(devices: list[FoundDevice]) -> list[Finding]:
+    """Everything but the timing."""
+    return [*_libraries(), *_permissions(devices), *_limits()]
+
+
+def _libraries() -> list[Finding]:
+    found: list[Finding] = []
+    try:
+        found.append(Finding("hidapi", OK, f"{version('hidapi')}, for devices over HID"))
+    except PackageNotFoundError:
+        found.append(Finding("hidapi", MISSING, "the package is not installed", "pip install hidapi"))
+    for name, path, install in (
+        ("OpenHaptics (HD)", find_hdapi(), "install 3D Systems' OpenHaptics and device driver, for a Touch or Phantom"),
+        ("Force Dimension (dhd)", find_dhd(), "install the Force Dimension SDK, for an omega, delta, sigma or Falcon"),
+    ):
+        found.append(
+            Finding(name, OK, path) if path else Finding(name, MISSING, "the library is not installed", install)
+        )
+    return found
+
+
+def _permissions(devices: list[FoundDevice]) -> list[Finding]:
+    ours = [device for device in devices if device.kind in ("phantom", "spacemouse")]
+    if not ours:
+        return [Finding("devices", MISSING, "no Phantom over HID and no SpaceMouse is connected")]
+    return [
+        Finding(device.path, OK, f"{device.product}: this user may open it")
+        if device.usable
+        else Finding(
+            device.path, MISSING, f"{device.product}: this user may not open it",
+            f"put this line into {RULES_FILE}, then run `udevadm control --reload` and plug the device in again:\n"
+            f"{'':9}{device.udev_rule()}",
+        )
+        for device in ours
+    ]  # fmt: skip
+
+
+def _limits() -> list[Finding]:
+    if not sys.platform.startswith("linux"):
+        return [Finding("realtime", WEAK, f"{platform.system()} has no realtime class that is used here")]
+    import resource  # not on Windows
+
+    unlimited = resource.RLIM_INFINITY
+    priority = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
+    memory = unlimited if os.geteuid() == 0 else resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]  # root has no limit
+    limits = "in /etc/security/limits.d/hvf.conf, then log in again"
+    return [
+        _preemption(),
+        Finding("realtime priority", OK, "allowed")
+        if priority != 0 or _is_given_precedence()
+        else Finding("realtime priority", WEAK, "not allowed (RLIMIT_RTPRIO 0)", f"put `USER - rtprio 80` {limits}"),
+        Finding("memory lock", OK, "unlimited" if memory == unlimited else f"{memory / 2**20:.0f} MB")
+        if memory == unlimited or memory >= 2**30
+        else Finding(
+            "memory lock", WEAK, f"{memory / 2**20:.0f} MB (RLIMIT_MEMLOCK)", f"put `USER - memlock unlimited` {limits}"
+        ),
+        _governor(),
+    ]
+
+
+def _is_given_precedence() -> bool:
+    """Whether the system gives this process SCHED_FIFO; it is as before after this."""
+    policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        return False
+    os.sched_setscheduler(0, policy, parameter)
+    return True
+
+
+def _preemption() -> Finding:
+    if _text("/sys/kernel/realtime") == "1":
+        return Finding("kernel", OK, "PREEMPT_RT")
+    build = platform.version()
+    kind = next((word for word in ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT") if word in build), "no preemption")
+    if kind == "PREEMPT_RT":
+        return Finding("kernel", OK, kind)
+    return Finding("kernel", WEAK, kind, "a kernel with PREEMPT_RT is late by less, above all in the worst case")
+
+
+def _governor() -> Finding:
+    found = {_text(str(path)) for path in Path("/sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor")}
+    if not found:
+        return Finding("processor's frequency", OK, "not scaled by the system")
+    if found == {"performance"}:
+        return Finding("processor's frequency", OK, "governor performance")
+    return Finding(
+        "processor's frequency", WEAK, f"governor {', '.join(sorted(found))}", "cpupower frequency-set -g performance"
+    )
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+def measured_lateness(seconds: float = 1.0) -> Lateness:
+    """Lateness of a loop of 1 kHz with absolute deadlines in this process; one that is missed is left out."""
+    late: list[float] = []
+    begin, k, missed = time.monotonic(), 0, 0
+    while k * PERIOD < seconds:
+        k += 1
+        left = begin + k * PERIOD - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)
+        behind = time.monotonic() - begin - k * PERIOD
+        late.append(behind)
+        missed += int(behind / PERIOD)
+        k += int(behind / PERIOD)
+    p50, p99, p999 = np.quantile(late, [0.5, 0.99, 0.999])
+    return Lateness(len(late), float(p50), float(p99), float(p999), max(late), missed)
+
+
+def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
+    """How a device answers commands that leave its motors off."""
+    reading, told = np.zeros(READING_SIZE), driver.telemetry
+    rows: list[Array] = []
+    begin, first = time.monotonic(), told.copy()
+    while time.monotonic() - begin < seconds:
+        driver.write(np.zeros(3), False)
+        if driver.read(reading, 2.0 * PERIOD):
+            rows.append(told.copy())
+        time.sleep(0.5 * PERIOD)  # a device that waits for nothing is not asked as often as it can answer
+    spent = time.monotonic() - begin
+    counts = told - first
+    columns = np.array(rows) if rows else np.full((1, len(told)), np.nan)
+
+    def quantile(column: int, share: float) -> float:
+        known = columns[:, column][~np.isnan(columns[:, column])]
+        return float(np.quantile(known, share)) if len(known) else float("nan")
+
+    return Link(
+        spent, int(counts[READ]), int(counts[LOST]), int(counts[BAD]), quantile(ROUND_TRIP, 0.5),
+        quantile(ROUND_TRIP, 0.99), quantile(JITTER, 0.5), quantile(STALENESS, 0.99),
+    )  # fmt: skip

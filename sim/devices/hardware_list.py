@@ -1,0 +1,191 @@
+"""Which devices are at hand, and how to open one by its name.
+
+| name | what it opens |
+|---|---|
+| `hid:SERIAL`, or `hid` if there is only one | a Phantom that speaks the open HID protocol |
+| `hidraw:PATH` | the same, by its node |
+| `spacemouse`, `spacemouse:PATH` | a 3Dconnexion SpaceMouse |
+| `hdapi`, `hdapi:NAME` | a device of OpenHaptics, by its name in the vendor's set-up |
+| `dhd` | a device of Force Dimension |
+"""
+
+import importlib
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from sim.devices import hid_protocol as protocol
+from sim.devices.dhd import DhdDevice, find_dhd, load_dhd
+from sim.devices.driver import Driver
+from sim.devices.hdapi import HdapiDevice, find_hdapi, load_hdapi
+from sim.devices.hid import HidHandle, HidPhantom
+from sim.devices.spacemouse import SpaceMouse
+from sim.errors import SimError
+
+_TOUCH = (0x2988, 0x0304)
+_CONNEXION, _LOGITECH = 0x256F, 0x046D
+_GENERIC_DESKTOP, _MULTI_AXIS = 0x01, 0x08
+_BUSES = {1: "usb", 2: "bluetooth", 3: "i2c", 4: "spi"}  # hidapi's hid_bus_type
+
+RULES_FILE = "/etc/udev/rules.d/70-hvf.rules"
+"""Before 73, where systemd gives the nodes with the tag `uaccess` to who sits at the machine."""
+
+
+@dataclass(frozen=True)
+class FoundDevice:
+    """A device that the machine sees.
+
+    Parameters
+    ----------
+    name : str
+        For `open_device`; empty where there is no driver for it here.
+    bus, transport, path : str
+        Such as usb, hidraw, /dev/hidraw3.
+    vendor_id, product_id : int
+        0 where the transport has none.
+    vendor, product, serial : str
+        As the device tells.
+    kind : str
+        ``phantom``, ``spacemouse``, ``touch``, ``vendor`` (behind a vendor's library) or ``other``.
+    note : str
+        What a person has to know, or do, about it.
+    usable : bool
+        Whether this user may open it.
+    """
+
+    name: str
+    bus: str
+    transport: str
+    path: str
+    vendor_id: int
+    product_id: int
+    vendor: str
+    product: str
+    serial: str
+    kind: str
+    note: str
+    usable: bool
+
+    def udev_rule(self) -> str:
+        """The rule that gives this device's node to who sits at the machine."""
+        ids = f'ATTRS{{idVendor}}=="{self.vendor_id:04x}", ATTRS{{idProduct}}=="{self.product_id:04x}"'
+        return f'KERNEL=="hidraw*", SUBSYSTEM=="hidraw", {ids}, MODE="0660", TAG+="uaccess"'
+
+
+def hid_backend() -> Any:
+    """The module of hidapi that sees the kernel's nodes: `hidraw` on Linux, `hid` elsewhere.
+
+    Raises
+    ------
+    SimError
+        If it is not installed.
+    """
+    name = "hidraw" if sys.platform.startswith("linux") else "hid"
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise SimError("the package hidapi is not installed; install it with: pip install hidapi") from None
+
+
+def found_devices() -> list[FoundDevice]:
+    """Every device that the machine sees; nothing is sent to any of them, and none is opened."""
+    found = [_hid_device(row) for row in hid_backend().enumerate()]
+    for name, transport, find, product in (
+        ("hdapi", "HDAPI", find_hdapi, "3D Systems Touch or Phantom"),
+        ("dhd", "DHD", find_dhd, "Force Dimension omega, delta, sigma or Novint Falcon"),
+    ):
+        path = find()
+        if path is not None:
+            note = "the library is installed; whether a device is connected shows when it is opened"
+            found.append(FoundDevice(name, "", transport, path, 0, 0, "", product, "", "vendor", note, True))
+    return found
+
+
+def _hid_device(row: dict[str, Any]) -> FoundDevice:
+    path = row["path"].decode(errors="replace")
+    ids, usage = (row["vendor_id"], row["product_id"]), (row["usage_page"], row["usage"])
+    serial = row["serial_number"] or ""
+    name, kind, note = "", "other", "not a device that moves a stylus"
+    if ids == _TOUCH:
+        kind = "touch"
+        note = "its HID reports are not public, so nothing is sent to it; use hdapi, with OpenHaptics installed"
+    elif usage == (protocol.USAGE_PAGE, protocol.USAGE):
+        name, kind, note = f"hid:{serial}" if serial else f"hidraw:{path}", "phantom", "speaks the open HID protocol"
+    elif ids[0] in (_CONNEXION, _LOGITECH) and usage == (_GENERIC_DESKTOP, _MULTI_AXIS):
+        name, kind, note = f"spacemouse:{path}", "spacemouse", "six axes in, no force out"
+    usable = not path.startswith("/") or os.access(path, os.R_OK | os.W_OK)
+    if kind in ("phantom", "spacemouse") and not usable:
+        note = f"no permission to open {path}; `hvf hardware doctor` prints the udev rule"
+    return FoundDevice(
+        name, _BUSES.get(row.get("bus_type", 0), "?"), "hidraw", path, *ids, row["manufacturer_string"] or "",
+        row["product_string"] or "", serial, kind, note, usable,
+    )  # fmt: skip
+
+
+def open_hid(path: str) -> HidHandle:
+    """Hidapi's handle of a node.
+
+    Raises
+    ------
+    SimError
+        If it cannot be opened, with what to do about it.
+    """
+    handle = hid_backend().device()
+    try:
+        handle.open_path(path.encode())
+    except OSError:
+        if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
+            raise SimError(f"no permission to open {path}; `hvf hardware doctor` prints the udev rule") from None
+        raise SimError(f"{path} cannot be opened: it is gone, or another program has it") from None
+    return handle
+
+
+def open_device(name: str) -> Driver:
+    """The driver of a device by its name: see this file's head.
+
+    Raises
+    ------
+    SimError
+        If there is no such device, with those that there are; or it cannot be opened.
+    DriverFault
+        If it does not answer as it should.
+    """
+    kind, _, rest = name.partition(":")
+    opens: dict[str, Callable[[str], Driver]] = {
+        "hid": _open_phantom, "hidraw": _open_phantom, "spacemouse": _open_spacemouse,
+        "hdapi": lambda which: HdapiDevice(load_hdapi(), which), "dhd": lambda _: DhdDevice(load_dhd()),
+    }  # fmt: skip
+    if kind not in opens or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
+        raise SimError(f"no device is called {name!r}; {_what_there_is()}")
+    return opens[kind](rest)
+
+
+def _what_there_is() -> str:
+    names = [device.name for device in found_devices() if device.name]
+    kinds = "expected hid:SERIAL, hidraw:PATH, spacemouse, hdapi[:NAME] or dhd"
+    return f"{kinds}; found here: {', '.join(names) if names else 'none'}"
+
+
+def _the_one(which: str, kind: str) -> FoundDevice:
+    """The device of a kind with a serial number or path; the only one where none is asked for."""
+    there = found_devices()
+    for device in there:
+        if which and which in (device.serial, device.path) and device.kind != kind:
+            raise SimError(f"{which} is {device.product or 'a device'}, no {kind}: {device.note}")
+    fitting = [device for device in there if device.kind == kind and which in ("", device.serial, device.path)]
+    if len(fitting) != 1:
+        asked = f"{kind} {which}" if which else kind
+        raise SimError(f"there are {len(fitting)} devices for {asked!r}; {_what_there_is()}")
+    return fitting[0]
+
+
+def _open_phantom(which: str) -> Driver:
+    device = _the_one(which, "phantom")
+    return HidPhantom(open_hid(device.path), device.path)
+
+
+def _open_spacemouse(which: str) -> Driver:
+    device = _the_one(which, "spacemouse")
+    return SpaceMouse(open_hid(device.path), device.product, device.path)

@@ -1,0 +1,118 @@
+"""The 64-byte reports of a Phantom that speaks USB HID: `docs/hid-protocol.md`, and in C `firmware/hvf_hid.h`.
+
+All integers are little-endian. Byte 0 is the report's number, the last four are the CRC-32 of the 60 before them
+(CRC-32/ISO-HDLC, the one of Ethernet and zlib: at this length it finds every error of up to four bits, and every burst
+of up to 32).
+"""
+
+import struct
+import zlib
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.errors import SimError
+
+REPORT_SIZE = 64
+VERSION = (1, 0)
+MAGIC = 0x31465648
+USAGE_PAGE, USAGE = 0xFF48, 0x56
+INPUT, OUTPUT, IDENTITY, CALIBRATION = 1, 2, 3, 4
+SWITCH = ENABLE = CALIBRATED = 1
+
+STATUS_ENABLED, STATUS_CALIBRATED, STATUS_WATCHDOG, STATUS_HOT = 1, 2, 4, 8
+STATUS_AMPLIFIER, STATUS_ENCODER, STATUS_REFUSED = 16, 32, 64
+HAS_MOTORS, HAS_WATCHDOG, HAS_TEMPERATURE, HAS_GIMBAL = 1, 2, 4, 8
+NO_TEMPERATURE = -(2**15)
+
+_CRC_AT = REPORT_SIZE - 4
+
+INPUT_REPORT = np.dtype([
+    ("report", "u1"), ("flags", "u1"), ("status", "<u2"), ("sequence", "<u4"), ("time_us", "<u8"),
+    ("encoder", "<i4", 6), ("temperature", "<i2", 3), ("boot", "<u2"), ("answered", "<u4"), ("held_us", "<u4"),
+    ("refused", "<u2"), ("reserved", "<u2"), ("crc", "<u4"),
+])  # fmt: skip
+OUTPUT_REPORT = np.dtype([
+    ("report", "u1"), ("flags", "u1"), ("boot", "<u2"), ("sequence", "<u4"), ("watchdog_us", "<u4"),
+    ("torque", "<i4", 3), ("answers", "<u4"), ("reserved", "u1", 32), ("crc", "<u4"),
+])  # fmt: skip
+IDENTITY_REPORT = np.dtype([
+    ("report", "u1"), ("major", "u1"), ("minor", "u1"), ("reserved", "u1"), ("magic", "<u4"), ("capabilities", "<u4"),
+    ("rate_hz", "<u2"), ("boot", "<u2"), ("watchdog_max_us", "<u4"), ("peak_torque", "<u2", 3), ("name", "S12"),
+    ("firmware", "S8"), ("serial", "S14"), ("crc", "<u4"),
+])  # fmt: skip
+CALIBRATION_REPORT = np.dtype([
+    ("report", "u1"), ("flags", "u1"), ("reserved", "<u2"), ("zero", "<i4", 6), ("counts_per_turn", "<i4", 6),
+    ("motor_turns", "<u2", 3), ("reserved2", "<u2"), ("crc", "<u4"),
+])  # fmt: skip
+LAYOUTS = {INPUT: INPUT_REPORT, OUTPUT: OUTPUT_REPORT, IDENTITY: IDENTITY_REPORT, CALIBRATION: CALIBRATION_REPORT}
+
+TORQUE_UNIT, PEAK_UNIT, TEMPERATURE_UNIT, COUNT_UNIT, TURN_UNIT = 1e-6, 1e-5, 0.01, 1e-3, 1e-3
+"""Of a torque [N m], a peak torque [N m], a temperature [°C], counts a turn, and motor turns a joint turn."""
+
+
+_INPUT = struct.Struct("<BBHIQ6i3hHIIHHI")
+_OUTPUT_HEAD = struct.Struct("<BBHII3iI32x")
+
+
+class InputReport(NamedTuple):
+    """What an input report tells, field by field as in `INPUT_REPORT`: a record of NumPy's is slow to take apart."""
+
+    flags: int
+    status: int
+    sequence: int
+    time_us: int
+    encoder: tuple[int, ...]
+    temperature: tuple[int, ...]
+    boot: int
+    answered: int
+    held_us: int
+    refused: int
+
+
+def unpacked_input(report: bytes) -> InputReport:
+    """The fields of the 64 bytes of an input report."""
+    f = _INPUT.unpack(report)
+    return InputReport(f[1], f[2], f[3], f[4], f[5:11], f[11:14], f[14], f[15], f[16], f[17])
+
+
+def packed_output(enable: bool, boot: int, sequence: int, watchdog_us: int, torque: list[int], answers: int) -> bytes:
+    """The 64 bytes of an output report; fields as in `OUTPUT_REPORT`."""
+    head = _OUTPUT_HEAD.pack(OUTPUT, ENABLE if enable else 0, boot, sequence, watchdog_us, *torque, answers)
+    return head + zlib.crc32(head).to_bytes(4, "little")
+
+
+def blank(report: int) -> npt.NDArray[Any]:
+    """A report of a number with all else zero: a record, shape ()."""
+    made = np.zeros((), LAYOUTS[report])
+    made["report"] = report
+    return made
+
+
+def sealed(report: npt.NDArray[Any]) -> bytes:
+    """A report's 64 bytes, with its checksum."""
+    head = report.tobytes()[:_CRC_AT]
+    return head + zlib.crc32(head).to_bytes(4, "little")
+
+
+def is_sound(report: bytes) -> bool:
+    """Whether the checksum of 64 bytes is right."""
+    return zlib.crc32(report[:_CRC_AT]) == int.from_bytes(report[_CRC_AT:], "little")
+
+
+def unsealed(report: bytes, number: int) -> npt.NDArray[Any]:
+    """The record of a feature report.
+
+    Raises
+    ------
+    SimError
+        If it has another size or number, or a wrong checksum.
+    """
+    if len(report) != REPORT_SIZE or report[0] != number or not is_sound(report):
+        raise SimError(
+            f"feature report {number} has {len(report)} bytes"
+            + (f" and number {report[0]}" if report else "")
+            + f"; expected {REPORT_SIZE}, that number, and their CRC-32 (docs/hid-protocol.md)"
+        )
+    return np.frombuffer(report, LAYOUTS[number])[0]

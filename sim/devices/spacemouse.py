@@ -1,0 +1,151 @@
+r"""A 3Dconnexion SpaceMouse as a stylus without motors: a push on its cap is a velocity of the tip.
+
+.. math:: \dot p_H = v_{max}\,s(a_{xyz}), \qquad \omega_H = \omega_{max}\,s(a_{rot}), \qquad s(a) = a/350
+
+beyond a dead zone, within the Phantom's workspace: the tip stays where a step would leave it. Reports, as the
+`spacenav` projects have found them: number 1 with x, y, z or with all six, 2 with the three turns, each little-endian
+int16 of about ±350; 3 with a bit for each button. Axes: x right, y towards the user, z down.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from controllers.safety.faults import Fault
+from models.phantom.kinematics import R_HP, inside_workspace
+from models.phantom.parameters import PREMIUM_1_5
+from sim.devices.driver import BAD, READ, DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SIZE, READING_SWITCH
+from sim.devices.hid import HidHandle
+from sim.devices.virtual_arm import write_pose
+
+Array = npt.NDArray[np.float64]
+
+TOP_SPEED, TOP_TURN = 0.15, 1.5
+"""With the cap pushed all the way [m/s], [rad/s]: across the workspace of a river in about a second."""
+FULL = 350.0
+DEAD_ZONE = 0.03
+"""Share of the full push that a cap that nobody touches may show."""
+_LONGEST = 0.05  # s, over which a velocity is integrated: a page that froze must not fling the stylus
+_TRANSLATION, _TURN, _BUTTONS = 1, 2, 3
+# From the cap's axes to H: right is −y, towards the user −x, down −z.
+_R_HC = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+class SpaceMouse:
+    """The driver of a SpaceMouse behind a HID handle (see `sim.devices.driver.Driver`).
+
+    Parameters
+    ----------
+    handle : HidHandle
+        Open; owned from here on.
+    name, transport : str
+        For people.
+    clock : callable
+        Seconds, by which the velocity is integrated, and which the readings carry.
+    start : Array
+        Where the tip begins, in H [m], shape (3,).
+    """
+
+    def __init__(
+        self,
+        handle: HidHandle,
+        name: str,
+        transport: str,
+        clock: Callable[[], float] = time.perf_counter,
+        start: Array | None = None,
+    ):
+        self._handle, self._clock = handle, clock
+        handle.set_nonblocking(True)
+        self.identity = DeviceIdentity(name, transport, "", "", False, False, True)
+        self.telemetry = fresh_telemetry()
+        self._push, self._buttons = np.zeros(6), 0
+        self._p_H = np.zeros(3) if start is None else start.copy()
+        self._r_HS = np.eye(3)
+        self._last: float | None = None
+        self._taken = 0
+
+    def read(self, reading: Array, timeout: float) -> bool:
+        """See `sim.devices.driver.Driver.read`; a cap at rest says nothing, so there is a new reading at every call.
+
+        Raises
+        ------
+        DriverFault
+            If the device is gone.
+        """
+        try:
+            raw = self._handle.read(64)
+            for _ in range(64):
+                if not raw:
+                    break
+                self._take(bytes(raw))
+                raw = self._handle.read(64)
+        except OSError:
+            raise DriverFault(Fault.UNPLUGGED) from None
+        now = self._clock()
+        self._move(0.0 if self._last is None else min(now - self._last, _LONGEST))
+        self._last = now
+        told = np.zeros(READING_SIZE)
+        write_pose(told, np.array(R_HP).T @ self._p_H, self._r_HS)
+        reading[:] = told
+        self._taken += 1
+        reading[READING_SWITCH] = float(self._buttons & 1)
+        reading[READING_CLOCK] = now
+        reading[READING_SEQUENCE] = self._taken
+        return True
+
+    def _take(self, raw: bytes) -> None:
+        """Take one report; other kinds, such as the battery's, are left out, and one that is too short is refused."""
+        number, axes = raw[0], np.frombuffer(raw[1 : 1 + 2 * ((len(raw) - 1) // 2)], "<i2")
+        if number == _TRANSLATION and len(axes) >= 6:
+            self._push = _shares(axes[:6])
+        elif number == _TRANSLATION and len(axes) >= 3:
+            self._push[:3] = _shares(axes[:3])
+        elif number == _TURN and len(axes) >= 3:
+            self._push[3:] = _shares(axes[:3])
+        elif number == _BUTTONS and len(raw) >= 2:
+            self._buttons = raw[1]
+        else:
+            self.telemetry[BAD] += number in (_TRANSLATION, _TURN, _BUTTONS)
+            return
+        self.telemetry[READ] += 1.0
+
+    def _move(self, seconds: float) -> None:
+        step = TOP_SPEED * seconds * (_R_HC @ self._push[:3])
+        for i in range(3):
+            there = self._p_H.copy()
+            there[i] += step[i]
+            p_P = np.array(R_HP).T @ there
+            if inside_workspace((p_P[0], p_P[1], p_P[2])):
+                self._p_H = there
+        turned = Rotation.from_rotvec(TOP_TURN * seconds * (_R_HC @ self._push[3:])).as_matrix() @ self._r_HS
+        if self._gimbal_can(turned):
+            self._r_HS = turned
+
+    def _gimbal_can(self, r_HS: Array) -> bool:
+        told = np.zeros(READING_SIZE)
+        write_pose(told, np.array(R_HP).T @ self._p_H, r_HS)
+        # Near a pitch of 90° yaw and roll are one: a step there would throw the gimbal's angles about.
+        return abs(told[READING_GIMBAL + 1]) < 1.4 and all(
+            low <= angle <= high
+            for angle, (low, high) in zip(told[READING_GIMBAL:], PREMIUM_1_5.gimbal_limit, strict=True)
+        )
+
+    def write(self, torque: Array, enable: bool) -> None:
+        """Nothing: it has no motors."""
+
+    def let_go(self) -> None:
+        """Nothing: it has no motors."""
+
+    def close(self) -> None:
+        """Give the device back."""
+        self._handle.close()
+
+
+def _shares(axes: npt.NDArray[np.int16]) -> Array:
+    """Pushes as shares of the full one, −1 … 1, and 0 within the dead zone."""
+    share = np.clip(axes / FULL, -1.0, 1.0)
+    return np.where(np.abs(share) < DEAD_ZONE, 0.0, share)

@@ -1,0 +1,22 @@
+"""Devices that are real to the software: the reference firmware, and vendor libraries built from C."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compiled
+
+
+@pytest.fixture(scope="session")
+def firmware_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compiled(tmp_path_factory.mktemp("firmware"), ROOT / "firmware" / "hvf_hid.c")
+
+
+@pytest.fixture
+def firmware(firmware_library: Path) -> Firmware:
+    return Firmware(firmware_library)
+
+
+@pytest.fixture
+def handle(firmware: Firmware) -> FirmwareHandle:
+    return FirmwareHandle(firmware)

@@ -1,0 +1,38 @@
+"""FOLLOW on a device of the HID protocol, and in the pure simulation."""
+
+import numpy as np
+
+from controllers.safety.faults import FAULT_RAMP
+from sim.devices.exchange import exchange
+from sim.loop.loop import Loop, tick_channels
+from tests.devices.rig import Rig
+from tests.sim.bare_servos import CUTOFF, bare_servo, device_world, run, simulated
+
+LAP = 4.0  # s
+
+
+def simulated_follow() -> np.ndarray:
+    """Places of the stylus of the pure simulation [m], a row a tick; its force is ramped in, as a real device's is."""
+    world = device_world()
+    device = simulated(world)
+    device.faults[FAULT_RAMP] = 0.0
+    ticks, _ = run(bare_servo(world, device), round(LAP * 1e3))
+    return ticks.hand[:, 1:4]
+
+
+def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
+    """Places of the stylus of a device, whose rig is made for an exchange, and the rig."""
+    world = device_world()
+    device = exchange(world, CUTOFF)
+    rig = make_rig(device)
+    blocks = []
+
+    def keep(ticks, frames, n):
+        blocks.append(tick_channels(ticks, n)["p"].copy())
+
+    Loop(bare_servo(world, device), world, keep, before_tick=rig).run(LAP)
+    return np.concatenate(blocks), rig
+
+
+def rms(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=1))))

@@ -1,0 +1,152 @@
+"""Devices behind a /dev/hidraw0 that hidapi opens as it comes: the test's side of `node_server.py`."""
+
+import functools
+import json
+import os
+import socket
+import subprocess
+from pathlib import Path
+
+from sim.devices import hid_protocol as protocol
+from sim.devices.exchange import Exchange
+from sim.devices.hardware_list import open_device, open_hid
+from sim.users.arm import Arm
+from tests.devices.drivers import spacemouse_rig
+from tests.devices.firmware import ROOT, Firmware, compiled
+from tests.devices.rig import Linkage, Rig
+
+SYSTEM_PYTHON = "/usr/bin/python3"
+PRELOAD = "libumockdev-preload.so.0"
+SPACEMOUSE_DESCRIPTOR = bytes.fromhex("05010908a101850109300931093216a2fe265e0175109503810285020933093409358102c0")
+
+
+@functools.cache
+def umockdev_missing() -> str:
+    """Why there is no umockdev here; empty where there is one."""
+    probe = "import gi; gi.require_version('UMockdev', '1.0'); from gi.repository import UMockdev"
+    try:
+        told = subprocess.run([SYSTEM_PYTHON, "-c", probe], capture_output=True, timeout=30)
+    except OSError:
+        return f"no {SYSTEM_PYTHON}"
+    return "umockdev, python3-gi or gir1.2-umockdev-1.0 is not installed" if told.returncode else ""
+
+
+def why_not() -> str:
+    """Why nodes cannot be had in this process; empty where they can."""
+    if PRELOAD not in os.environ.get("LD_PRELOAD", ""):
+        return umockdev_missing() or "run by tests/devices/test_hidraw_nodes.py, which loads umockdev before"
+    return ""
+
+
+class HidrawNode:
+    """A /dev/hidraw0 that this process sees, with packets in and out.
+
+    Parameters
+    ----------
+    descriptor : bytes
+        HID report descriptor.
+    vendor, product : int
+    name, serial : str
+    """
+
+    def __init__(self, descriptor: bytes, vendor: int, product: int, name: str, serial: str = ""):
+        self._line, theirs = socket.socketpair()
+        self._server = subprocess.Popen(
+            [SYSTEM_PYTHON, str(Path(__file__).parent / "node_server.py"), str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+        )
+        theirs.close()
+        self._text, self._written = b"", []
+        self._tell(descriptor=descriptor.hex(), vendor=vendor, product=product, name=name, serial=serial)
+        os.environ["UMOCKDEV_DIR"] = self._until("directory")
+
+    def _tell(self, **said: object) -> None:
+        self._line.sendall(json.dumps(said).encode() + b"\n")
+
+    def _until(self, key: str):
+        """The next answer with a key; what was written meanwhile is kept."""
+        while True:
+            while b"\n" not in self._text:
+                got = self._line.recv(65536)
+                assert got, "the node's server has ended"
+                self._text += got
+            line, self._text = self._text.split(b"\n", 1)
+            said = json.loads(line)
+            if "written" in said:
+                self._written.append(bytes.fromhex(said["written"]))
+            if key in said:
+                return said[key]
+
+    def post(self, packet: bytes) -> None:
+        """An input report, which is there to be read when this returns."""
+        self._tell(packet=packet.hex())
+        self._until("done")
+
+    def feature(self, number: int, report: bytes) -> None:
+        """What a feature report is answered with."""
+        self._tell(feature=[number, report.hex()])
+        self._until("done")
+
+    def unplug(self) -> None:
+        self._tell(gone=True)
+        self._until("done")
+
+    def written(self) -> list[bytes]:
+        """Output and feature reports since the last call."""
+        self._tell(feature=[255, ""])  # whose answer comes behind all of them
+        self._until("done")
+        taken, self._written = self._written, []
+        return taken
+
+    def close(self) -> None:
+        self._line.close()
+        self._server.wait(10)
+
+
+class NodeFirmware:
+    """The reference firmware on the linkage, behind a node."""
+
+    def __init__(self, folder: Path, arm: Arm | None = None):
+        self.firmware = Firmware(compiled(folder, ROOT / "firmware" / "hvf_hid.c"))
+        self.linkage = Linkage(arm)
+        self.node = HidrawNode(self.firmware.descriptor(), 0x16C0, 0x0486, "Reference", "HVF-0001")
+        self._features()
+
+    def _features(self) -> None:
+        for number in (protocol.IDENTITY, protocol.CALIBRATION):
+            self.node.feature(number, self.firmware.feature(number))
+
+    def tell(self) -> None:
+        self.firmware.turn_to(self.linkage.angles())
+        self.node.post(self.firmware.tick())
+
+    def hear(self) -> None:
+        for report in self.node.written():
+            self.firmware.take(report)
+
+    def move(self) -> None:
+        self.hear()
+        self.linkage.turn(self.firmware.joint_torque)
+
+
+class NodeRig(Rig):
+    """A rig whose node goes when the driver is closed."""
+
+    def __init__(self, device: Exchange, driver, behind, node: HidrawNode):
+        super().__init__(device, driver, behind)
+        close = driver.close
+
+        def closed() -> None:
+            close()
+            node.close()
+
+        driver.close = closed
+
+
+def node_rig(kind: str, device: Exchange, arm: Arm, folder: Path) -> Rig:
+    if kind == "hid node":
+        behind = NodeFirmware(folder, arm)
+        return NodeRig(device, open_device("hid:HVF-0001"), behind, behind.node)
+    node = HidrawNode(SPACEMOUSE_DESCRIPTOR, 0x256F, 0xC635, "SpaceMouse Compact")
+    rig = spacemouse_rig(device, open_hid("/dev/hidraw0"), node.post, "/dev/hidraw0")
+    return NodeRig(device, rig.driver, rig.behind, node)

@@ -1,0 +1,162 @@
+"""Run by `test_hidraw_nodes.py`, with umockdev loaded: hidapi as it comes, on a /dev/hidraw0."""
+
+import time
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from experiments.cli import main
+from sim.devices.driver import READ, ROUND_TRIP, DriverFault
+from sim.devices.hardware_list import found_devices, hid_backend, open_device
+from sim.errors import SimError
+from tests.devices.follow import LAP, device_follow, rms, simulated_follow
+from tests.devices.hidraw_node import SPACEMOUSE_DESCRIPTOR, HidrawNode, NodeFirmware, NodeRig
+
+MOUSE = bytes.fromhex("05010902a1010901a10005091901290315002501950375018102c0c0")
+
+
+@pytest.fixture
+def phantom(tmp_path):
+    made = NodeFirmware(tmp_path)
+    yield made
+    made.node.close()
+
+
+def test_hidapi_is_the_wheel_s_own_and_sees_the_node(phantom) -> None:
+    (row,) = hid_backend().enumerate()
+    assert (row["vendor_id"], row["usage_page"], row["usage"]) == (0x16C0, 0xFF48, 0x56)
+    (device,) = found_devices()
+    assert (device.name, device.bus, device.kind, device.usable) == ("hid:HVF-0001", "usb", "phantom", True)
+
+
+@pytest.mark.parametrize("name", ["hid", "hid:HVF-0001", "hidraw:/dev/hidraw0"])
+def test_it_is_opened_by_any_of_its_names(phantom, name) -> None:
+    driver = open_device(name)
+    phantom.tell()
+    reading = np.zeros(9)
+    assert driver.read(reading, 0.5)
+    assert driver.identity.serial == "HVF-0001"
+    driver.close()
+
+
+def test_a_read_waits_as_long_as_it_is_told_and_no_longer(phantom) -> None:
+    driver, reading = open_device("hid"), np.zeros(9)
+    begin = time.perf_counter()
+    assert not driver.read(reading, 0.05)
+    assert 0.045 < time.perf_counter() - begin < 1.0
+    phantom.tell()
+    begin = time.perf_counter()
+    assert driver.read(reading, 5.0)
+    assert time.perf_counter() - begin < 1.0
+    driver.close()
+
+
+def test_unplugging_is_a_fault_when_reading_and_when_writing_and_letting_go_raises_nothing(phantom) -> None:
+    driver = open_device("hid")
+    driver.write(np.zeros(3), True)
+    phantom.node.unplug()
+    for do in (lambda: driver.read(np.zeros(9), 0.0), lambda: driver.read(np.zeros(9), 0.05),
+               lambda: driver.write(np.zeros(3), True)):  # fmt: skip
+        with pytest.raises(DriverFault) as refused:
+            do()
+        assert refused.value.fault is Fault.UNPLUGGED
+    driver.let_go()
+    driver.close()
+
+
+def test_reports_that_are_short_long_or_spoiled_arrive_as_they_were_sent(phantom) -> None:
+    driver, reading = open_device("hid"), np.zeros(9)
+    genuine = phantom.firmware.tick()
+    for size in (1, 63, 65):
+        phantom.node.post((genuine + b"\0")[:size])
+        with pytest.raises(DriverFault, match=f"a report of {size} bytes"):
+            driver.read(reading, 0.0)
+    for _ in range(2):
+        phantom.node.post(genuine[:40] + b"\xff" + genuine[41:])
+        assert not driver.read(reading, 0.0)
+    phantom.node.post(genuine[:40] + b"\xff" + genuine[41:])
+    with pytest.raises(DriverFault, match="3 reports in a row had a wrong checksum"):
+        driver.read(reading, 0.0)
+    driver.close()
+
+
+def test_follow_through_hidapi_and_the_firmware_is_the_simulation_s_run_within_a_millimetre(tmp_path) -> None:
+    behind = NodeFirmware(tmp_path)
+    places, rig = device_follow(lambda device: NodeRig(device, open_device("hid"), behind, behind.node))
+    assert rig.fault == Fault.NONE
+    assert rig.driver.telemetry[READ] == LAP * 1e3
+    assert np.isfinite(rig.driver.telemetry[ROUND_TRIP])
+    rig.driver.close()
+    assert rms(places, simulated_follow()) < 1e-3
+
+
+def test_a_touch_is_recognised_and_nothing_is_sent_to_it(capsys) -> None:
+    node = HidrawNode(MOUSE, 0x2988, 0x0304, "Touch", "T-1")
+    (device,) = found_devices()
+    assert (device.kind, device.name) == ("touch", "")
+    for name in ("hid:T-1", "hidraw:/dev/hidraw0"):
+        with pytest.raises(SimError, match="its HID reports are not public, so nothing is sent to it; use hdapi"):
+            open_device(name)
+    assert main(["hardware", "list"]) == 0
+    assert "2988:0304" in capsys.readouterr().out
+    assert node.written() == []
+    node.close()
+
+
+def test_any_other_device_is_listed_and_refused() -> None:
+    node = HidrawNode(MOUSE, 0x046D, 0xC077, "Mouse")
+    (device,) = found_devices()
+    assert (device.kind, device.name, device.product) == ("other", "", "Mouse")
+    with pytest.raises(SimError, match="is Mouse, no phantom: not a device that moves a stylus"):
+        open_device("hidraw:/dev/hidraw0")
+    with pytest.raises(SimError, match="there are 0 devices for 'spacemouse'"):
+        open_device("spacemouse")
+    assert node.written() == []
+    node.close()
+
+
+def test_a_spacemouse_is_opened_by_its_kind_and_by_its_node() -> None:
+    node = HidrawNode(SPACEMOUSE_DESCRIPTOR, 0x256F, 0xC635, "SpaceMouse Compact")
+    for name in ("spacemouse", "spacemouse:/dev/hidraw0"):
+        driver = open_device(name)
+        assert driver.identity.name == "SpaceMouse Compact"
+        driver.close()
+    assert node.written() == []
+    node.close()
+
+
+def test_a_node_that_may_not_be_opened_has_its_udev_rule_printed(phantom, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("sim.devices.hardware_list.os.access", lambda path, mode: path != "/dev/hidraw0")
+    (device,) = found_devices()
+    assert not device.usable
+    assert main(["hardware", "doctor", "--seconds", "0.05"]) == 0
+    said = capsys.readouterr().out
+    assert 'ATTRS{idVendor}=="16c0", ATTRS{idProduct}=="0486", MODE="0660", TAG+="uaccess"' in said
+    assert "/etc/udev/rules.d/70-hvf.rules" in said
+
+
+def test_the_doctor_measures_how_a_device_answers_with_its_motors_off(phantom, capsys) -> None:
+    import threading
+
+    done = threading.Event()
+
+    def live() -> None:
+        while not done.is_set():
+            phantom.hear()
+            phantom.tell()
+            time.sleep(1e-3)
+
+    device = threading.Thread(target=live)
+    device.start()
+    try:
+        assert main(["hardware", "doctor", "--device", "hid", "--seconds", "0.5"]) == 0
+    finally:
+        done.set()
+        device.join()
+    said = capsys.readouterr().out
+    assert "link     Reference HVF-0001 (/dev/hidraw0)" in said
+    assert "0 lost, 0 refused" in said
+    assert "round trip" in said
+    assert "not told" not in said
+    assert not phantom.firmware.motors.on

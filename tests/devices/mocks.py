@@ -1,0 +1,82 @@
+"""Vendor libraries built from C, and what stands behind them."""
+
+import ctypes
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, stylus_orientation
+from sim.devices.dhd import load_dhd
+from sim.devices.hdapi import load_hdapi
+from tests.devices.firmware import compiled
+from tests.devices.rig import Linkage
+
+R_HP_ = np.array(R_HP)
+HERE = Path(__file__).parent
+R_HD = np.diag([-1.0, -1.0, 1.0])
+
+
+def mock_hd(folder: Path) -> ctypes.CDLL:
+    path = compiled(folder, HERE / "mock_hd.c")
+    library = load_hdapi(str(path))
+    library.mock_velocity.argtypes = [ctypes.c_double] * 3
+    library.mock_temperature.argtypes = [ctypes.c_double]
+    library.mock_frames.restype = ctypes.c_ulong
+    library.mock_reset()
+    return library
+
+
+def mock_dhd(folder: Path) -> ctypes.CDLL:
+    library = load_dhd(str(compiled(folder, HERE / "mock_dhd.c")))
+    library.mock_reset()
+    return library
+
+
+def three(library: ctypes.CDLL) -> np.ndarray:
+    room = (ctypes.c_double * 3)()
+    library.mock_force(room)
+    return np.array(room)
+
+
+def pose_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tip in P [m] and the stylus's orientation in H (3, 3)."""
+    q = stylus_orientation(angles[:3], angles[3:])
+    return np.array(forward_kinematics(angles[:3])), Rotation.from_quat(q, scalar_first=True).as_matrix()
+
+
+class BehindVendor:
+    """A linkage whose pose a library tells, and that its force pulls; such a device carries its own weight."""
+
+    def __init__(self, library: ctypes.CDLL, linkage: Linkage):
+        self.library, self.linkage = library, linkage
+
+    def force_P(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def move(self) -> None:
+        theta = tuple(self.linkage.angles()[:3])
+        self.linkage.turn(np.add(joint_torques(theta, tuple(self.force_P())), gravity_torques(theta)))
+
+
+class BehindHd(BehindVendor):
+    def tell(self) -> None:
+        p_P, r_HS = pose_of(self.linkage.angles())
+        transform = np.eye(4)
+        transform[:3, :3], transform[:3, 3] = R_HP_.T @ r_HS @ R_HP_, 1e3 * p_P
+        self.library.mock_pose((ctypes.c_double * 16)(*transform.T.ravel()))
+        self.library.mock_tick()
+
+    def force_P(self) -> np.ndarray:
+        return three(self.library)
+
+
+class BehindDhd(BehindVendor):
+    def tell(self) -> None:
+        p_P, r_HS = pose_of(self.linkage.angles())
+        p_D, frame = R_HD @ R_HP_ @ p_P, R_HD @ r_HS @ R_HD
+        self.library.mock_pose((ctypes.c_double * 3)(*p_D), (ctypes.c_double * 9)(*frame.ravel()))
+
+    def force_P(self) -> np.ndarray:
+        return R_HP_.T @ R_HD @ three(self.library)

@@ -1,0 +1,90 @@
+"""A device's driver in the loop: what stands behind its arrays is the linkage in MuJoCo, in lock-step."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from controllers.safety.faults import FAULT_CODE, latch
+from sim.devices.driver import Driver, DriverFault
+from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange
+from sim.users.arm import Arm
+from sim.world.plant import make_plant
+from tests.devices.firmware import Firmware, FirmwareHandle
+from tests.sim.bare_servos import START, device_world, pass_period, simulated
+
+
+class Linkage:
+    """The Phantom in MuJoCo with a hand on it: true angles, and torques that somebody sets."""
+
+    def __init__(self, arm: Arm | None = None, start: np.ndarray = START):
+        self.world = device_world(start=start)
+        self.phantom = simulated(self.world, arm)
+        self.plant, self.ticks = make_plant(self.world), 0
+        self._applied = np.zeros((self.plant.substeps, 3))
+
+    def angles(self) -> np.ndarray:
+        """Joint and gimbal angles [rad], shape (6,)."""
+        port = self.phantom.port
+        return port.qpos[[*port.arm_q, *port.gimbal_q]]
+
+    def turn(self, torque: np.ndarray) -> None:
+        """A period passes under these torques of the joints."""
+        self.plant.ctrl[list(self.phantom.port.motor)] = torque
+        pass_period(self.plant, self.phantom.port, self.phantom.user, self.ticks * self.plant.period, self._applied)
+        self.ticks += 1
+
+
+class Behind(Protocol):
+    """The real side of a device."""
+
+    def tell(self) -> None:
+        """A period begins: a reading is under way."""
+        ...
+
+    def move(self) -> None:
+        """The period passes under whatever was commanded."""
+        ...
+
+
+class FirmwareBehind:
+    """The reference firmware on the linkage."""
+
+    def __init__(self, firmware: Firmware, handle: FirmwareHandle, linkage: Linkage):
+        self.firmware, self.handle, self.linkage = firmware, handle, linkage
+
+    def tell(self) -> None:
+        self.firmware.turn_to(self.linkage.angles())
+        self.handle.tick()
+
+    def move(self) -> None:
+        self.linkage.turn(self.firmware.joint_torque)
+
+
+class Rig:
+    """Called before each tick: sends the last command, and reads; a fault of the driver is latched in the device."""
+
+    def __init__(self, device: Exchange, driver: Driver, behind: Behind, period: float = 1e-3):
+        self.device, self.driver, self.behind, self.period = device, driver, behind, period
+
+    def send(self) -> None:
+        command = self.device.command
+        self.driver.write(command[COMMAND_TORQUE : COMMAND_TORQUE + 3], command[COMMAND_FAULT] == 0.0)
+
+    def __call__(self, tick: int) -> None:
+        if tick > 0:
+            self._guarded(self.send, tick)
+            self.behind.move()
+        self.behind.tell()
+        self._guarded(lambda: self.driver.read(self.device.reading, 0.0), tick)
+
+    def _guarded(self, do: Callable[[], object], tick: int) -> None:
+        try:
+            do()
+        except DriverFault as fault:
+            latch(self.device.faults, int(fault.fault), tick * self.period, fault.value)
+            self.driver.let_go()
+
+    @property
+    def fault(self) -> int:
+        return int(self.device.faults[FAULT_CODE])

@@ -1,0 +1,90 @@
+"""DHD by ctypes, against a mock of the library built from C."""
+
+import ctypes
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
+from sim.devices.dhd import LARGEST, DhdDevice, load_dhd
+from sim.devices.driver import DriverFault
+from sim.errors import SimError
+from tests.devices.mocks import mock_dhd, three
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return mock_dhd(tmp_path_factory.mktemp("dhd"))
+
+
+@pytest.fixture
+def dhd(library):
+    library.mock_reset()
+    return library
+
+
+def pose(dhd, p) -> None:
+    dhd.mock_pose((ctypes.c_double * 3)(*p), (ctypes.c_double * 9)(*np.eye(3).ravel()))
+
+
+def test_who_it_is_and_that_its_watchdog_of_ten_milliseconds_is_set(dhd) -> None:
+    device = DhdDevice(dhd)
+    assert device.identity == ("mock omega.6", "DHD", "321", "", True, True, True)
+    assert dhd.mock_watchdog() * 125e-6 == pytest.approx(0.01)
+
+
+def test_its_axes_are_towards_the_user_right_and_up(dhd) -> None:
+    device = DhdDevice(dhd)
+    dhd.mock_button(1)
+    pose(dhd, [0.01, 0.02, 0.03])
+    reading = np.zeros(9)
+    assert device.read(reading, 0.0)
+    np.testing.assert_allclose(
+        forward_kinematics(reading[3:6]), vector_to_device_frame((-0.01, -0.02, 0.03)), atol=1e-12
+    )
+    assert tuple(reading[[0, 2]]) == (1.0, 1.0)
+    dhd.mock_guard(1)
+    assert not device.read(reading, 0.0)
+
+
+def test_forces_are_newtons_in_its_axes_and_no_larger_than_the_limit(dhd) -> None:
+    device, reading, rng = DhdDevice(dhd), np.zeros(9), np.random.default_rng(6)
+    device.read(reading, 0.0)
+    theta = tuple(reading[3:6])
+    for _ in range(200):
+        f_H = rng.normal(0.0, 3.0, 3)
+        torque = np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta))
+        device.write(torque, True)
+        wanted = f_H * min(1.0, LARGEST / np.linalg.norm(f_H))
+        np.testing.assert_allclose(three(dhd), wanted * [-1.0, -1.0, 1.0], atol=1e-12)
+    device.write(torque, False)
+    assert not three(dhd).any()
+    device.write(torque, True)
+    with pytest.raises(DriverFault):
+        device.write(np.array([np.nan, 0.0, 0.0]), True)
+    assert not three(dhd).any()
+    device.write(torque, True)
+    device.close()
+    assert not dhd.mock_opened()
+
+
+@pytest.mark.parametrize(("code", "fault"), [(2, Fault.UNPLUGGED), (7, Fault.UNPLUGGED), (12, Fault.DEVICE_REPORTED)])
+def test_an_error_is_a_fault_with_the_library_s_words_when_reading_and_when_writing(dhd, code, fault) -> None:
+    device = DhdDevice(dhd)
+    dhd.mock_error(code)
+    for do in (lambda: device.read(np.zeros(9), 0.0), lambda: device.write(np.zeros(3), True)):
+        with pytest.raises(DriverFault, match="mock error") as refused:
+            do()
+        assert refused.value.fault is fault
+    device.let_go()
+
+
+def test_no_device_and_no_library_are_lines(dhd, monkeypatch) -> None:
+    dhd.mock_missing(1)
+    with pytest.raises(SimError, match="DHD opens no device: mock error"):
+        DhdDevice(dhd)
+    monkeypatch.setattr("sim.devices.dhd.find_dhd", lambda: None)
+    with pytest.raises(SimError, match="install the Force Dimension SDK"):
+        load_dhd()

@@ -1,0 +1,186 @@
+"""HDAPI by ctypes, against a mock of the library built from C."""
+
+import time
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from models.phantom.dynamics import gravity_torques
+from models.phantom.kinematics import forward_kinematics, joint_torques
+from sim.devices.driver import DriverFault
+from sim.devices.hdapi import ERRORS, HdapiDevice, load_hdapi
+from sim.errors import SimError
+from tests.devices.mocks import mock_hd, three
+from tests.devices.test_hid import Clock
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return mock_hd(tmp_path_factory.mktemp("hd"))
+
+
+@pytest.fixture
+def hd(library):
+    library.mock_reset()
+    return library
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def pose(hd, p_mm, rotation=None) -> None:
+    transform = np.eye(4)
+    transform[:3, 3] = p_mm
+    if rotation is not None:
+        transform[:3, :3] = rotation
+    hd.mock_pose((__import__("ctypes").c_double * 16)(*transform.T.ravel()))
+
+
+def told(device) -> np.ndarray:
+    reading = np.zeros(9)
+    assert device.read(reading, 0.0)
+    return reading
+
+
+def test_who_it_is_that_it_has_no_watchdog_and_that_it_is_calibrated(hd) -> None:
+    assert HdapiDevice(hd).identity == ("Mock Premium", "HDAPI", "M-42", "", True, False, True)
+
+
+@pytest.mark.parametrize(("state", "calibrated"), [(0x5000, True), (0x5001, True), (0x5002, False)])
+def test_a_device_that_can_calibrate_itself_is_asked_to(hd, state, calibrated) -> None:
+    hd.mock_calibration(state)
+    assert HdapiDevice(hd).identity.calibrated is calibrated
+
+
+def test_millimetres_become_metres_and_the_first_button_the_switch(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    pose(hd, [30.0, -20.0, 10.0])
+    hd.mock_buttons(3)
+    assert not device.read(np.zeros(9), 0.0)
+    hd.mock_tick()
+    reading = told(device)
+    np.testing.assert_allclose(forward_kinematics(reading[3:6]), [0.03, -0.02, 0.01], atol=1e-12)
+    np.testing.assert_array_equal(reading[:3], [1.0, 100.0, 1.0])
+    assert not device.read(reading, 0.0)
+
+
+def test_the_force_of_the_torques_is_what_the_motors_give_while_commands_come(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    hd.mock_tick()
+    theta, force = tuple(told(device)[3:6]), (0.5, -1.0, 0.3)
+    torque = np.add(joint_torques(theta, force), gravity_torques(theta))
+    device.write(torque, True)
+    assert not three(hd).any()
+    hd.mock_tick()
+    np.testing.assert_allclose(three(hd), force, atol=1e-12)
+    clock.now += 4.9e-3
+    hd.mock_tick()
+    np.testing.assert_allclose(three(hd), force, atol=1e-12)
+    clock.now += 0.2e-3
+    hd.mock_tick()
+    assert not three(hd).any()
+    device.write(torque, True)
+    hd.mock_tick()
+    assert three(hd).any()
+    device.write(torque, False)
+    hd.mock_tick()
+    assert not three(hd).any()
+
+
+def test_no_command_exceeds_the_device_s_nominal_force_and_none_makes_the_library_complain(hd, clock) -> None:
+    device, rng = HdapiDevice(hd, clock=clock), np.random.default_rng(7)
+    for _ in range(300):
+        torque = rng.normal(0.0, 3.0, 3) * rng.choice([1.0, 1e3, 1e9])
+        device.write(torque, True)
+        hd.mock_tick()
+        assert np.linalg.norm(three(hd)) <= 8.5 * (1.0 + 1e-12)
+        told(device)  # raises for an error
+    with pytest.raises(DriverFault) as refused:
+        device.write(np.array([0.0, np.inf, 0.0]), True)
+    assert refused.value.fault is Fault.FORCE_NOT_FINITE
+    hd.mock_tick()
+    assert not three(hd).any()
+
+
+@pytest.mark.parametrize("code", ERRORS)
+def test_every_error_of_the_library_is_a_fault_with_its_name(hd, clock, code) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    device.write(np.zeros(3), True)
+    hd.mock_velocity(300.0, 400.0, 0.0)
+    hd.mock_temperature(0.93)
+    hd.mock_error(code)
+    hd.mock_error(0x0304)  # what follows is of no interest
+    hd.mock_tick()
+    expected = {0x0200: (Fault.MOTORS_HOT, 0.93), 0x0203: (Fault.TOO_FAST, 0.5), 0x0302: (Fault.UNPLUGGED, 0x0302)}
+    with pytest.raises(DriverFault, match=ERRORS[code]) as refused:
+        device.read(np.zeros(9), 0.0)
+    assert (refused.value.fault, refused.value.value) == expected.get(code, (Fault.DEVICE_REPORTED, code))
+    hd.mock_tick()
+    told(device)  # once
+
+
+def test_where_the_phantom_cannot_be_or_what_is_no_number_is_a_fault(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    for p, fault in [([0.0, 0.0, 900.0], Fault.LEFT_WORKSPACE), ([np.nan, 0.0, 0.0], Fault.READING_NOT_FINITE)]:
+        pose(hd, p)
+        hd.mock_tick()
+        with pytest.raises(DriverFault) as refused:
+            device.read(np.zeros(9), 0.0)
+        assert refused.value.fault is fault
+
+
+def test_what_is_closed_gives_no_force_and_can_be_opened_again(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    device.write(np.ones(3), True)
+    hd.mock_tick()
+    assert three(hd).any()
+    device.close()
+    assert not three(hd).any()
+    assert not hd.mock_opened()
+    HdapiDevice(hd).close()
+
+
+def test_the_vendor_s_own_thread_serves_a_thousand_times_a_second(hd) -> None:
+    hd.mock_manual(0)
+    device = HdapiDevice(hd)
+    reading, n, first = np.zeros(9), 0, time.perf_counter()
+    while n < 200:
+        n += device.read(reading, 0.5)
+        device.write(np.zeros(3), True)
+    assert reading[0] >= 200.0
+    assert time.perf_counter() - first < 5.0
+    device.close()
+    frames = hd.mock_frames()
+    time.sleep(0.01)
+    assert hd.mock_frames() == frames
+
+
+@pytest.mark.parametrize(
+    ("order", "says"),
+    [("mock_missing", "HD_DEVICE_FAULT; expected a name"),
+     ("mock_no_scheduler", "scheduler at 1000 Hz: HD_TIMER_ERROR")],
+)  # fmt: skip
+def test_a_device_or_scheduler_that_is_not_there_is_a_line(hd, order, says) -> None:
+    getattr(hd, order)(1)
+    with pytest.raises(SimError, match=says):
+        HdapiDevice(hd)
+
+
+def test_another_name_is_a_line(hd) -> None:
+    with pytest.raises(SimError, match="does not open Left"):
+        HdapiDevice(hd, "Left")
+
+
+def test_a_library_that_is_missing_is_a_line_with_what_to_install(monkeypatch) -> None:
+    monkeypatch.setattr("sim.devices.hdapi.find_hdapi", lambda: None)
+    with pytest.raises(SimError, match="install 3D Systems' OpenHaptics"):
+        load_hdapi()
+
+
+def test_a_library_that_is_another_is_a_line(tmp_path) -> None:
+    (tmp_path / "libHD.so").write_text("not a library")
+    with pytest.raises(SimError, match="is not OpenHaptics' HD library"):
+        load_hdapi(str(tmp_path / "libHD.so"))

@@ -1,0 +1,173 @@
+"""The HID driver on the reference firmware: what is read, what is sent, and what is measured on the way."""
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from models.phantom.kinematics import ENCODER_STEP, GIMBAL_STEP
+from models.phantom.parameters import PREMIUM_1_5
+from sim.devices import hid_protocol as protocol
+from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, TEMPERATURE, DriverFault
+from sim.devices.hid import HidPhantom
+from sim.errors import SimError
+from tests.devices.firmware import Firmware, FirmwareHandle
+from tests.devices.follow import device_follow, rms, simulated_follow
+from tests.devices.rig import FirmwareBehind, Linkage, Rig
+
+POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
+
+
+class Clock:
+    """Seconds that pass when told so."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
+    return HidPhantom(handle, "in memory", clock)
+
+
+def test_a_device_says_who_it_is(driver: HidPhantom) -> None:
+    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True)
+
+
+def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
+    firmware.turn_to(POSE)
+    firmware.sensors.pressed = 1
+    handle.tick()
+    reading = np.zeros(9)
+    assert driver.read(reading, 0.0)
+    steps = np.array([*ENCODER_STEP, *[GIMBAL_STEP] * 3])
+    assert np.all(np.abs(reading[3:] - POSE) <= 0.5001 * steps)
+    np.testing.assert_array_equal(reading[:3], [1.0, 1e-3, 1.0])
+    assert not driver.read(reading, 0.0)
+    handle.tick()
+    handle.tick()
+    assert driver.read(reading, 0.0)
+    np.testing.assert_array_equal(reading[:2], [3.0, 3e-3])  # the newest
+
+
+def test_torques_of_the_joints_arrive_at_the_shafts_to_a_micronewtonmetre(driver, handle, firmware) -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        torque = rng.uniform(-1.0, 1.0, 3) * PREMIUM_1_5.peak_torque
+        driver.write(torque, True)
+        handle.tick()
+        np.testing.assert_allclose(firmware.joint_torque, torque, atol=13.3e-6)
+    driver.write(torque, False)
+    handle.tick()
+    assert not firmware.joint_torque.any()
+
+
+def test_nothing_that_is_commanded_exceeds_the_peak_torque_and_what_is_not_finite_lets_go(
+    driver, handle, firmware
+) -> None:
+    rng = np.random.default_rng(5)
+    bad = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, 0.0]
+    for _ in range(500):
+        torque = np.where(rng.random(3) < 0.3, rng.choice(bad, 3), rng.normal(0.0, 5.0, 3))
+        if np.all(np.isfinite(torque)):
+            driver.write(torque, True)
+        else:
+            with pytest.raises(DriverFault) as refused:
+                driver.write(torque, True)
+            assert refused.value.fault is Fault.FORCE_NOT_FINITE
+        handle.tick()
+        assert np.all(np.abs(firmware.joint_torque) <= np.array(PREMIUM_1_5.peak_torque) * (1.0 + 1e-9))
+        if not np.all(np.isfinite(torque)):
+            assert not firmware.motors.on
+
+
+def test_temperatures_round_trip_loss_jitter_and_staleness_are_told(driver, handle, firmware, clock) -> None:
+    reading, told = np.zeros(9), driver.telemetry
+    assert np.isnan(told[ROUND_TRIP])
+    for k in range(202):
+        driver.write(np.zeros(3), True)
+        clock.now += 0.4e-3
+        handle.tick()
+        if k % 20 == 19:
+            handle.queue.clear()  # lost
+        clock.now += 0.6e-3 + (0.3e-3 if k % 2 else 0.0)
+        driver.read(reading, 0.0)
+        clock.now -= 0.3e-3 if k % 2 else 0.0
+    np.testing.assert_array_equal(told[TEMPERATURE : TEMPERATURE + 3], [30.0, 31.0, np.nan])
+    assert (told[READ], told[BAD], told[LOST]) == (192.0, 0.0, 10.0)
+    assert told[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, for one of which the device held it
+    assert told[JITTER] == pytest.approx(0.3e-3, rel=0.2)
+    assert told[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
+
+
+def test_a_calibration_is_kept_by_the_device(driver, handle, firmware) -> None:
+    firmware.turn_to(POSE)
+    handle.tick()
+    driver.calibrate(np.array([0.0, 0.1, -0.1]), np.zeros(3))
+    handle.tick()
+    reading = np.zeros(9)
+    driver.read(reading, 0.0)
+    np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
+    again = HidPhantom(handle, "in memory")
+    handle.tick()
+    again.read(reading, 0.0)
+    np.testing.assert_allclose(reading[3:], [0.0, 0.1, -0.1, 0.0, 0.0, 0.0], atol=GIMBAL_STEP)
+
+
+def test_a_calibration_without_a_reading_is_refused(driver) -> None:
+    with pytest.raises(SimError, match="nothing to calibrate"):
+        driver.calibrate(np.zeros(3), np.zeros(3))
+
+
+def other_feature(number: int, **changed):
+    def feature(handle: FirmwareHandle) -> None:
+        genuine = handle.get_feature_report
+
+        def told(report_num: int, max_length: int) -> list[int]:
+            raw = bytes(genuine(report_num, max_length))
+            if report_num != number:
+                return list(raw)
+            record = np.frombuffer(raw, protocol.LAYOUTS[number]).copy()[0:1].reshape(())
+            for name, value in changed.items():
+                record[name] = value
+            return list(protocol.sealed(record))
+
+        handle.get_feature_report = told
+
+    return feature
+
+
+def test_another_major_version_is_a_fault_and_another_minor_one_is_not(handle: FirmwareHandle) -> None:
+    other_feature(protocol.IDENTITY, minor=9)(handle)
+    HidPhantom(handle, "x")
+    other_feature(protocol.IDENTITY, major=2)(handle)
+    with pytest.raises(DriverFault, match=r"speaks version 2\.9") as refused:
+        HidPhantom(handle, "x")
+    assert refused.value.fault is Fault.VERSION_WRONG
+
+
+@pytest.mark.parametrize(
+    ("number", "changed", "says"),
+    [(protocol.IDENTITY, {"magic": 5}, "the mark 0x5; expected 0x31465648"),
+     (protocol.CALIBRATION, {"counts_per_turn": 0}, "expected none to be 0")],
+)  # fmt: skip
+def test_a_device_that_is_another_or_has_no_scale_is_refused(handle, number, changed, says) -> None:
+    other_feature(number, **changed)(handle)
+    with pytest.raises(SimError, match=says):
+        HidPhantom(handle, "x")
+
+
+@pytest.mark.slow
+def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+    places, rig = device_follow(
+        lambda device: Rig(device, HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+    )
+    assert rig.fault == Fault.NONE
+    assert rms(places, simulated_follow()) < 1e-3

@@ -1,0 +1,214 @@
+"""One description of the reports, in Python and in C; and what the firmware promises by itself."""
+
+import subprocess
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.phantom.parameters import PREMIUM_1_5
+from sim.devices import hid_protocol as protocol
+from sim.errors import SimError
+from tests.devices.firmware import ROOT, Firmware, compiled
+
+STRUCTS = {
+    "hvf_input": protocol.INPUT_REPORT, "hvf_output": protocol.OUTPUT_REPORT,
+    "hvf_identity": protocol.IDENTITY_REPORT, "hvf_calibration": protocol.CALIBRATION_REPORT,
+}  # fmt: skip
+
+
+def printed(folder: Path, lines: list[str]) -> str:
+    """What C prints that knows the header."""
+    source = folder / "printed.c"
+    body = "\n".join(lines)
+    head = f'#include <stdio.h>\n#include "{ROOT}/firmware/hvf_hid.h"\n'
+    source.write_text(head + f"int main(void) {{\n{body}\nreturn 0;\n}}\n")
+    return subprocess.run([compiled(folder, source, program=True)], capture_output=True, text=True, check=True).stdout
+
+
+def output(
+    firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other
+):
+    made = protocol.blank(protocol.OUTPUT)
+    made["flags"], made["boot"], made["sequence"] = int(enable), firmware.boot, sequence
+    made["watchdog_us"], made["torque"] = watchdog_us, torque
+    for name, value in other.items():
+        made[name] = value
+    return protocol.sealed(made)
+
+
+def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
+    lines = [
+        f'printf("{struct} {name} %zu %zu\\n", offsetof({struct}, {name}), sizeof((({struct} *)0)->{name}));'
+        for struct, layout in STRUCTS.items()
+        for name in layout.names
+    ]
+    told = printed(tmp_path, lines)
+    expected = [
+        f"{struct} {name} {layout.fields[name][1]} {layout.fields[name][0].itemsize}"
+        for struct, layout in STRUCTS.items()
+        for name in layout.names
+    ]
+    assert told.split("\n")[:-1] == expected
+    assert all(layout.itemsize == protocol.REPORT_SIZE for layout in STRUCTS.values())
+
+
+def test_taking_a_report_apart_and_putting_one_together_agree_with_the_layout() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(100):
+        raw = rng.bytes(64)
+        told, record = protocol.unpacked_input(raw), np.frombuffer(raw, protocol.INPUT_REPORT)[0]
+        for name, value in told._asdict().items():
+            np.testing.assert_array_equal(value, record[name], err_msg=name)
+        torque, answers = rng.integers(-(2**31), 2**31, 3).tolist(), int(rng.integers(0, 2**32))
+        made = np.frombuffer(
+            protocol.packed_output(True, 77, 2**32 - 1, 5000, torque, answers), protocol.OUTPUT_REPORT
+        )[0]
+        assert protocol.is_sound(made.tobytes())
+        assert made["torque"].tolist() == torque
+        fields = ("report", "flags", "boot", "sequence", "watchdog_us", "answers")
+        assert [int(made[name]) for name in fields] == [2, 1, 77, 2**32 - 1, 5000, answers]
+
+
+def test_constants_are_the_header_s(tmp_path: Path) -> None:
+    pairs = {
+        "HVF_VERSION_MAJOR": protocol.VERSION[0], "HVF_VERSION_MINOR": protocol.VERSION[1], "HVF_MAGIC": protocol.MAGIC,
+        "HVF_STATUS_ENABLED": protocol.STATUS_ENABLED, "HVF_STATUS_CALIBRATED": protocol.STATUS_CALIBRATED,
+        "HVF_STATUS_WATCHDOG": protocol.STATUS_WATCHDOG, "HVF_STATUS_HOT": protocol.STATUS_HOT,
+        "HVF_STATUS_AMPLIFIER": protocol.STATUS_AMPLIFIER, "HVF_STATUS_ENCODER": protocol.STATUS_ENCODER,
+        "HVF_STATUS_REFUSED": protocol.STATUS_REFUSED, "HVF_HAS_MOTORS": protocol.HAS_MOTORS,
+        "HVF_HAS_WATCHDOG": protocol.HAS_WATCHDOG, "HVF_HAS_TEMPERATURE": protocol.HAS_TEMPERATURE,
+        "HVF_HAS_GIMBAL": protocol.HAS_GIMBAL, "HVF_NO_TEMPERATURE": protocol.NO_TEMPERATURE,
+        "HVF_INPUT": protocol.INPUT, "HVF_OUTPUT": protocol.OUTPUT, "HVF_IDENTITY": protocol.IDENTITY,
+        "HVF_CALIBRATION": protocol.CALIBRATION, "HVF_SWITCH": protocol.SWITCH, "HVF_ENABLE": protocol.ENABLE,
+        "HVF_CALIBRATED": protocol.CALIBRATED,
+    }  # fmt: skip
+    told = printed(tmp_path, [f'printf("%lld\\n", (long long){name});' for name in pairs])
+    assert [int(line) for line in told.split()] == list(pairs.values())
+
+
+def test_the_checksum_is_crc_32_of_ethernet_in_both(firmware: Firmware) -> None:
+    crc = firmware.c.hvf_crc32
+    crc.restype = __import__("ctypes").c_uint32
+    assert crc(b"123456789", 9) == 0xCBF43926 == zlib.crc32(b"123456789")  # the check value of its catalogue entry
+    rng = np.random.default_rng(1)
+    for n in range(0, 200, 7):
+        data = rng.bytes(n)
+        assert crc(data, n) == zlib.crc32(data)
+
+
+def test_no_report_with_up_to_four_wrong_bits_or_a_burst_of_32_is_taken() -> None:
+    rng = np.random.default_rng(2)
+    report = protocol.sealed(protocol.blank(protocol.INPUT))
+    for _ in range(5000):
+        bits = np.unpackbits(np.frombuffer(report, np.uint8))
+        bits[rng.choice(512, rng.integers(1, 5), replace=False)] ^= 1
+        assert not protocol.is_sound(np.packbits(bits).tobytes())
+        bits = np.unpackbits(np.frombuffer(report, np.uint8), bitorder="little")
+        first = rng.integers(0, 480)
+        bits[first : first + 32] ^= np.append(1, rng.integers(0, 2, 31)).astype(np.uint8)
+        assert not protocol.is_sound(np.packbits(bits, bitorder="little").tobytes())
+
+
+def test_a_feature_report_that_is_none_is_refused_with_what_came() -> None:
+    with pytest.raises(SimError, match=r"has 3 bytes and number 9; expected 64"):
+        protocol.unsealed(b"\x09\x00\x00", protocol.IDENTITY)
+
+
+def test_the_reference_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> None:
+    """The main program with a board of nothing: a thousand periods, and the last report is sound."""
+    board = tmp_path / "board.c"
+    board.write_text(f"""#include <stdio.h>
+#include "{ROOT}/firmware/phantom_board.h"
+static uint64_t now; static hvf_input last;
+void board_begin(hvf_identity *i, hvf_calibration *c, uint16_t *boot) {{ i->rate_hz = 1000; c->flags = 1; *boot = 7; }}
+int board_period(void) {{ now += 100; return now > 1000000 ? -1 : now % 1000 == 0; }}
+uint64_t board_time_us(void) {{ return now; }}
+void board_sense(hvf_sensors *s) {{ s->time_us = now; s->encoder[1] = (int32_t)now; }}
+void board_drive(const hvf_motors *m) {{ (void)m; }}
+size_t board_receive(uint8_t *b, size_t n) {{ (void)b; (void)n; return 0; }}
+void board_send(const hvf_input *r) {{ last = *r; if (now == 1000000) fwrite(&last, 1, sizeof last, stdout); }}
+void board_feed_hardware_watchdog(void) {{}}
+""")
+    program = compiled(
+        tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True
+    )
+    raw = subprocess.run([program], capture_output=True, check=True).stdout
+    assert protocol.is_sound(raw)
+    report = np.frombuffer(raw, protocol.INPUT_REPORT)[0]
+    assert (report["sequence"], report["time_us"], report["encoder"][1], report["boot"]) == (1000, 10**6, 10**6, 7)
+
+
+def test_the_firmware_switches_off_when_commands_stay_out_and_stays_off_until_told_so(firmware: Firmware) -> None:
+    assert firmware.take(output(firmware, 1))
+    firmware.tick()
+    assert firmware.motors.on
+    for _ in range(4):
+        firmware.tick()
+    assert firmware.motors.on  # 5 ms
+    report = np.frombuffer(firmware.tick(), protocol.INPUT_REPORT)[0]
+    assert not firmware.motors.on
+    assert not any(firmware.motors.torque)
+    assert report["status"] & protocol.STATUS_WATCHDOG
+    firmware.take(output(firmware, 2))
+    firmware.tick()
+    assert not firmware.motors.on  # a late command is not enough
+    firmware.take(output(firmware, 3, enable=False))
+    firmware.take(output(firmware, 4))
+    firmware.tick()
+    assert firmware.motors.on
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        lambda f: output(f, 1)[:-1],
+        lambda f: output(f, 1) + b"\0",
+        lambda f: bytes([output(f, 1)[0]]) + b"\xff" + output(f, 1)[2:],
+        lambda f: output(f, 1, boot=f.boot - 1),
+        lambda f: output(f, 1, watchdog_us=0),
+        lambda f: output(f, 1, watchdog_us=100_001),
+    ],
+    ids=["short", "long", "bit", "of another power-up", "no watchdog", "too slow a watchdog"],
+)
+def test_the_firmware_refuses_a_command_that_is_not_sound_and_does_not_count_it_as_heard(firmware, spoiled) -> None:
+    assert not firmware.take(spoiled(firmware))
+    report = np.frombuffer(firmware.tick(), protocol.INPUT_REPORT)[0]
+    assert not firmware.motors.on
+    assert report["refused"] == 1
+    assert report["status"] & protocol.STATUS_REFUSED
+    assert firmware.take(output(firmware, 1))
+
+
+def test_the_firmware_takes_each_command_once_and_none_out_of_order_also_where_numbers_wrap(firmware: Firmware) -> None:
+    assert firmware.take(output(firmware, 2**32 - 2))
+    for number, taken in [(2**32 - 2, False), (2**32 - 3, False), (2**32 - 1, True), (0, True), (2**32 - 1, False)]:
+        assert firmware.take(output(firmware, number)) is taken
+
+
+def test_no_command_makes_the_firmware_exceed_the_peak_torque_or_drive_a_hot_motor(firmware: Firmware) -> None:
+    rng = np.random.default_rng(3)
+    limit = round(PREMIUM_1_5.stall_motor_torque * 1e6)
+    for k in range(1, 500):
+        firmware.sensors.temperature[:] = rng.choice([2000, 9400, 9600, 10_100, protocol.NO_TEMPERATURE], 3).tolist()
+        torque = rng.integers(-(2**31), 2**31, 3)
+        firmware.take(output(firmware, k, enable=rng.random() < 0.8, torque=torque))
+        firmware.tick()
+        assert max(abs(t) for t in firmware.motors.torque) <= limit
+        if max(firmware.sensors.temperature) >= 10_000:
+            assert not firmware.motors.on
+
+
+def test_a_motor_that_was_too_hot_has_to_cool_by_five_degrees_before_it_is_driven_again(firmware: Firmware) -> None:
+    def driven(k: int, hundredths: int) -> bool:
+        firmware.sensors.temperature[0] = hundredths
+        firmware.tick()
+        firmware.take(output(firmware, 2 * k, enable=False))
+        firmware.take(output(firmware, 2 * k + 1))
+        firmware.tick()
+        return bool(firmware.motors.on)
+
+    assert [driven(k, t) for k, t in enumerate([9900, 10_000, 9900, 9501, 9499, 9900])] == [
+        True, False, False, False, True, True,
+    ]  # fmt: skip

@@ -1,0 +1,36 @@
+"""What goes through /dev/hidraw0 and hidapi as it comes, in a process that has umockdev loaded before all else."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.devices.firmware import COMPILER, ROOT
+from tests.devices.hidraw_node import PRELOAD, umockdev_missing
+
+INNER = "HVF_INNER"
+
+
+def inside(*arguments: str, seconds: float = 240.0) -> str:
+    """Pytest's output in a process with umockdev; the test is skipped where there is none."""
+    if os.environ.get(INNER):
+        pytest.skip("this is the process")
+    if umockdev_missing() or COMPILER is None:
+        pytest.skip(umockdev_missing() or "no C compiler")
+    told = subprocess.run(
+        [sys.executable, "-m", "pytest", "-o", "addopts=", "-p", "no:cacheprovider", *arguments],
+        cwd=ROOT, env=os.environ | {"LD_PRELOAD": PRELOAD, INNER: "1"}, capture_output=True, text=True, timeout=seconds,
+    )  # fmt: skip
+    assert told.returncode == 0, told.stdout[-6000:] + told.stderr[-2000:]
+    return told.stdout
+
+
+@pytest.mark.slow
+def test_the_contract_of_a_device_holds_for_hid_and_spacemouse_through_their_nodes() -> None:
+    assert "18 passed" in inside("tests/contract/test_device_contract.py", "-k", "node")
+
+
+@pytest.mark.slow
+def test_the_driver_the_list_and_the_doctor_see_a_real_node() -> None:
+    assert "13 passed" in inside("tests/devices/inside_umockdev.py")

@@ -1,0 +1,136 @@
+"""A SpaceMouse: a push is a velocity, within the workspace."""
+
+from collections import deque
+
+import numpy as np
+import pytest
+
+from controllers.safety.faults import Fault
+from models.phantom.kinematics import (
+    forward_kinematics,
+    inside_workspace,
+    stylus_orientation,
+    vector_to_device_frame,
+    vector_to_hand_frame,
+    within_limits,
+)
+from models.phantom.parameters import PREMIUM_1_5
+from sim.devices.driver import BAD, READ, DriverFault
+from sim.devices.spacemouse import TOP_SPEED, TOP_TURN, SpaceMouse
+from tests.devices.test_hid import Clock
+
+
+class Cap:
+    """A HID handle with reports to order."""
+
+    def __init__(self) -> None:
+        self.queue, self.plugged = deque[bytes](), True
+
+    def push(self, x: int, y: int, z: int) -> None:
+        self.queue.append(b"\x01" + np.array([x, y, z], "<i2").tobytes())
+
+    def turn(self, x: int, y: int, z: int) -> None:
+        self.queue.append(b"\x02" + np.array([x, y, z], "<i2").tobytes())
+
+    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
+        if not self.plugged:
+            raise OSError("read error")
+        return list(self.queue.popleft()[:max_length]) if self.queue else []
+
+    def set_nonblocking(self, value: bool) -> int:
+        return 0
+
+    def close(self) -> None:
+        self.plugged = False
+
+
+@pytest.fixture
+def cap() -> Cap:
+    return Cap()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def mouse(cap: Cap, clock: Clock) -> SpaceMouse:
+    return SpaceMouse(cap, "SpaceNavigator", "test", clock)
+
+
+def tip(mouse: SpaceMouse, clock: Clock, ticks: int = 100) -> tuple[np.ndarray, np.ndarray]:
+    reading = np.zeros(9)
+    for _ in range(ticks):
+        clock.now += 1e-3
+        assert mouse.read(reading, 0.0)
+    return np.array(vector_to_hand_frame(forward_kinematics(reading[3:6]))), reading
+
+
+@pytest.mark.parametrize(
+    ("push", "way"), [((350, 0, 0), (0, -1, 0)), ((0, 350, 0), (-1, 0, 0)), ((0, 0, 350), (0, 0, -1))]
+)
+def test_a_push_right_towards_the_user_or_down_goes_there_at_the_top_speed(mouse, cap, clock, push, way) -> None:
+    tip(mouse, clock, 1)
+    cap.push(*push)
+    p, _ = tip(mouse, clock, 100)
+    np.testing.assert_allclose(p, np.array(way) * TOP_SPEED * 0.1, atol=1e-9)
+    cap.push(0, 0, 0)
+    q, _ = tip(mouse, clock, 50)
+    np.testing.assert_array_equal(p, q)
+
+
+def test_a_turn_turns_the_stylus_about_the_same_axes(mouse, cap, clock) -> None:
+    tip(mouse, clock, 1)
+    cap.turn(0, 0, -350)
+    _, reading = tip(mouse, clock, 100)
+    q = np.array(stylus_orientation(reading[3:6], reading[6:9]))
+    half = 0.5 * TOP_TURN * 0.1
+    np.testing.assert_allclose(q, [np.cos(half), 0.0, 0.0, np.sin(half)], atol=1e-9)
+
+
+def test_six_axes_in_one_report_and_the_buttons(mouse, cap, clock) -> None:
+    tip(mouse, clock, 1)
+    cap.queue.append(b"\x01" + np.array([350, 0, 0, 0, 0, -350], "<i2").tobytes())
+    cap.queue.append(b"\x03\x01\x00")
+    p, reading = tip(mouse, clock, 10)
+    assert p[1] < 0.0
+    assert reading[2] == 1.0
+    assert stylus_orientation(reading[3:6], reading[6:9])[3] > 0.0
+
+
+def test_whatever_it_sends_the_tip_stays_in_the_workspace_and_the_gimbal_in_its_range(mouse, cap, clock) -> None:
+    rng, reading = np.random.default_rng(8), np.zeros(9)
+    for _ in range(400):
+        cap.push(*rng.integers(-500, 500, 3))
+        cap.turn(*rng.integers(-500, 500, 3))
+        clock.now += rng.uniform(0.0, 0.2)
+        last = reading.copy()
+        mouse.read(reading, 0.0)
+        theta = tuple(reading[3:6])
+        assert within_limits(theta)
+        assert inside_workspace(vector_to_device_frame(vector_to_hand_frame(forward_kinematics(theta))))
+        for angle, (low, high) in zip(reading[6:], PREMIUM_1_5.gimbal_limit, strict=True):
+            assert low - 1e-9 <= angle <= high + 1e-9
+        if last[0]:
+            step = np.subtract(forward_kinematics(reading[3:6]), forward_kinematics(last[3:6]))
+            assert np.abs(step).max() <= TOP_SPEED * 0.05 + 1e-9
+
+
+def test_a_cap_that_nobody_touches_does_not_drift_and_other_reports_are_left_out(mouse, cap, clock) -> None:
+    cap.push(5, -5, 8)
+    cap.queue.append(b"\x17\x64")  # a battery's
+    cap.queue.append(b"\x01\x00")  # too short
+    p, _ = tip(mouse, clock, 100)
+    assert not p.any()
+    assert mouse.telemetry[BAD] == 1.0
+    assert mouse.telemetry[READ] == 1.0
+
+
+def test_it_has_no_force_and_unplugging_it_is_a_fault(mouse, cap, clock) -> None:
+    assert not mouse.identity.forces
+    mouse.write(np.ones(3), True)
+    cap.plugged = False
+    with pytest.raises(DriverFault) as refused:
+        mouse.read(np.zeros(9), 0.0)
+    assert refused.value.fault is Fault.UNPLUGGED

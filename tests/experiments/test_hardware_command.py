@@ -1,0 +1,87 @@
+"""`hvf hardware`: what a person, and a program, is told where nothing is connected."""
+
+import json
+
+import pytest
+
+from experiments.cli import main
+from experiments.hardware.doctor import MISSING, OK, findings, measured_lateness
+from sim.devices import hardware_list
+from sim.devices.hardware_list import FoundDevice, found_devices
+
+
+@pytest.fixture(autouse=True)
+def nothing_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Backend:
+        @staticmethod
+        def enumerate() -> list[dict]:
+            return []
+
+    monkeypatch.setattr(hardware_list, "hid_backend", Backend)
+    for module in ("sim.devices.hardware_list", "experiments.hardware.doctor"):
+        for name in ("find_hdapi", "find_dhd"):
+            monkeypatch.setattr(f"{module}.{name}", lambda: None)
+
+
+def test_a_list_of_nothing_says_where_to_look(capsys) -> None:
+    assert main(["hardware", "list"]) == 0
+    assert capsys.readouterr().out == "no device found; `hvf hardware doctor` says what may be missing\n"
+    assert main(["hardware", "list", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == []
+
+
+def test_the_doctor_names_what_is_missing_and_how_late_the_machine_is(capsys) -> None:
+    assert main(["hardware", "doctor", "--seconds", "0.05", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    state = {finding["what"]: finding for finding in told["findings"]}
+    assert state["hidapi"]["state"] == OK
+    assert state["OpenHaptics (HD)"]["state"] == state["Force Dimension (dhd)"]["state"] == MISSING
+    assert "OpenHaptics" in state["OpenHaptics (HD)"]["remedy"]
+    assert {"kernel", "realtime priority", "memory lock", "processor's frequency"} <= set(state)
+    assert 0.0 <= told["lateness"]["p50"] <= told["lateness"]["p99"] <= told["lateness"]["worst"]
+    assert told["link"] is None
+
+
+def test_deadlines_that_are_missed_are_counted_and_not_made_up() -> None:
+    late = measured_lateness(0.1)
+    assert late.loops + late.missed == pytest.approx(100, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("device", "says"),
+    [
+        ("frob", "no device is called 'frob'"), ("hidraw", "no device is called 'hidraw'"),
+        ("hid:7", "there are 0 devices for 'phantom 7'"), ("hdapi", "install 3D Systems' OpenHaptics"),
+        ("dhd", "install the Force Dimension SDK"), ("dhd:3", "no device is called 'dhd:3'"),
+    ],
+)  # fmt: skip
+def test_a_device_that_is_not_there_is_one_line(capsys, device, says) -> None:
+    assert main(["hardware", "doctor", "--device", device, "--seconds", "0.01"]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1
+
+
+def test_seconds_that_are_none_are_refused(capsys) -> None:
+    assert main(["hardware", "doctor", "--seconds", "0"]) == 2
+    assert "seconds" in capsys.readouterr().err
+
+
+def test_hidapi_that_is_not_installed_is_a_line(monkeypatch, capsys) -> None:
+    monkeypatch.undo()
+    monkeypatch.setitem(__import__("sys").modules, "hidraw", None)
+    monkeypatch.setitem(__import__("sys").modules, "hid", None)
+    assert main(["hardware", "list"]) == 2
+    assert "pip install hidapi" in capsys.readouterr().err
+
+
+def test_a_library_that_is_installed_is_listed_and_a_node_without_permission_has_its_rule(monkeypatch) -> None:
+    monkeypatch.setattr(hardware_list, "find_hdapi", lambda: "libHD.so")
+    (device,) = found_devices()
+    assert (device.name, device.transport, device.kind) == ("hdapi", "HDAPI", "vendor")
+    node = FoundDevice(
+        "hid:1", "usb", "hidraw", "/dev/hidraw9", 0x16C0, 0x486, "V", "P", "1", "phantom", "no permission", False
+    )
+    (finding,) = (finding for finding in findings([node]) if finding.what == "/dev/hidraw9")
+    assert finding.state == MISSING
+    assert node.udev_rule() in finding.remedy

@@ -1,0 +1,97 @@
+"""`make hil-vm`: the HID driver on Linux's own hidraw, in a virtual machine whose kernel has uhid.
+
+Needs qemu-system-x86_64, busybox-static, a C compiler, and either a kernel with modules in /boot and /lib/modules, or
+apt-get to fetch Debian's (some 70 MB, kept in runs/hil-vm). The guest sees this machine's files and changes none.
+"""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.devices.firmware import ROOT, compiled
+
+FOLDER = ROOT / "runs" / "hil-vm"
+MODULES = ("virtio_pci", "9pnet_virtio", "9p", "hid-generic", "uhid")
+SECONDS = 400
+
+INIT = """#!/bin/busybox sh
+/bin/busybox --install -s /bin
+mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t devtmpfs dev /dev
+for module in {modules}; do modprobe $module; done
+mount -t 9p -o trans=virtio,version=9p2000.L,msize=524288,cache=loose,ro host /host || poweroff -f
+for place in proc sys dev; do mount --move /$place /host/$place; done
+mount -t tmpfs tmp /host/tmp
+cd /host
+export PYTHONDONTWRITEBYTECODE=1 NUMBA_CACHE_DIR=/tmp
+chroot /host /bin/sh -c 'cd {root} && {python} -m tests.hil.guest {library}'
+poweroff -f
+"""
+
+
+def kernel() -> tuple[Path, Path]:
+    """A kernel and the folder with its modules."""
+    for image in sorted(Path("/boot").glob("vmlinuz-*"), reverse=True):
+        modules = Path("/lib/modules") / image.name.removeprefix("vmlinuz-")
+        if list(modules.rglob("uhid.ko*")):
+            return image, modules
+    fetched = FOLDER / "kernel"
+    if not list(fetched.glob("boot/vmlinuz-*")):
+        depends = subprocess.run(
+            ["apt-cache", "depends", "linux-image-amd64"], capture_output=True, text=True, check=True
+        ).stdout
+        package = next(line.split()[-1] for line in depends.splitlines() if "Depends: linux-image" in line)
+        subprocess.run(["apt-get", "download", "--quiet", package], cwd=FOLDER, check=True)
+        (archive,) = FOLDER.glob(f"{package}_*.deb")
+        subprocess.run(["dpkg", "-x", archive, fetched], check=True)
+        archive.unlink()
+    (image,) = fetched.glob("boot/vmlinuz-*")
+    return image, fetched / "lib" / "modules" / image.name.removeprefix("vmlinuz-")
+
+
+def initramfs(busybox: str, modules: Path, library: Path) -> Path:
+    """What the kernel begins with: busybox, the modules, and the script that goes on to this machine's files."""
+    tree = FOLDER / "initramfs"
+    shutil.rmtree(tree, ignore_errors=True)
+    for name in ("bin", "proc", "sys", "dev", "host", f"lib/modules/{modules.name}"):
+        (tree / name).mkdir(parents=True)
+    shutil.copy(busybox, tree / "bin" / "busybox")
+    inside = tree / "lib" / "modules" / modules.name
+    for part in ("net/9p", "fs/9p", "fs/netfs", "fs/fscache", "drivers/virtio", "drivers/hid"):
+        for module in (modules / "kernel" / part).glob("*.ko*"):
+            shutil.copy(module, inside)
+    subprocess.run([busybox, "depmod", "-b", tree, modules.name], check=True)
+    script = INIT.format(modules=" ".join(MODULES), root=ROOT, python=sys.executable, library=library)
+    (tree / "init").write_text(script)
+    (tree / "init").chmod(0o755)
+    names = "\n".join(str(path.relative_to(tree)) for path in sorted(tree.rglob("*")))
+    packed = FOLDER / "initramfs.cpio"
+    with packed.open("wb") as out:
+        subprocess.run([busybox, "cpio", "-o", "-H", "newc"], cwd=tree, input=names.encode(), stdout=out, check=True)
+    return packed
+
+
+def main() -> int:
+    """Exit code 0 if the guest passed, 1 if not, 2 if there is something missing."""
+    qemu, busybox = shutil.which("qemu-system-x86_64"), shutil.which("busybox")
+    if qemu is None or busybox is None:
+        print("hil-vm needs qemu-system-x86_64 and busybox (Debian: qemu-system-x86 busybox-static)", file=sys.stderr)
+        return 2
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    library = compiled(FOLDER, ROOT / "firmware" / "hvf_hid.c")
+    image, modules = kernel()
+    told = subprocess.run(
+        [
+            qemu, "-accel", "tcg", "-cpu", "max", "-m", "2048", "-smp", "1", "-nographic", "-no-reboot", "-nic", "none",
+            "-kernel", str(image), "-initrd", str(initramfs(busybox, modules, library)),
+            "-append", "console=ttyS0 quiet panic=-1",
+            "-virtfs", "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap",
+        ],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False,
+    )  # fmt: skip
+    print(told.stdout[-6000:], told.stderr, sep="")
+    return 0 if "hil-vm: passed" in told.stdout else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
