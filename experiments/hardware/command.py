@@ -6,6 +6,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import above, part
+from experiments.config.words import config_of_options
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import IdentifyHardware, RunHardware
 
@@ -84,11 +85,33 @@ class Doctor:
         return 0
 
 
+@part
+class RunDevice(RunHardware):
+    """Run a field on a real device: its figure is shown, its twin mirrors it, everything is recorded."""
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.hardware.run import run_hardware
+
+        return run_hardware(config_of_options(self.options), self)
+
+
+@part
+class IdentifyDevice(IdentifyHardware):
+    """Find friction, inertia, delay and encoder offset of a device in recordings of it with no hand on the stylus."""
+
+    def __call__(self) -> int:
+        """Identify."""
+        from experiments.hardware.identify import identify
+
+        return identify(self)
+
+
 Which = (
     Annotated[ListDevices, tyro.conf.subcommand("list")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
-    | Annotated[RunHardware, tyro.conf.subcommand("run")]
-    | Annotated[IdentifyHardware, tyro.conf.subcommand("identify")]
+    | Annotated[RunDevice, tyro.conf.subcommand("run")]
+    | Annotated[IdentifyDevice, tyro.conf.subcommand("identify")]
 )  # fmt: skip
 
 

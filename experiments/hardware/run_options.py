@@ -6,14 +6,14 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import above, at_least, part
-from experiments.config.words import RunOptions, config_of_options
+from experiments.config.words import RunOptions
 
 EMULATED = "emulated"
 
 
 @part
 class RunHardware:
-    """Run a field on a real device: its figure is shown, its twin mirrors it, everything is recorded."""
+    """How a field is run on a real device."""
 
     options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
@@ -45,16 +45,10 @@ class RunHardware:
     view: bool = False
     """Show device and figure in a browser, from a process of its own."""
 
-    def __call__(self) -> int:
-        """Run."""
-        from experiments.hardware.run import run_hardware
-
-        return run_hardware(config_of_options(self.options), self)
-
 
 @part
 class IdentifyHardware:
-    """Find friction, inertia, delay and encoder offset of a device in recordings of it with no hand on the stylus."""
+    """From which recordings a device is identified, and where that is written."""
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """Folders of `hvf hardware run`, or their recordings; several fast and slow ones tell more than one."""
@@ -64,9 +58,3 @@ class IdentifyHardware:
     """Replace the file if it exists."""
     json: bool = False
     """Print the file's content instead of a table."""
-
-    def __call__(self) -> int:
-        """Identify."""
-        from experiments.hardware.identify import identify
-
-        return identify(self)
