@@ -1,4 +1,9 @@
-"""What is hidden in a simulated device is found, each quantity within its interval."""
+"""What is hidden in a simulated device is found, each quantity within its interval.
+
+``HVF_DRAWS=50`` draws fifty devices in place of one; then nine of ten have to be within all of their intervals.
+"""
+
+import os
 
 import numpy as np
 import pytest
@@ -59,29 +64,38 @@ def truth(linkage: Linkage, heavier: float) -> np.ndarray:
     return np.array([*known, second, third])
 
 
+def identified(seed: int) -> tuple[Identified, np.ndarray]:
+    """What is found of a device, and what is true of it."""
+    linkage, heavier = drawn(np.random.default_rng(seed))
+    return identify_linkage([moved(linkage, heavier, lap) for lap in LAPS]), truth(linkage, heavier)
+
+
 @pytest.fixture(scope="module")
 def found() -> tuple[Identified, np.ndarray]:
-    linkage, heavier = drawn(np.random.default_rng(7))
-    return identify_linkage([moved(linkage, heavier, lap) for lap in LAPS]), truth(linkage, heavier)
+    return identified(7)
 
 
 @pytest.mark.slow
 def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_intervals(found) -> None:
-    identified, hidden = found
-    assert (np.abs(identified.values - hidden) <= identified.margins).all(), dict(
-        zip(NAMES, (identified.values - hidden) / identified.margins, strict=True)
-    )
+    draws = [found, *(identified(1000 + k) for k in range(int(os.environ.get("HVF_DRAWS", "1")) - 1))]
+    outside = [
+        {name: (x - y) / m for name, x, y, m in zip(NAMES, f.values, hidden, f.margins, strict=True) if abs(x - y) > m}
+        for f, hidden in draws
+    ]
+    within = sum(not names for names in outside)
+    print(f"{within} of {len(draws)} devices within all intervals; outside: {[names for names in outside if names]}")
+    assert within >= 0.9 * len(draws)
 
 
 @pytest.mark.slow
 def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
-    identified, hidden = found
-    margins = dict(zip(NAMES, identified.margins, strict=True))
+    result, hidden = found
+    margins = dict(zip(NAMES, result.margins, strict=True))
     assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.01
     assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.5 * PREMIUM_1_5.viscous_friction[0]
     assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.02
     assert margins["delay"] < 5e-4
-    assert identified.unexplained < 0.005
+    assert result.unexplained < 0.005
 
 
 def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
