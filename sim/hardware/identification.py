@@ -28,7 +28,7 @@ that the equations leave out would explain.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -164,7 +164,7 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
     scale = np.ones(3)
     for _ in range(_STEPS):
         left, sensitivity = _residuals(equations, values)
-        scale = np.array([np.std(left[equations.usable[:, i], i]) for i in range(3)])
+        scale = np.array([float(np.std(left[equations.usable[:, i], i])) for i in range(3)])
         rows, targets = _stacked(equations, sensitivity, left, scale)
         step = np.linalg.lstsq(rows, -targets, rcond=None)[0]
         values = values + step
@@ -204,7 +204,7 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
     # ψ = (8/3) sin⁴(π s)/W has a mean of 1/W, and three derivatives that end at zero.
     weights = 8.0 / 3.0 * np.sin(np.pi * s) ** 4 / length
     slopes = 8.0 / 3.0 * 4.0 * np.pi * np.sin(np.pi * s) ** 3 * np.cos(np.pi * s) / length / WINDOW
-    found: list[tuple[Array, ...]] = []
+    found: list[tuple[npt.NDArray[Any], ...]] = []
     for motion in motions:
         n = len(motion.clock) - 1
         rates = np.diff(motion.theta, axis=0) / period
@@ -215,7 +215,7 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
         at = starts[:, None] + np.arange(length)
         # The torque of the interval and of those around it, for delays of up to two periods either way.
         commands = np.stack([motion.torque[at + shift] for shift in (-2, -1, 0, 1)], axis=2)
-        usable = (np.abs(smooth[at]) > _SLOWEST).all(axis=1)
+        usable = np.min(np.abs(smooth[at]), axis=1) > _SLOWEST
         new = np.zeros(len(starts), dtype=bool)
         new[:1] = True
         found.append((rates[at], middles[at], np.sign(smooth[at]), commands, usable, new))
@@ -240,9 +240,9 @@ def _mechanics(equations: _Equations, values: Array) -> Array:
     theta, rate = np.moveaxis(equations.middles - offset, -1, 0), np.moveaxis(equations.rates, -1, 0)
     zero = np.zeros_like(theta[0])
 
-    def times(matrix: tuple[tuple[object, ...], ...], turned: bool) -> list[Array]:
+    def times(matrix: Any, turned: bool) -> list[Array]:
         rows = zip(*matrix, strict=True) if turned else matrix
-        return [sum((np.asarray(m) * v for m, v in zip(row, rate, strict=True)), zero) for row in rows]
+        return [row[0] * rate[0] + row[1] * rate[1] + row[2] * rate[2] for row in rows]
 
     angles, speeds = (theta[0], theta[1], theta[2]), (rate[0], rate[1], rate[2])
     momentum = times(mass_matrix.py_func(angles), False)

@@ -15,7 +15,7 @@ class Quantiles(NamedTuple):
     p99: float
     p999: float
     longest: float
-    count: int
+    times: int
 
 
 class Spread:

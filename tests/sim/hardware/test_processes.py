@@ -108,7 +108,7 @@ def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> Non
         assert recording.channel("ticks", "missed")[-1] == ended.missed
         np.testing.assert_array_equal(np.diff(ticks) - 1, np.diff(recording.channel("ticks", "missed")[:]))
         np.testing.assert_allclose(recording.channel("ticks", "t")[:], ticks * PERIOD, atol=1e-9)
-    assert ended.compute.count == ended.ticks
+    assert ended.compute.times == ended.ticks
     assert ended.compute.p50 <= ended.compute.p99 <= ended.compute.p999 <= ended.compute.longest
     assert ended.descriptors == 0
 
