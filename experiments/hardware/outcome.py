@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -105,8 +106,10 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -
     )  # fmt: skip
 
 
-def _recorded(path: Path) -> dict[str, float]:
-    nothing = dict.fromkeys(("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0)
+def _recorded(path: Path) -> dict[str, Any]:
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
+    )
     try:
         recording = Recording(path)
     except RecordingError:

@@ -6,7 +6,7 @@ import select
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 
 from rich.console import Console
@@ -118,7 +118,7 @@ def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
 
 
 @contextlib.contextmanager
-def emulated(make: MakeEmulated, realtime: bool) -> Iterator[socket.socket]:
+def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, None, None]:
     """The emulated device in its process; gives the servo's end of its packets."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
@@ -137,7 +137,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def _page(config: RunConfig, run: HardwareRun) -> Iterator[None]:
+def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
     page = context.Process(target=show_status, args=(config, run.status), name="page", daemon=True)
     page.start()
