@@ -27,7 +27,7 @@ def drawn(rng: np.random.Generator) -> tuple[Linkage, float]:
     return Linkage(
         coulomb=tuple(rng.uniform(0.5, 2.0, 3) * PREMIUM_1_5.coulomb_friction),
         viscous=tuple(rng.uniform(0.3, 4.0, 3) * PREMIUM_1_5.viscous_friction),
-        inertia=tuple(rng.uniform(-0.07, 0.15, 3) * INERTIA),
+        inertia=tuple(rng.uniform(-0.03, 0.15, 3) * INERTIA),
         delay=1.25e-4 * int(rng.integers(0, 9)), offset=tuple(rng.uniform(-0.03, 0.03, 3)),
     ), float(rng.uniform(-0.01, 0.01))  # fmt: skip
 
