@@ -14,6 +14,7 @@ from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverC
 from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
+from experiments.files.device_files import linkage_of
 from experiments.setups.certified_law import certified_laws, leading_drag
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
@@ -102,7 +103,7 @@ def certificate_inputs(
         "period": sampling.period,
         "delay": sampling.delay,
         "filter": sampling.cutoff,
-        "device": PREMIUM_1_5,
+        "device": (PREMIUM_1_5, linkage_of(config.device)) if config.device.device_file else PREMIUM_1_5,
         "hand": hands,
         "push": push,
         "code": code_inputs(),

@@ -25,6 +25,7 @@ from experiments.certify.certified_rivers import certify_rivers
 from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import clip_inputs, read_certificate
+from experiments.files.device_files import linkage_of
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws
 from experiments.setups.clips import load_clips
@@ -45,7 +46,8 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     ParameterError
         If there is no certificate for the run's mode, or a number is out of its interval.
     """
-    curves, device, sampling = certified_curves(config), phantom_device(), certified_sampling(config, delay)
+    curves, sampling = certified_curves(config), certified_sampling(config, delay)
+    device = phantom_device(linkage_of(config.device))
     return {
         name: River(LAWS[law], stiffness, damping, width, curves[""], device, sampling)
         for name, (law, stiffness, damping, width) in certified_laws(config).items()
@@ -171,7 +173,7 @@ def _field_verdicts(
         if not clips:
             raise ParameterError("a certificate of leading is of a clip that is led; give one")
         field, curve = leading_field(config, config.mode, clips[0]), certified_curves(config)[""]
-        device, sampling = phantom_device(), certified_sampling(config, delay)
+        device, sampling = phantom_device(linkage_of(config.device)), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
         return main, certify_leading(field, curve, device, sampling, hands)
     rivers = certified_rivers(config, delay)

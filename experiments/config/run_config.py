@@ -69,16 +69,19 @@ class Figure:
 
 @part
 class Phantom:
-    """The simulated PHANToM.
+    """The PHANToM.
 
     Parameters
     ----------
     cutoff : float
         Corner frequency of its velocity filter [Hz].
+    device_file : str
+        What `hvf hardware identify` found of it; by default it is as published.
     """
 
     kind: Literal["phantom"] = "phantom"
     cutoff: float = above(0.0, default=150.0, unit="Hz")
+    device_file: str = ""
 
 
 @part

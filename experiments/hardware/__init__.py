@@ -1,1 +1,1 @@
-"""Real devices: which there are, and whether this machine can drive one."""
+"""Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""

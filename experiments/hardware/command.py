@@ -6,7 +6,9 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import above, part
+from experiments.config.words import config_of_options
 from experiments.files.json_text import json_text
+from experiments.hardware.run_options import IdentifyHardware, RunHardware
 
 
 @dataclass(frozen=True)
@@ -83,15 +85,39 @@ class Doctor:
         return 0
 
 
+@part
+class RunDevice(RunHardware):
+    """Run a field on a real device: its figure is shown, its twin mirrors it, everything is recorded."""
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.hardware.run import run_hardware
+
+        return run_hardware(config_of_options(self.options), self)
+
+
+@part
+class IdentifyDevice(IdentifyHardware):
+    """Find friction, inertia, delay and encoder offset of a device in recordings of it with no hand on the stylus."""
+
+    def __call__(self) -> int:
+        """Identify."""
+        from experiments.hardware.identify import identify
+
+        return identify(self)
+
+
 Which = (
     Annotated[ListDevices, tyro.conf.subcommand("list")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+    | Annotated[RunDevice, tyro.conf.subcommand("run")]
+    | Annotated[IdentifyDevice, tyro.conf.subcommand("identify")]
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Hardware:
-    """Real devices: which there are, and whether this machine can drive one."""
+    """Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
 
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
 

@@ -10,6 +10,7 @@ from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
+from experiments.files.device_files import linkage_of
 from experiments.setups.defaults import resolved
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
@@ -24,6 +25,7 @@ from sim.body.drive import BodyState
 from sim.body.figure import Figure
 from sim.body.unsimulated import kinematic_figure, no_figure
 from sim.compilation.units import Unit
+from sim.devices.device import DeviceState
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
@@ -48,7 +50,16 @@ Ready = Callable[[tuple[Unit, ...]], None]
 """Called before compiled code is needed, with its units (see `experiments.compiling`)."""
 
 
-def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready = lambda units: None) -> Session:
+DeviceOf = Callable[[World], DeviceState]
+"""Makes the device of a world; by default that is a simulated Phantom in the hand of the run's user."""
+
+
+def wire(
+    config: RunConfig,
+    clips: tuple[Clip, ...] | None = None,
+    ready: Ready = lambda units: None,
+    device: DeviceOf | None = None,
+) -> Session:
     """Put a run together.
 
     Parameters
@@ -59,6 +70,8 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         In place of those that it names.
     ready : callable
         See `Ready`.
+    device : callable, optional
+        See `DeviceOf`.
 
     Raises
     ------
@@ -71,10 +84,18 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     check_rates(config)
     world = World(config.scene, config.figure.kind)
-    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
+    if config.device.device_file:
+        linkage_of(config.device).into(world)
+    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready, device)
 
 
-def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready) -> Session:
+def assemble(
+    world: World,
+    maps: MapParts[Any],
+    parts_of: Callable[[Any], Parts],
+    ready: Ready,
+    device: DeviceOf | None = None,
+) -> Session:
     """Put the parts of a run together that a map makes.
 
     Parameters
@@ -87,6 +108,8 @@ def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts]
         From the map to the parts; called again when the map has been improved.
     ready : callable
         See `Ready`.
+    device : callable, optional
+        See `DeviceOf`.
 
     Raises
     ------
@@ -94,11 +117,11 @@ def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts]
         As `wire`.
     """
     draft = parts_of(maps)
-    ready(_units(draft, _servo(draft, world)))
+    ready(_units(draft, _servo(draft, world, device)))
     # Whatever takes compiled code to find is found when everything has been checked, and if anybody is to show it.
     refined = maps.refine() if world.kind != "none" else maps
     parts = draft if refined is maps else parts_of(refined)
-    servo = _servo(parts, world).linked(parts.program)
+    servo = _servo(parts, world, device).linked(parts.program)
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
@@ -122,18 +145,20 @@ def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
-def _servo(parts: Parts, world: World) -> Servo:
+def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
     config, program = parts.config, parts.program
     compiled, walker = parts.maps.whole_map.compiled(), None
     period = config.clock.servo_period
-    port = phantom_port(world.model, world.data, period, config.device.cutoff)
     field = unlinked_field(program, ForceLimiter(period), parts.tank)
     if parts.walker is not None:
         # The field moves the walker, the map shows it.
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
-    device = simulated_phantom(port, parts.user)
+    if device_of is None:
+        device = simulated_phantom(phantom_port(world.model, world.data, period, config.device.cutoff), parts.user)
+    else:
+        device = device_of(world)
     body, reference = _BODIES[world.kind](parts, world, compiled)
     return Servo(
         plant=make_plant(world), device=device, field=field, reference=reference, figure=body,
@@ -184,8 +209,8 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
         return
     world.reset(begin.point, poses[0], orientation, begin.velocity, _velocity(whole_map, argument[0], begin))
     begin_in_motion(reference, np.array(begin))
-    assert isinstance(servo.device, SimulatedPhantom)
-    sense_in_motion(servo.device.port)
+    if isinstance(servo.device, SimulatedPhantom):
+        sense_in_motion(servo.device.port)
 
 
 def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array:

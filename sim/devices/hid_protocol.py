@@ -1,4 +1,4 @@
-"""The 64-byte reports of a Phantom that speaks USB HID: `docs/reference/hid-protocol.md`, and in C `firmware/hvf_hid.h`.
+"""The 64-byte reports of a Phantom that speaks USB HID: `docs/reference/hid-protocol.md`; in C `firmware/hvf_hid.h`.
 
 All integers are little-endian. Byte 0 is the report's number, the last four are the CRC-32 of the 60 before them
 (CRC-32/ISO-HDLC, the one of Ethernet and zlib: at this length it finds every error of up to four bits, and every burst

@@ -1,0 +1,244 @@
+r"""The last thing before the motors of a real device: what of a commanded force gets through, and when.
+
+.. math:: F = g\, s\, w(p)\, u(v)\, \min(1, L/|F_w|)\, F_w, \qquad |F_k - F_{k-1}| \le r\,T
+
+g is the gain of the oscillation detector, s the share that is ramped in (0 in every state but `RAMPING` and `ACTIVE`),
+w and u fall from 1 to 0 between a limit of workspace or speed and the margin behind it, where a fault is latched. It
+trusts nothing that comes before it: whatever force is asked for, what leaves is finite, within L and the slew rate r.
+Letting go is not held to the slew rate.
+
+What is required of it is collected from what haptic devices do: no force before the commanded one has been small
+(CHAI3D), limits of force, its rate, speed and temperature (OpenHaptics' HDAPI, with their errors), brakes above a
+speed and a watchdog (Force Dimension's DHD), reflexes that stop and stay (Franka's).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.safety.arming import (
+    ARM,
+    ARMING,
+    CLEAR,
+    DISARM,
+    DISARMED,
+    FAULTED,
+    QUIET,
+    RAMPED,
+    RAMPING,
+    RELEASED,
+    next_state,
+    pushes,
+)
+from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
+from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
+
+_PERIOD, _FORCE, _STEP, _SPEED, _SPEED_MARGIN, _MARGIN, _SMALL, _QUIET, _RAMP = range(9)
+_DEAD_MAN, _PERMITTED, _LOW, _HIGH, _SIZE = 9, 10, 11, 14, 17
+GATE_STATE, GATE_SHARE, GATE_QUIET, GATE_GAIN, GATE_FORCE, GATE_SIZE = 0, 1, 2, 3, 4, 7
+
+OSCILLATION, LEFT_WORKSPACE, TOO_FAST = int(Fault.OSCILLATION), int(Fault.LEFT_WORKSPACE), int(Fault.TOO_FAST)
+
+
+@njit
+def pass_gate(
+    params: Array, shaking: Array, gate: Array, shaken: Array, faults: Array, hand: Array, request: int, force: Array
+) -> None:
+    """Decide the state of this tick, and what of a force gets through.
+
+    Parameters
+    ----------
+    params, shaking : Array
+        `Gate.params`, and those of its `OscillationDetector`.
+    gate, shaken : Array
+        Memory [state, share, quiet ticks' time, gain, last force (3)], and the detector's; written.
+    faults : Array
+        Of the device; what is wrong is latched.
+    hand : Array
+        The hand vector as measured.
+    request : int
+        `ARM`, `DISARM`, `CLEAR` or `NO_REQUEST`; whoever passes `CLEAR` has called `rearm` before.
+    force : Array
+        What is asked for [N]; what gets through is written, shape (3,).
+    """
+    t, period = hand[HAND_TIME], params[_PERIOD]
+    if not np.isfinite(force[0] + force[1] + force[2]):
+        latch(faults, FORCE_NOT_FINITE, t, force[0] + force[1] + force[2])
+        force[0] = force[1] = force[2] = 0.0
+    largest = max(abs(force[0]), abs(force[1]), abs(force[2]), 1e-300)
+    size = largest * np.sqrt((force[0] / largest) ** 2 + (force[1] / largest) ** 2 + (force[2] / largest) ** 2)
+    held = params[_DEAD_MAN] == 0.0 or hand[HAND_SWITCH] > 0.0
+    quiet = held and size <= params[_SMALL]
+    gate[GATE_QUIET] = gate[GATE_QUIET] + period if quiet else 0.0
+
+    if request == CLEAR and faults[FAULT_CODE] == 0.0:
+        gate[GATE_STATE] = next_state(int(gate[GATE_STATE]), CLEAR)
+    state = _requested(params, int(gate[GATE_STATE]), request, held, gate[GATE_QUIET])
+    if pushes(state):
+        _judge_motion(params, faults, hand)
+        gain = oscillation_gain(shaking, shaken, force)
+        if gain < 0.0:
+            latch(faults, OSCILLATION, t, -gain)
+    else:
+        # An open loop shakes nothing.
+        gain = 1.0
+        shaken[:] = 0.0
+        shaken[OSCILLATION_GAIN] = 1.0
+    if faults[FAULT_CODE] != 0.0:
+        state = next_state(state, FAULTED)
+    share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP]) if pushes(state) else 0.0
+    if state == RAMPING and share >= 1.0:
+        state = next_state(state, RAMPED)
+    gate[GATE_STATE], gate[GATE_SHARE], gate[GATE_GAIN] = state, share, max(0.0, gain)
+    if pushes(state):
+        _slew(params, gate, gain * share * _room(params, hand) * min(1.0, params[_FORCE] / max(size, 1e-300)), force)
+    else:
+        for i in range(3):
+            force[i] = gate[GATE_FORCE + i] = 0.0
+
+
+@njit
+def _requested(params: Array, state: int, request: int, held: bool, quiet: float) -> int:
+    """State after what the user asks for, the dead-man switch, and how long the force has been small [s]."""
+    if request == DISARM or (request == ARM and params[_PERMITTED] > 0.0):
+        state = next_state(state, request)
+    if not held:
+        state = next_state(state, RELEASED)
+    if state == ARMING and quiet >= params[_QUIET]:
+        state = next_state(state, QUIET)
+    return state
+
+
+@njit
+def _judge_motion(params: Array, faults: Array, hand: Array) -> None:
+    """Latch a hand that is beyond the margin of workspace or speed; a NaN is beyond."""
+    speed, outside = _speed(hand), _outside(params, hand)
+    if not outside <= params[_MARGIN]:
+        latch(faults, LEFT_WORKSPACE, hand[HAND_TIME], outside)
+    if not speed <= params[_SPEED] + params[_SPEED_MARGIN]:
+        latch(faults, TOO_FAST, hand[HAND_TIME], speed)
+
+
+@njit
+def _speed(hand: Array) -> float:
+    v = HAND_VELOCITY
+    return np.sqrt(hand[v] ** 2 + hand[v + 1] ** 2 + hand[v + 2] ** 2)
+
+
+@njit
+def _outside(params: Array, hand: Array) -> float:
+    """Distance from the box of the workspace [m], 0 within it."""
+    square = 0.0
+    for i in range(3):
+        p = hand[HAND_POSITION + i]
+        square += np.maximum(0.0, np.maximum(params[_LOW + i] - p, p - params[_HIGH + i])) ** 2
+    return np.sqrt(square)
+
+
+@njit
+def _room(params: Array, hand: Array) -> float:
+    """w(p) u(v): 1 within the limits, 0 at the end of the margins."""
+    w = 1.0 - _outside(params, hand) / params[_MARGIN]
+    u = 1.0 - (_speed(hand) - params[_SPEED]) / params[_SPEED_MARGIN]
+    return max(0.0, min(1.0, w)) * max(0.0, min(1.0, u))
+
+
+@njit
+def _slew(params: Array, gate: Array, scale: float, force: Array) -> None:
+    """Scale a force, hold it to the slew rate from the last one, and remember it."""
+    change = 0.0
+    for i in range(3):
+        force[i] *= scale
+        change += (force[i] - gate[GATE_FORCE + i]) ** 2
+    share = min(1.0, params[_STEP] / max(np.sqrt(change), 1e-300))
+    for i in range(3):
+        force[i] = gate[GATE_FORCE + i] + (force[i] - gate[GATE_FORCE + i]) * share
+        gate[GATE_FORCE + i] = force[i]
+
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Limits of what gets to a real device.
+
+    Parameters
+    ----------
+    period : float
+        Servo period T [s].
+    force : float
+        L, largest force [N]; half of the Premium's peak.
+    slew : float
+        r, largest change of the force [N/s].
+    speed, speed_margin : float
+        Speed of the tip from which on the force fades, and over how much more, until a fault [m/s].
+    low, high : three floats
+        Corners of the workspace's box in H [m]; the Premium 1.5's is 191 × 381 × 267 mm (data sheet) about its middle.
+    margin : float
+        Over which the force fades behind the box, until a fault [m].
+    small, quiet : float
+        No force before the one that is asked for has been at most `small` [N] for `quiet` [s]. A river pulls along
+        with b_d |φ̇| also where the hand is on its curve: 0.6 N at 8 N s/m and 8 cm/s.
+    ramp : float
+        In which the force is brought in [s].
+    dead_man : bool
+        Whether the stylus's switch has to be held for any force.
+    permitted : bool
+        Whether it may be armed at all: by a certificate of this field and device, and a calibration.
+    oscillation : OscillationDetector, optional
+        By default one of the same period.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not positive and finite, or the box has no room in it.
+    """
+
+    period: float
+    force: float = 4.0
+    slew: float = 1000.0
+    speed: float = 1.0
+    speed_margin: float = 0.5
+    low: Triple = (-0.10, -0.20, -0.14)
+    high: Triple = (0.10, 0.20, 0.14)
+    margin: float = 0.02
+    small: float = 1.0
+    quiet: float = 0.05
+    ramp: float = 1.0
+    dead_man: bool = True
+    permitted: bool = False
+    oscillation: OscillationDetector | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        for name in ("period", "force", "slew", "speed", "speed_margin", "margin", "small", "quiet", "ramp"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} of the gate must be positive and finite, got {value}")
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise ParameterError(f"a workspace from {self.low} to {self.high} m has no room in it")
+
+    @property
+    def detector(self) -> OscillationDetector:
+        """The oscillation detector."""
+        return self.oscillation or OscillationDetector(self.period)
+
+    def params(self) -> Array:
+        """Parameters of `pass_gate`."""
+        params = np.zeros(_SIZE)
+        params[:_DEAD_MAN] = (
+            self.period, self.force, self.slew * self.period, self.speed, self.speed_margin, self.margin, self.small,
+            self.quiet, self.ramp,
+        )  # fmt: skip
+        params[_DEAD_MAN], params[_PERMITTED] = float(self.dead_man), float(self.permitted)
+        params[_LOW:_HIGH], params[_HIGH:_SIZE] = self.low, self.high
+        return params
+
+    def fresh_memory(self) -> Array:
+        """Memory of a device that is disarmed."""
+        memory = np.zeros(GATE_SIZE)
+        memory[GATE_STATE], memory[GATE_GAIN] = DISARMED, 1.0
+        return memory

@@ -1,0 +1,123 @@
+r"""A loop that shakes the hand: found by how often the fast part of the force turns round, and quieted by a gain.
+
+.. math:: F_h = F - F_l, \quad \dot F_l = \omega_c (F - F_l), \qquad \dot n = -n/\tau + \sum_k \delta(t - t_k)
+
+t_k are the times at which F_h, larger than a threshold, points against where it last did. A limit cycle of f Hz makes n
+rise to 2 f τ; a step or a wall makes it 1 or 2, tremor (8–12 Hz) and what a hand means to do (below 10 Hz) at most
+2.4. While
+n is above its limit the force is multiplied by a gain that falls, g' = −g/τ_d; it comes back slowly. F is what the hand
+gets, so the gain settles where it is no longer shaken: a loop that is too stiff ends up at the edge of its stability, a
+noisy one at a whisper. Shaking for more than a share of the time all the same is a fault.
+
+The index of Dimeas & Aspragathos, "Online stability in human-robot cooperation with admittance control", IEEE Trans.
+Haptics 9(2), 2016, compares the fast part of the force's spectrum with the whole, and lowers gains by it; here turns
+are counted, which needs no window and no transform.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+
+_PERIOD, _PASS, _THRESHOLD, _LEAK, _MOST, _DOWN, _UP, _FORGET, _LONGEST = range(9)
+OSCILLATION_LAST, OSCILLATION_COUNT, OSCILLATION_GAIN, OSCILLATION_TIME, OSCILLATION_SIZE = 3, 6, 7, 8, 9
+
+
+@njit
+def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
+    """Take note of the force that is asked for at this tick, and give the gain for it.
+
+    Parameters
+    ----------
+    params : Array
+        `OscillationDetector.params`.
+    memory : Array
+        [slow part (3), fast part at the last turn (3), n, g, time of shaking], written.
+    force : Array
+        [N], shape (3,).
+
+    Returns
+    -------
+    float
+        g in 0…1; negative, minus the size of the fast part [N], if the gain has not stopped it.
+    """
+    dot, size, gain = 0.0, 0.0, memory[OSCILLATION_GAIN]
+    for i in range(3):
+        memory[i] += params[_PASS] * (gain * force[i] - memory[i])
+        fast = gain * force[i] - memory[i]
+        size += fast * fast
+        dot += fast * memory[OSCILLATION_LAST + i]
+    memory[OSCILLATION_COUNT] *= params[_LEAK]
+    last = memory[3] ** 2 + memory[4] ** 2 + memory[5] ** 2
+    if size > params[_THRESHOLD] ** 2:
+        if dot < 0.0:
+            memory[OSCILLATION_COUNT] += 1.0
+        if dot < 0.0 or last == 0.0:
+            for i in range(3):
+                memory[OSCILLATION_LAST + i] = gain * force[i] - memory[i]
+    shakes = memory[OSCILLATION_COUNT] > params[_MOST]
+    gain = gain * params[_DOWN] if shakes else min(1.0, gain + params[_UP])
+    memory[OSCILLATION_GAIN] = gain
+    memory[OSCILLATION_TIME] = memory[OSCILLATION_TIME] * params[_FORGET] + (params[_PERIOD] if shakes else 0.0)
+    return -np.sqrt(size) if memory[OSCILLATION_TIME] > params[_LONGEST] else gain
+
+
+@dataclass(frozen=True)
+class OscillationDetector:
+    """What counts as shaking, and what is done about it.
+
+    Parameters
+    ----------
+    period : float
+        Servo period T [s].
+    corner : float
+        ω_c/2π, above what a hand means to do [Hz].
+    threshold : float
+        Size of the fast part from which on it counts [N]; a hand feels 0.1 N.
+    memory : float
+        τ of the count [s].
+    turns : float
+        Count above which it is shaking; a frequency of ``turns / (2 memory)``: 15 Hz.
+    fall, rise : float
+        Time constant of the gain's fall, and time in which it comes back from 0 to 1 [s].
+    longest, forget : float
+        Time of shaking that is a fault, forgotten with this time constant [s]: 1 s at once, or a fifth of the time.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not positive and finite.
+    """
+
+    period: float
+    corner: float = 15.0
+    threshold: float = 0.3
+    memory: float = 0.1
+    turns: float = 3.0
+    fall: float = 0.1
+    rise: float = 2.0
+    longest: float = 1.0
+    forget: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} of the oscillation detector must be positive and finite, got {value}")
+
+    def params(self) -> Array:
+        """Parameters of `oscillation_gain`."""
+        period = self.period
+        share = 1.0 - np.exp(-2.0 * np.pi * self.corner * period)
+        leak, down, forget = (np.exp(-period / time) for time in (self.memory, self.fall, self.forget))
+        return np.array(
+            [period, share, self.threshold, leak, self.turns, down, period / self.rise, forget, self.longest]
+        )
+
+    def fresh_memory(self) -> Array:
+        """Memory of a loop that has not shaken."""
+        memory = np.zeros(OSCILLATION_SIZE)
+        memory[OSCILLATION_GAIN] = 1.0
+        return memory

@@ -1,0 +1,55 @@
+r"""Heat of the motors: each one's i²t, and the torque that it leaves.
+
+.. math:: \dot h_i = (\tau_i^2 - h_i)/\tau_{th}, \qquad |\tau_i| \le L_i(h_i),
+          \quad L_i^2 = c_i^2 + (p_i^2 - c_i^2) \max(0, 1 - h_i/c_i^2)
+
+Copper loss goes with the square of the current, and the winding cools: h is the mean square of the torque over the
+winding's time constant, and h = c² its temperature at the continuous torque c for ever. p is the torque at stall. With
+the ceiling L no demand takes h above c². (Maxon's data sheets give c, the stall torque and the time constant; the
+`ForceLimiter` has the same law for the force at the tip.)
+"""
+
+import numpy as np
+from numba import njit
+
+from controllers.safety.limiter import force_ceiling
+from controllers.state import Array
+
+
+@njit
+def hold_to_heat(
+    heat: Array, continuous: tuple[float, float, float], peak: tuple[float, float, float], share: float, torque: Array
+) -> float:
+    """Scale joint torques to what the motors' heat leaves, in place, and book them.
+
+    All three are scaled alike, so that the force keeps its direction.
+
+    Parameters
+    ----------
+    heat : Array
+        h_i [N² m²], shape (3,); written. One that is not finite counts as the highest.
+    continuous, peak : three floats
+        c_i, p_i [N m].
+    share : float
+        ``1 − exp(−T/τ_th)`` of a period T.
+    torque : Array
+        [N m], shape (3,); written.
+
+    Returns
+    -------
+    float
+        Largest share of what a motor can dissipate that is used, max h_i/c_i².
+    """
+    scale = 1.0
+    for i in range(3):
+        if not np.isfinite(heat[i]) or heat[i] < 0.0:
+            heat[i] = continuous[i] * continuous[i]
+        ceiling = force_ceiling(heat[i], continuous[i], peak[i])
+        if abs(torque[i]) * scale > ceiling:
+            scale = ceiling / abs(torque[i])
+    used = 0.0
+    for i in range(3):
+        torque[i] *= scale
+        heat[i] += share * (torque[i] * torque[i] - heat[i])
+        used = max(used, heat[i] / (continuous[i] * continuous[i]))
+    return used

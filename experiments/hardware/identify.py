@@ -1,0 +1,78 @@
+"""``hvf hardware identify``: from recordings of a device that nobody holds to a device file."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from controllers.safety.arming import State
+from experiments.files.device_files import device_json, save_device
+from experiments.files.json_text import json_text
+from experiments.hardware.run_options import IdentifyHardware
+from experiments.results.folder import RECORDING
+from sim.errors import SimError
+from sim.hardware.identification import NAMES, Identified, Motion, identify_linkage, motions_of
+from sim.recording.recording import Recording
+
+_SETTLING = 2.5
+"""Left out after the force is in [s]: a hand that held the stylus lets go meanwhile."""
+_UNITS = {"coulomb": "N m", "viscous": "N m s/rad", "inertia": "kg m²", "delay": "s", "offset": "rad", "weight": "N m"}
+
+
+def identify(options: IdentifyHardware) -> int:
+    """Find out what a device is, say it, and write it.
+
+    Raises
+    ------
+    SimError
+        If a recording is none of a hardware run, tells too little, or the file exists.
+    """
+    if options.out.exists() and not options.overwrite:
+        raise SimError(f"{options.out}: exists; choose another --out, or --overwrite it")
+    if not options.runs:
+        raise SimError("no recording is given; expected folders of hvf hardware run")
+    motions = [motion for path in options.runs for motion in recorded_motions(path)]
+    found = identify_linkage(motions)
+    content = device_json(found, [str(path) for path in options.runs])
+    save_device(content, options.out)
+    print(json_text(content) if options.json else "\n".join(lines_of(found, motions)))
+    return 0
+
+
+def recorded_motions(path: Path) -> list[Motion]:
+    """Stretches of a recording, or of a run's folder, in which the device was active and nobody held it.
+
+    Raises
+    ------
+    SimError
+        If it is no recording of a hardware run.
+    """
+    file = path / RECORDING if path.is_dir() else path
+    with Recording(file) as recording:
+        if "clock" not in recording.groups.get("ticks", ()):
+            raise SimError(f"{file}: is no recording of a hardware run; expected one of hvf hardware run")
+        tick, clock, theta, torque, state = (
+            recording.channel("ticks", name)[:] for name in ("tick", "clock", "theta", "torque", "state")
+        )
+        rate = recording.rates["ticks"]
+    active = state == State.ACTIVE
+    settled = np.zeros(len(active), dtype=bool)
+    wait = round(_SETTLING * rate)
+    counted = 0
+    for k, on in enumerate(active):
+        counted = counted + 1 if on else 0
+        settled[k] = counted > wait
+    return motions_of(tick, clock, theta, torque, settled)
+
+
+def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
+    """What was found, a line each."""
+    seconds = sum(float(motion.clock[-1] - motion.clock[0]) for motion in motions)
+    said = [
+        f"{seconds:.1f} s of motion, {found.windows} windows; {found.unexplained:.2%} of the torque is unexplained."
+    ]
+    for name, value, margin in zip(NAMES, found.values, found.margins, strict=True):
+        unit = _UNITS[name.rstrip("123")]
+        known = "" if margin < abs(value) else "  (not told apart from zero)"
+        said.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{known}")
+    return [*said, "offset1    is told by no motion: find it at the joint's stop."]

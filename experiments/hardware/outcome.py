@@ -1,0 +1,136 @@
+"""What a hardware run was: from its recording, and from what the servo said at its end."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.safety.arming import State
+from controllers.safety.faults import Fault
+from sim.hardware.controls import Look
+from sim.hardware.servo_process import Ended, Ready
+from sim.recording.recording import Recording, RecordingError
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a hardware run was.
+
+    Attributes
+    ----------
+    device, transport : str
+        Of the device.
+    fault : str
+        What it let go for at last; empty if for nothing.
+    silent : bool
+        Whether the servo stopped without a word.
+    broken : str
+        The program's own failure in the servo's process.
+    ticks, missed : int
+        Run, and deadlines missed.
+    compute, lateness : three floats
+        p50, p99, p99.9 of a tick's computing time, and of how late it began [s]; zeros of a servo that was killed.
+    memory_growth, descriptors : float, int
+        Of the servo's process after its first second [MB].
+    recorded, dropped : int
+        Ticks in the recording, and those that its process did not take in time.
+    active : float
+        Time under full force [s].
+    distance, force, heat : float
+        While active: RMS distance from the curve [m], largest force [N], largest share of a motor's heat.
+    apart, hand_force : float
+        RMS of the twin's prediction of a tick [m], largest force of the hand as it tells it [N], while active.
+    """
+
+    device: str
+    transport: str
+    fault: str
+    silent: bool
+    broken: str
+    ticks: int
+    missed: int
+    compute: tuple[float, float, float]
+    lateness: tuple[float, float, float]
+    memory_growth: float
+    descriptors: int
+    recorded: int
+    dropped: int
+    active: float
+    distance: float
+    force: float
+    heat: float
+    apart: float
+    hand_force: float
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing ended the run before its time."""
+        return not (self.fault or self.silent or self.broken)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it by name."""
+        return asdict(self)
+
+    def lines(self) -> list[str]:
+        """What a person wants to know, first what went wrong."""
+        wrong = [f"The device let go: {self.fault}."] if self.fault else []
+        wrong += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
+        wrong += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
+        micro = [" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness)]
+        return [
+            *wrong,
+            f"{self.device} ({self.transport}): {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from "
+            f"the curve, at most {self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
+            f"The twin predicted a tick within {1e3 * self.apart:.3f} mm RMS; the hand pushed with at most "
+            f"{self.hand_force:.2f} N.",
+            f"{self.ticks} ticks, {self.missed} deadlines missed; p50 / p99 / p99.9: computing {micro[0]} µs, late by "
+            f"{micro[1]} µs.",
+            f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files; {self.recorded} ticks "
+            f"are recorded, {self.dropped} were dropped.",
+        ]
+
+
+def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -> Outcome:
+    """The outcome of a run that has ended."""
+    found = _recorded(recording)
+    compute, lateness = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if ended is not None:
+        compute, lateness = ended.compute[:3], ended.lateness[:3]
+    return Outcome(
+        ready.identity.name, ready.identity.transport,
+        "" if last.fault is Fault.NONE else last.fault.words(last.value), ended is None,
+        ended.broken if ended else "", ended.ticks if ended else int(last.row["tick"]),
+        ended.missed if ended else int(last.row["missed"]), compute, lateness,
+        ended.memory_growth if ended else 0.0, ended.descriptors if ended else 0, **found,
+    )  # fmt: skip
+
+
+def _recorded(path: Path) -> dict[str, Any]:
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
+    )
+    try:
+        recording = Recording(path)
+    except RecordingError:
+        return nothing
+    with recording:
+        channels = recording.groups["ticks"]
+        state = recording.channel("ticks", "state")[:]
+        if not len(state):
+            return nothing
+        on = state == State.ACTIVE
+        rows = {
+            name: recording.channel("ticks", name)[:] for name in ("distance", "force", "heat", "apart", "hand_force")
+        }
+        rows = {name: rows[name][on] for name in rows if name in channels}
+        sizes = {name: np.linalg.norm(rows[name], axis=1) for name in ("force", "hand_force")}
+        some = bool(on.any())
+        return {
+            "recorded": len(state), "dropped": int(recording.channel("ticks", "dropped")[-1]),
+            "active": float(np.sum(on)) / recording.rates["ticks"],
+            "distance": float(np.sqrt(np.mean(rows["distance"] ** 2))) if some else 0.0,
+            "force": float(sizes["force"].max(initial=0.0)), "heat": float(rows["heat"].max(initial=0.0)),
+            "apart": float(np.sqrt(np.mean(rows["apart"] ** 2))) if some else 0.0,
+            "hand_force": float(sizes["hand_force"].max(initial=0.0)),
+        }  # fmt: skip

@@ -1,0 +1,77 @@
+"""Whether a device may be armed with a field: what the certificate, the device and its calibration say."""
+
+from pathlib import Path
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.report import Certificate
+from experiments.certify.certified_clips import run_and_clips
+from experiments.certify.certified_field import certificate_inputs
+from experiments.config.run_config import RunConfig
+from experiments.files.certificate_files import verify_certificate
+from experiments.files.device_files import linkage_of
+from models.mocap.clip import Clip
+from sim.devices.driver import DeviceIdentity
+from sim.errors import SimError
+
+HAND_PUSH = 1.0  # the default of `hvf certify` [N]
+
+
+def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
+    """The certificate of a field, if it is of this one, on this device, and says that the loop is stable.
+
+    Parameters
+    ----------
+    certificate : Path
+        A folder of ``hvf certify``, or its certificate.json.
+    config : RunConfig
+        Of the field.
+    delay : float
+        Of the torques [s].
+
+    Raises
+    ------
+    CertificateError
+        If there is none there.
+    ChangedInputs
+        If it is of another field, device, delay or code.
+    SimError
+        If it does not say that the loop is stable, or not for the delay of the device's file.
+    """
+    file = certificate / "certificate.json" if certificate.is_dir() else certificate
+    found_delay = linkage_of(config.device).delay
+    if delay < found_delay:
+        raise SimError(
+            f"the device file tells of a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
+            "here and in hvf certify"
+        )
+    clips: tuple[Clip, ...] = ()
+    if config.map.kind in ("led", "file"):
+        config, clips = run_and_clips(None, config)
+    found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))
+    stable = {name: verdict for name, verdict in found.verdicts.items() if name.startswith("stability")}
+    if not stable:
+        raise SimError(f"{file}: says nothing of stability; expected the certificate of a field")
+    for name, verdict in stable.items():
+        if verdict.verdict != "certified":
+            raise SimError(f"{file}: {name} is {verdict.verdict}, so no device is armed with it; {verdict.reason}")
+    return found
+
+
+def check_device(identity: DeviceIdentity) -> list[str]:
+    """What is to be said of a device that may be armed.
+
+    Raises
+    ------
+    SimError
+        If it may not: it has no motors, or does not know where it is.
+    """
+    if not identity.forces:
+        raise SimError(f"{identity.name} has no motors: no force can be felt on it; it plays, it is not armed")
+    if not identity.calibrated:
+        raise SimError(f"{identity.name} is not calibrated: its encoders do not know their zero; calibrate it first")
+    if identity.watchdog:
+        return []
+    return [
+        f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; keep "
+        "its power switch within reach"
+    ]

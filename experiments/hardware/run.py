@@ -1,0 +1,207 @@
+"""A hardware run from a configuration to a folder: permit, processes, a person who arms, what happened."""
+
+import contextlib
+import multiprocessing
+import select
+import socket
+import sys
+import time
+from collections.abc import Generator
+from pathlib import Path
+
+from rich.console import Console
+
+from controllers.safety.arming import ARM, CLEAR, DISARM, State
+from controllers.safety.faults import Fault
+from controllers.safety.gate import Gate
+from experiments.compiling import compile_once
+from experiments.config.part import to_dict, to_json
+from experiments.config.run_config import RunConfig
+from experiments.files.device_files import linkage_of
+from experiments.files.json_text import json_text
+from experiments.hardware.outcome import Outcome, outcome_of
+from experiments.hardware.page import show_status
+from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
+from experiments.hardware.permit import check_device, verified
+from experiments.hardware.run_options import EMULATED, RunHardware
+from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
+from experiments.setups.defaults import resolved
+from models.scene import SceneConfig
+from sim.errors import SimError
+from sim.hardware.controls import HardwareRun, Look
+from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
+from sim.hardware.recorder_process import RecordingJob
+from sim.hardware.servo_process import ServoClock
+from sim.hardware.shared import SharedNumbers
+
+_POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
+
+
+def run_hardware(config: RunConfig, options: RunHardware) -> int:
+    """Run a field on a device, and write what happened into a folder.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Of the field; how long it is armed is its `seconds`.
+    options : RunHardware
+        Device, certificate, limits.
+
+    Returns
+    -------
+    int
+        Exit code: 1 if a fault or a failure ended the run.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        If there is no such device, or it may not be armed with this field; the folder is then as it was.
+    """
+    console = Console(stderr=True)
+    check_folder(options.out, options.overwrite)
+    if not (options.arm or sys.stdin.isatty()):
+        raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
+    config = resolved(config)
+    _permit(config, options, console)
+    serving = served(config)
+    session = session_of(serving, ready=lambda units: compile_once(console, units))
+    for remark in session.remarks:
+        console.print(remark, highlight=False)
+    period = config.clock.servo_period
+    gate = Gate(
+        period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed, small=options.small,
+        ramp=options.ramp, dead_man=options.dead_man, permitted=True,
+    )  # fmt: skip
+    clear_folder(options.out)
+    (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+    job = RecordingJob(
+        options.out / RECORDING, to_dict(config), session.static(), config.seed,
+        SceneConfig(servo_period=period, physics_step=config.clock.physics_step),
+    )  # fmt: skip
+    with contextlib.ExitStack() as stack:
+        linkage = linkage_of(config.device)
+        make = MakeServo(serving, options.name, gate, linkage.offset)
+        if options.name == EMULATED:
+            scene = SceneConfig(servo_period=period, physics_step=config.clock.physics_step)
+            packets = stack.enter_context(emulated(MakeEmulated(scene, start_of(session), linkage), options.realtime))
+            make = MakeServo(serving, options.name, gate, linkage.offset, packets)
+        clock = ServoClock(late=options.late, realtime=options.realtime)
+        run = stack.enter_context(HardwareRun(make, period, clock, job))
+        ready = run.start()
+        for line in (*check_device(ready.identity), *ready.said):
+            console.print(line, highlight=False)
+        if options.view:
+            stack.enter_context(_page(config, run))
+        last = _attend(run, config.seconds, options, console)
+        ended = run.stop()
+    outcome = outcome_of(options.out / RECORDING, ready, ended, last)
+    _write(outcome, options.out, console)
+    return 0 if outcome.sound else 1
+
+
+def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
+    """Refuse a device with motors that has no certificate of this field.
+
+    Raises
+    ------
+    CertificateError, SimError
+        If it may not be armed.
+    """
+    if options.certificate is not None:
+        found = verified(options.certificate, config, options.delay)
+        console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)
+    elif options.name != EMULATED:
+        raise SimError(
+            f"{options.name} is armed with a certificate of this field only; expected --certificate, a folder that "
+            "hvf certify has written with the same options"
+        )
+
+
+@contextlib.contextmanager
+def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, None, None]:
+    """The emulated device in its process; gives the servo's end of its packets."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    shown = SharedNumbers(SHOWN_SIZE)
+    end = EmulatedEnd(theirs, shown, make.scene.servo_period)
+    context = multiprocessing.get_context("spawn")
+    process = context.Process(target=host_device, args=(make, end, realtime), name="device", daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        yield ours
+    finally:
+        ours.close()
+        process.kill()
+        process.join()
+        shown.close()
+
+
+@contextlib.contextmanager
+def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
+    context = multiprocessing.get_context("spawn")
+    page = context.Process(target=show_status, args=(config, run.status), name="page", daemon=True)
+    page.start()
+    try:
+        yield
+    finally:
+        page.kill()
+        page.join()
+
+
+def _attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> Look:
+    """Arm, look, say what changes, for so many seconds from the first arming on; gives the last look with a servo."""
+    terminal = sys.stdin.isatty() and not options.arm
+    until, state, look = None, None, run.poll()
+    if terminal:
+        console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
+    else:
+        run.request(ARM)
+        until = time.monotonic() + seconds
+    with contextlib.suppress(KeyboardInterrupt):
+        while until is None or time.monotonic() < until:
+            time.sleep(_POLL)
+            look = run.poll()
+            if not look.alive:
+                console.print("The servo has stopped; the device's watchdog lets go.")
+                return look
+            if look.state is not state:
+                state = look.state
+                console.print(_told(look, options.dead_man), highlight=False)
+            if look.fault is not Fault.NONE and not terminal:
+                return look
+            if terminal and _enter():
+                if look.fault is not Fault.NONE:
+                    run.request(CLEAR)
+                    time.sleep(2.0 * _POLL)
+                run.request(ARM)
+                until = until or time.monotonic() + seconds
+    run.request(DISARM)
+    return look
+
+
+def _enter() -> bool:
+    """Whether Enter was pressed."""
+    if not select.select([sys.stdin], [], [], 0.0)[0]:
+        return False
+    sys.stdin.readline()
+    return True
+
+
+def _told(look: Look, dead_man: bool) -> str:
+    said = {
+        State.DISARMED: "Disarmed: the motors are off.",
+        State.ARMING: "Arming: no force yet"
+        + (", the switch has to be held, and" if dead_man else ";")
+        + " the force that is asked for has to be small first.",
+        State.RAMPING: "The force comes in.",
+        State.ACTIVE: "Active.",
+        State.FAULT: f"The device let go at {float(look.row['t']):.3f} s: {look.fault.words(look.value)}.",
+    }
+    return f"{float(look.row['t']):8.2f} s  {said[look.state]}"
+
+
+def _write(outcome: Outcome, out: Path, console: Console) -> None:
+    for line in outcome.lines():
+        print(line)
+    (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
+    console.print(f"Written to {out}: {SUMMARY}, {RECORDING}.", highlight=False)

@@ -1,0 +1,60 @@
+"""The options of ``hvf hardware run`` and ``hvf hardware identify``; light, for the command line reads them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from experiments.config.part import above, at_least, part
+from experiments.config.words import RunOptions
+
+EMULATED = "emulated"
+
+
+@part
+class RunHardware:
+    """How a field is run on a real device."""
+
+    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
+    name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
+    """A device as `hvf hardware list` names it, or "emulated": the MuJoCo linkage in a process of its own."""
+    certificate: Path | None = None
+    """Folder or certificate.json of `hvf certify` for this very field; only the emulated device runs without."""
+    delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
+    """Of the motors' torques, as it was certified [s]."""
+    out: Path = Path("runs/hardware")
+    """Folder to write."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+    arm: bool = False
+    """Arm at once; otherwise a person at the terminal presses Enter."""
+    dead_man: bool = True
+    """Force only while the stylus's switch is held."""
+    force: Annotated[float, above(0.0, unit="N")] = 4.0
+    """Largest force [N]."""
+    speed: Annotated[float, above(0.0, unit="m/s")] = 1.0
+    """Speed of the tip from which on the force fades; half as much again is a fault [m/s]."""
+    small: Annotated[float, above(0.0, unit="N")] = 1.0
+    """No force before the one that is asked for has been at most so small [N]."""
+    ramp: Annotated[float, above(0.0, unit="s")] = 1.0
+    """In which the force is brought in [s]."""
+    late: Annotated[float, above(0.0, unit="s")] = 0.04
+    """Lateness of the servo that is a fault [s]."""
+    realtime: bool = True
+    """Ask the system to run the servo before everything else."""
+    view: bool = False
+    """Show device and figure in a browser, from a process of its own."""
+
+
+@part
+class IdentifyHardware:
+    """From which recordings a device is identified, and where that is written."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders of `hvf hardware run`, or their recordings; several fast and slow ones tell more than one."""
+    out: Path = Path("device.json")
+    """Device file to write."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+    json: bool = False
+    """Print the file's content instead of a table."""

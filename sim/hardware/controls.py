@@ -1,0 +1,224 @@
+"""The end of a hardware run that a person holds: it starts the processes, arms, looks, and ends them.
+
+Its `poll` is its heartbeat: a servo that does not hear it lets go. It hears the servo's in turn.
+"""
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.safety.arming import NO_REQUEST, State
+from controllers.safety.faults import Fault
+from sim.errors import SimError
+from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
+from sim.hardware.recorder_process import (
+    RING_SECONDS,
+    TOLD_APART,
+    TOLD_DROPPED,
+    TOLD_ERROR,
+    TOLD_FORCE,
+    TOLD_ROWS,
+    TOLD_SIZE,
+    RecordingJob,
+    record_rows,
+)
+from sim.hardware.servo_process import (
+    ORDER_BEAT,
+    ORDER_NUMBER,
+    ORDER_REQUEST,
+    ORDER_SIZE,
+    ORDER_STOP,
+    Channels,
+    Ended,
+    Ready,
+    Refused,
+    ServoClock,
+    serve,
+)
+from sim.hardware.shared import Ring, SharedNumbers
+
+Array = npt.NDArray[np.float64]
+
+SILENT = 0.2
+"""Time without a tick after which a servo counts as gone [s]."""
+_START, _END = 600.0, 10.0  # [s] that are waited for a servo to begin, which may compile, and to end
+
+
+class Recorded(NamedTuple):
+    """What the recorder tells.
+
+    Attributes
+    ----------
+    alive : bool
+        Whether it is there and writes.
+    rows, dropped : int
+        Ticks written, and lost because it did not keep up.
+    error : int
+        errno of what stopped it, or 0.
+    hand_force : Array
+        The twin's estimate [N], in H, shape (3,).
+    apart : float
+        From the twin's prediction to the device [m].
+    """
+
+    alive: bool
+    rows: int
+    dropped: int
+    error: int
+    hand_force: Array
+    apart: float
+
+
+class Look(NamedTuple):
+    """What is seen of a hardware run.
+
+    Attributes
+    ----------
+    alive : bool
+        Whether the servo ticks.
+    state : State
+    fault : Fault
+    value : float
+        Of the fault.
+    row : dict
+        The last tick, by `sim.hardware.gated_servo.CHANNELS`.
+    recorded : Recorded, optional
+        None where nothing is recorded.
+    """
+
+    alive: bool
+    state: State
+    fault: Fault
+    value: float
+    row: dict[str, Array]
+    recorded: Recorded | None
+
+
+class HardwareRun:
+    """Servo and recorder in processes of their own, and the controls here; a context manager that ends them.
+
+    Parameters
+    ----------
+    make : callable
+        Opens the device and makes what is driven, in the servo's process; picklable.
+    period : float
+        Servo period [s].
+    clock : ServoClock
+        Of the servo.
+    job : RecordingJob, optional
+        What is recorded.
+
+    Attributes
+    ----------
+    servo : BaseProcess
+        The servo's process.
+    recorder : BaseProcess or None
+        The recorder's.
+    status : SharedNumbers
+        The servo's last row, for any other process that is to show it.
+    """
+
+    def __init__(
+        self, make: Callable[[], GatedServo], period: float, clock: ServoClock, job: RecordingJob | None = None
+    ):
+        context = multiprocessing.get_context("spawn")
+        self._orders, self.status = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE)
+        self._rows = Ring(round(RING_SECONDS / period), ROW_SIZE)
+        self._until, self._told = SharedNumbers(1), SharedNumbers(TOLD_SIZE)
+        self._said, told = context.Pipe(duplex=False)
+        self._order, self._row, self._heard = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
+        channels = Channels(self._orders, self.status, self._rows, told)
+        self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
+        self.recorder: BaseProcess | None = None
+        if job is not None:
+            arguments = job, self._rows, self._until, self._told
+            self.recorder = context.Process(target=record_rows, args=arguments, name="recorder", daemon=True)
+        self._their_end: Connection = told
+        self._ended: Ended | None = None
+
+    def __enter__(self) -> "HardwareRun":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+        for shared in (self._orders, self.status, self._rows, self._until, self._told):
+            shared.close()
+
+    def start(self) -> Ready:
+        """Start the processes, and wait until the servo ticks.
+
+        Raises
+        ------
+        SimError
+            If the servo could not begin; the message says why.
+        """
+        self.servo.start()
+        self._their_end.close()
+        if self.recorder is not None:
+            self.recorder.start()
+        said = self._hear(_START)
+        if isinstance(said, Ready):
+            self.poll()
+            return said
+        raise SimError(said.why if isinstance(said, Refused) else "the servo's process ended before it began")
+
+    def _hear(self, timeout: float) -> Ready | Refused | Ended | None:
+        try:
+            return self._said.recv() if self._said.poll(timeout) else None
+        except EOFError:
+            return None
+
+    def request(self, event: int) -> None:
+        """Send `ARM`, `DISARM` or `CLEAR` (of `controllers.safety.arming`)."""
+        self._order[ORDER_NUMBER] += 1.0
+        self._order[ORDER_REQUEST] = event
+        self._orders.write(self._order)
+
+    def poll(self) -> Look:
+        """Tell the servo that somebody is there, and look at it."""
+        self._order[ORDER_BEAT] += 1.0
+        self._orders.write(self._order)
+        self.status.read(self._row)
+        row, now = {name: channel[0] for name, channel in columns(self._row[None].copy()).items()}, time.monotonic()
+        tick = float(row["tick"])
+        if tick != self._heard[0]:
+            self._heard = tick, now
+        alive = self.servo.is_alive() and now - self._heard[1] < SILENT
+        state, fault = State(int(row["state"])), Fault(int(row["fault"]))
+        return Look(alive, state, fault, float(row["fault_value"]), row, self._recorded())
+
+    def _recorded(self) -> Recorded | None:
+        if self.recorder is None:
+            return None
+        told = np.zeros(TOLD_SIZE)
+        self._told.read(told)
+        error = int(told[TOLD_ERROR])
+        force = told[TOLD_FORCE : TOLD_FORCE + 3]
+        alive = self.recorder.is_alive() and error == 0
+        return Recorded(alive, int(told[TOLD_ROWS]), int(told[TOLD_DROPPED]), error, force, float(told[TOLD_APART]))
+
+    def stop(self) -> Ended | None:
+        """End the servo, then the recorder once it has everything; what the servo said at its end, if it could."""
+        if self._ended is None and self.servo.pid is not None:
+            self._order[ORDER_STOP], self._order[ORDER_REQUEST] = 1.0, NO_REQUEST
+            self._orders.write(self._order)
+            said = self._hear(_END)
+            self._ended = said if isinstance(said, Ended) else None
+            _end(self.servo)
+        if self.recorder is not None and self.recorder.pid is not None:
+            self._until.write(np.ones(1))
+            _end(self.recorder)
+        return self._ended
+
+
+def _end(process: BaseProcess) -> None:
+    process.join(_END)
+    if process.is_alive():
+        process.kill()
+        process.join()

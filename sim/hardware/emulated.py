@@ -1,0 +1,130 @@
+"""A device that is real to the software: the MuJoCo linkage behind a driver, with what a linkage's data sheet hides.
+
+Its clock runs by its own steps, one a command, so that a run with it is the same again. Its hand holds the stylus, with
+a tremor, until the motors have been on for a while, and then lets go.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import rest_pose
+from models.phantom.kinematics import encoder_reading, gimbal_reading
+from models.scene import SceneConfig
+from sim.compilation.compiled import entry_point
+from sim.devices.driver import READ, TELEMETRY_SIZE, TEMPERATURE, DeviceIdentity
+from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
+from sim.errors import SimError
+from sim.users.arm import Arm
+from sim.world.linkage import Linkage
+from sim.world.phantom_port import PhantomPort, phantom_port
+from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+
+TREMOR, TREMOR_FREQUENCY = 1e-4, 10.0
+"""Physiological tremor of a hand at rest: some 0.1 mm [m] at 8 to 12 Hz."""
+
+
+@entry_point
+def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Array) -> None:
+    """Some physics steps of a Phantom whose motors somebody else has set, from time t [s] on."""
+    advance(plant, port, user, t, False, applied)
+
+
+def holding_arm(point: Array, seconds: float) -> Arm:
+    """A hand that holds a stylus at a point of H [m] for a time [s], and trembles."""
+    t = np.arange(0.0, seconds, 2e-3)
+    phases = 2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2])
+    return Arm(path=point + TREMOR * np.sin(phases), period=2e-3)
+
+
+class EmulatedPhantom:
+    """Driver of a linkage in MuJoCo; one servo period passes in it with every command.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+        Its servo period and physics step.
+    start : Array
+        Where the stylus is at first, in H [m].
+    linkage : Linkage
+        What it is.
+    arm : Arm, optional
+        The hand, once it has let go; relaxed by default.
+    holds : float
+        How long the hand still holds the stylus after the motors came on [s].
+    presses : bool
+        Whether it presses the switch.
+
+    Raises
+    ------
+    SimError
+        If the start is out of reach, or the delay not below a period.
+    """
+
+    def __init__(
+        self, scene: SceneConfig, start: Array, linkage: Linkage | None = None, arm: Arm | None = None,
+        holds: float = 1.5, presses: bool = True,
+    ):  # fmt: skip
+        linkage = linkage or Linkage()
+        self.world = World(scene, "none")
+        self.world.reset(start, rest_pose())
+        linkage.into(self.world)
+        self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
+        self._plant, self._switch, self._offset = make_plant(self.world), float(presses), np.array(linkage.offset)
+        steps = self._plant.substeps
+        late = round(linkage.delay / scene.servo_period * steps)
+        if late > steps:
+            raise SimError(f"a delay of {linkage.delay} s is more than the servo period {scene.servo_period} s")
+        self._spans = [(s, flag) for s, flag in ((late, False), (steps - late, True)) if s > 0]
+        self._holding = make_hand(holding_arm(start, 600.0)) if holds > 0.0 else None
+        self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
+        self._applied, self._last, self._motors = np.zeros((steps, 3)), np.zeros(3), list(self.port.motor)
+        self._steps, self._told = 0, 0
+        self.torque = np.zeros(3)
+        self.telemetry = np.zeros(TELEMETRY_SIZE)
+        self.telemetry[TEMPERATURE : TEMPERATURE + 3] = np.nan
+        self.identity = DeviceIdentity(
+            "emulated Phantom", "MuJoCo", "", "", forces=True, watchdog=True, calibrated=True
+        )
+
+    @property
+    def clock(self) -> float:
+        """Its own time [s]."""
+        return self._steps * self._plant.period
+
+    def read(self, reading: Array, timeout: float) -> bool:
+        """As `sim.devices.driver.Driver`; there is a new reading after each command."""
+        q, port, new = self.port.qpos, self.port, self._steps + 1 > self._told
+        theta = q[list(port.arm_q)] + self._offset
+        reading[READING_THETA : READING_THETA + 3] = encoder_reading((theta[0], theta[1], theta[2]))
+        g = port.gimbal_q
+        reading[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_reading((q[g[0]], q[g[1]], q[g[2]]))
+        reading[READING_SWITCH], reading[READING_CLOCK] = self._switch, self.clock
+        reading[READING_SEQUENCE] = self._told = self._steps + 1
+        self.telemetry[READ] += new
+        return new
+
+    def write(self, torque: Array, enable: bool) -> None:
+        """As `sim.devices.driver.Driver`; then a servo period passes."""
+        self.torque[:] = torque if enable else 0.0
+        self._on = self._on + self._plant.period if enable else 0.0
+        user = self._relaxed if self._holding is None or self._on > self._holds else self._holding
+        t = self.clock
+        for steps, new in self._spans:
+            span = steps / self._plant.substeps * self._plant.period
+            plant = self._plant._replace(substeps=steps, period=span)
+            self.world.data.ctrl[self._motors] = self.torque if new else self._last
+            pass_time(plant, self.port, user, t, self._applied[:steps])
+            t += span
+        self._last[:] = self.torque
+        self._steps += 1
+
+    def let_go(self) -> None:
+        """As `sim.devices.driver.Driver`; no time passes."""
+        self.torque[:] = self._last[:] = 0.0
+
+    def close(self) -> None:
+        """As `sim.devices.driver.Driver`."""
+        self.let_go()

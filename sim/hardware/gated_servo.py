@@ -1,0 +1,167 @@
+"""A servo with a driver and a gate: one tick, whatever clock it is called by."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.safety.arming import CLEAR, NO_REQUEST, State
+from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
+from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
+from sim.devices.driver import LOST, ROUND_TRIP, TEMPERATURE, Driver, DriverFault
+from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
+from sim.errors import SimError
+from sim.hardware.gated_tick import GateMemory, gated_tick
+from sim.loop.loop import make_logs, tick_channels
+from sim.loop.servo import Servo, rearm_servo, run_block
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+
+READ_SHARE = 0.3
+"""Share of a period that is waited for a reading: the rest is for the tick and the command."""
+
+CHANNELS: dict[str, tuple[int, ...]] = {
+    "tick": (), "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
+    "force": (3,), "asked": (3,), "torque": (3,), "tank": (), "tank_scale": (), "phase": (), "nearest": (3,),
+    "distance": (), "river": (), "fault": (), "fault_value": (), "gaps": (), "state": (), "gain": (), "share": (),
+    "heat": (), "missed": (), "lateness": (), "compute": (), "sequence": (), "clock": (), "theta": (3,),
+    "gimbal": (3,), "round_trip": (), "lost": (), "temperature": (3,),
+}  # fmt: skip
+"""What a tick leaves behind: the loop's, the gate's (`asked` is before it, `force` after), clock's and device's."""
+
+_PLACES: dict[str, slice] = {}
+for _name, _shape in CHANNELS.items():
+    _at = max((s.stop for s in _PLACES.values()), default=0)
+    _PLACES[_name] = slice(_at, _at + (_shape[0] if _shape else 1))
+ROW_SIZE = _PLACES["temperature"].stop
+
+
+def columns(rows: Array) -> dict[str, Array]:
+    """Rows of ticks by channel, shape (n, …) each."""
+    return {name: rows[:, place].reshape(len(rows), *CHANNELS[name]) for name, place in _PLACES.items()}
+
+
+class GatedServo(NamedTuple):
+    """What is driven, and by what.
+
+    Attributes
+    ----------
+    servo : Servo
+        Whose device is an `Exchange`.
+    world : World
+        Kept alive here.
+    driver : Driver
+        Of the device.
+    gate : Gate
+        Its limits.
+    offset : Array
+        Of the encoders, subtracted from the readings [rad], shape (3,).
+    """
+
+    servo: Servo
+    world: World
+    driver: Driver
+    gate: Gate
+    offset: Array
+
+
+class Ticker:
+    """Ticks of a gated servo, and the row that each leaves behind.
+
+    Parameters
+    ----------
+    parts : GatedServo
+        What is driven.
+
+    Attributes
+    ----------
+    row : Array
+        The last tick's, by `CHANNELS`, shape (`ROW_SIZE`,).
+
+    Raises
+    ------
+    SimError
+        If the servo's device is no exchange.
+    """
+
+    def __init__(self, parts: GatedServo):
+        if not isinstance(parts.servo.device, Exchange):
+            raise SimError(f"the servo's device is a {type(parts.servo.device).__name__}; expected an Exchange")
+        self.parts, self._device = parts, parts.servo.device
+        self.gated = GateMemory.of(parts.gate)
+        self._ticks, self._frames = make_logs(parts.servo, 1)
+        self._timeout = READ_SHARE * parts.gate.period
+        self.row = np.zeros(ROW_SIZE)
+        self._tick_views = [
+            (self.row[_PLACES[name]], channel.reshape(-1))
+            for name, channel in tick_channels(self._ticks, 1).items()
+            if name in CHANNELS and name not in ("force", "torque", "fault", "fault_value", "gaps")
+        ]
+        self._views = {name: self.row[place] for name, place in _PLACES.items()}
+
+    @property
+    def state(self) -> State:
+        """Of the gate."""
+        return State(int(self.gated.gate[GATE_STATE]))
+
+    @property
+    def fault(self) -> LatchedFault | None:
+        """That is latched."""
+        return latched(self._device.faults)
+
+    def fail(self, fault: Fault, value: float) -> None:
+        """Latch a fault, from the next tick on."""
+        latch(self._device.faults, int(fault), float(self._device.hand[0]), value)
+
+    def tick(self, number: int, request: int = NO_REQUEST) -> None:
+        """Read, compute, write: tick `number`, whose time is ``number T``.
+
+        A driver's fault is latched, and the motors are let go; nothing is raised.
+        """
+        parts, device = self.parts, self._device
+        try:
+            if parts.driver.read(device.reading, self._timeout):
+                device.reading[READING_THETA : READING_THETA + 3] -= parts.offset
+        except DriverFault as found:
+            self.fail(found.fault, found.value)
+        if request == CLEAR:
+            rearm_servo(parts.servo)
+        run_block(parts.servo, number, 1, False, self._ticks, self._frames)
+        field = parts.servo.field
+        gated_tick(device, self.gated, field.limiter, field.tank, field.force, request)
+        try:
+            parts.driver.write(self.gated.torque, self.gated.pushes)
+        except DriverFault as found:
+            self.fail(found.fault, found.value)
+        if not self.gated.pushes and device.faults[FAULT_CODE] != 0.0:
+            parts.driver.let_go()
+        self._keep(number)
+
+    def _keep(self, number: int) -> None:
+        """Fill the row."""
+        device, gated, view, telemetry = self._device, self.gated, self._views, self.parts.driver.telemetry
+        for place, channel in self._tick_views:
+            place[:] = channel
+        view["tick"][0] = number
+        view["asked"][:], view["force"][:] = self.parts.servo.field.force, gated.force
+        view["torque"][:] = gated.torque
+        faults = device.faults
+        view["fault"][0], view["fault_value"][0], view["gaps"][0] = (
+            faults[FAULT_CODE],
+            faults[FAULT_VALUE],
+            faults[FAULT_GAPS],
+        )
+        view["state"][0], view["gain"][0] = gated.gate[GATE_STATE], gated.gate[GATE_GAIN]
+        view["share"][0], view["heat"][0] = gated.gate[GATE_SHARE], gated.told[0]
+        reading = device.reading
+        view["sequence"][0], view["clock"][0] = reading[READING_SEQUENCE], reading[READING_CLOCK]
+        view["theta"][:] = reading[READING_THETA : READING_THETA + 3]
+        view["gimbal"][:] = reading[READING_GIMBAL : READING_GIMBAL + 3]
+        view["round_trip"][0], view["lost"][0] = telemetry[ROUND_TRIP], telemetry[LOST]
+        view["temperature"][:] = telemetry[TEMPERATURE : TEMPERATURE + 3]
+
+    def note_time(self, missed: int, lateness: float, compute: float) -> None:
+        """Add to the row what the clock says: deadlines missed so far, lateness and computing time of this tick [s]."""
+        view = self._views
+        view["missed"][0], view["lateness"][0], view["compute"][0] = missed, lateness, compute

@@ -1,0 +1,113 @@
+"""What comes between the loop's tick and the motors of a real device, compiled: gate, torques, heat."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.safety.arming import pushes
+from controllers.safety.energy_tank import book_force
+from controllers.safety.faults import FAULT_CODE, Fault, latch
+from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
+from controllers.safety.limiter import LIMITER_FORCE
+from controllers.safety.thermal import hold_to_heat
+from models.phantom.dynamics import gravity_torques
+from models.phantom.parameters import PREMIUM_1_5
+from sim.compilation.compiled import entry_point
+from sim.devices.exchange import COMMAND_FAULT, COMMAND_FORCE, COMMAND_TORQUE, Exchange
+from sim.world.encoders import PEAK_TORQUE, motor_torques
+
+Array = npt.NDArray[np.float64]
+
+CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
+THERMAL_TIME = 10.0
+"""Time constant of a motor's winding [s]: the RE 25's is of this order."""
+HOT = 0.98
+"""Share of what a motor can dissipate from which on a demand that stays is a fault."""
+
+MOTORS_HOT = int(Fault.MOTORS_HOT)
+
+
+class GateMemory(NamedTuple):
+    """A gate as the compiled tick holds it.
+
+    Attributes
+    ----------
+    params, shaking, gate, shaken : Array
+        Of `controllers.safety.gate.pass_gate`.
+    heat : Array
+        Of the motors (`controllers.safety.thermal`), shape (3,).
+    told : Array
+        [share of a motor's heat that is used], shape (1,).
+    force, torque : Array
+        What gets through [N], and is commanded to the motors [N m], shape (3,).
+    cooling : float
+        ``1 − exp(−T/τ)`` of the winding.
+    """
+
+    params: Array
+    shaking: Array
+    gate: Array
+    shaken: Array
+    heat: Array
+    told: Array
+    force: Array
+    torque: Array
+    cooling: float
+
+    @classmethod
+    def of(cls, gate: Gate) -> "GateMemory":
+        """Memory of a gate before its first tick; its motors are cold."""
+        return cls(
+            gate.params(), gate.detector.params(), gate.fresh_memory(), gate.detector.fresh_memory(), np.zeros(3),
+            np.zeros(1), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME),
+        )  # fmt: skip
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the motors are on."""
+        return bool(pushes(int(self.gate[GATE_STATE])))
+
+
+@entry_point
+def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array, asked: Array, request: int) -> None:
+    """From the force that the loop commands to the torques of the motors; zero in every state without force.
+
+    Limiter and tank are told what force the hand really gets. The linkage's weight is balanced in the share in which
+    the force is ramped in.
+
+    Parameters
+    ----------
+    device : Exchange
+        Whose `command` is written again.
+    gated : GateMemory
+        `force` and `torque` are written.
+    limiter, tank : Array
+        Memory of both, of the loop's field.
+    asked : Array
+        What the loop commands [N], shape (3,).
+    request : int
+        Of `controllers.safety.gate.pass_gate`.
+    """
+    force, torque, faults = gated.force, gated.torque, device.faults
+    force[:] = asked
+    pass_gate(gated.params, gated.shaking, gated.gate, gated.shaken, faults, device.hand, request, force)
+    memory, held_back = device.memory, 1.0 - gated.gate[GATE_SHARE]
+    motor_torques(faults, memory, device.hand[0], force, torque)
+    # J(θ)ᵀF is ramped in with F, the weight is not yet.
+    weight = gravity_torques((memory[0], memory[1], memory[2]))
+    for i in range(3):
+        torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
+    gated.told[0] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
+    if gated.told[0] > HOT:
+        latch(faults, MOTORS_HOT, device.hand[0], gated.told[0])
+    if faults[FAULT_CODE] != 0.0 or not pushes(int(gated.gate[GATE_STATE])):
+        force[:] = 0.0
+        torque[:] = 0.0
+    book_force(tank, force)
+    for i in range(3):
+        limiter[LIMITER_FORCE + i] = force[i]
+        device.command[COMMAND_TORQUE + i] = device.torque[i] = torque[i]
+        device.command[COMMAND_FORCE + i] = force[i]
+    device.command[COMMAND_FAULT] = faults[FAULT_CODE]

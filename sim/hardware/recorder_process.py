@@ -1,0 +1,94 @@
+"""The recorder's process: takes the servo's rows, shows them to the twin, and writes them; it may die or freeze.
+
+What it did not take in time is gone, and the recording says how much: the channel `tick` jumps, and `dropped` counts.
+"""
+
+import errno
+import os
+import signal
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from models.scene import SceneConfig
+from sim.hardware.gated_servo import CHANNELS, columns
+from sim.hardware.shared import Ring, SharedNumbers
+from sim.hardware.twin import TWIN_CHANNELS, Twin
+from sim.recording.recorder import Group, Recorder
+
+Array = npt.NDArray[np.float64]
+
+TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_SIZE = 0, 1, 2, 3, 6, 7
+"""What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m]."""
+
+RING_SECONDS = 5.0
+"""How long a recorder may stand still before rows are lost."""
+
+_REST = 0.02  # [s] between two looks at the ring
+
+
+@dataclass(frozen=True)
+class RecordingJob:
+    """What a recorder is to write.
+
+    Parameters
+    ----------
+    path : Path
+        File to make.
+    config, static : mapping
+        Of `sim.recording.recorder.Recorder`.
+    seed : int
+        Likewise.
+    scene : SceneConfig
+        Of the twin's world; its servo period is the servo's.
+    """
+
+    path: Path
+    config: Mapping[str, object]
+    static: Mapping[str, npt.ArrayLike | str]
+    seed: int
+    scene: SceneConfig
+
+
+def hardware_groups(period: float) -> dict[str, Group]:
+    """What is recorded of a servo of a period [s]: its rows, how many were dropped before each, and the twin's."""
+    return {"ticks": Group(1.0 / period, CHANNELS | {"dropped": ()} | TWIN_CHANNELS)}
+
+
+def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: SharedNumbers) -> None:
+    """Record until `orders` has a 1 and nothing is left; the target of a process.
+
+    A disk that is full, or any other error of writing, ends the recording where it is, and is told; the servo never
+    hears of it.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    status, order, parent = np.zeros(TOLD_SIZE), np.zeros(1), os.getppid()
+    twin = Twin(job.scene)
+    try:
+        with Recorder(job.path, job.config, job.seed, hardware_groups(job.scene.servo_period), job.static) as recorder:
+            while True:
+                orders.read(order)
+                last = order[0] > 0.0 or os.getppid() != parent
+                taken, lost = rows.take()
+                status[TOLD_DROPPED] += lost
+                if len(taken):
+                    found = columns(taken)
+                    found |= {"dropped": np.full(len(taken), status[TOLD_DROPPED])} | twin.follow(found)
+                    recorder.append("ticks", found)
+                    status[TOLD_ROWS] += len(taken)
+                    status[TOLD_FORCE : TOLD_FORCE + 3] = found["hand_force"][-1]
+                    status[TOLD_APART] = found["apart"][-1]
+                told.write(status)
+                if last and not len(taken):
+                    break
+                time.sleep(_REST)
+            recorder.flush()
+            recorder.close({"rows": int(status[TOLD_ROWS]), "dropped": int(status[TOLD_DROPPED])})
+    except (OSError, RuntimeError) as error:
+        status[TOLD_ERROR] = float(getattr(error, "errno", None) or errno.EIO)
+        told.write(status)
+        os._exit(1)  # HDF5 would write again on its way out

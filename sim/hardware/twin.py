@@ -1,0 +1,231 @@
+r"""The twin: a MuJoCo Phantom that goes where the device goes, and what the difference says of the hand.
+
+A prediction is one period of the model from the twin's state, under the torques that were commanded and the hand's last
+estimated ones; the encoders then correct it as a Luenberger observer with a double pole z₀ = e^(−ω T):
+
+.. math:: \hat\theta = \theta^- + (1 - z_0^2)\,e, \quad \hat\omega = \omega^- + (1 - z_0)^2 e/T,
+          \quad e = \theta - \theta^-
+
+The hand's torques are the residual of the generalised momentum (De Luca & Mattone, ICRA 2005; De Luca et al., IROS
+2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f_c \tanh(\dot\theta/\epsilon) +
+\tau_h`,
+
+.. math:: r = K \left(p(t) - p(0) - \int (\tau + C^T\dot\theta - N - D\dot\theta - f + r)\,dt\right),
+          \qquad \dot r = K (\tau_h - r)
+
+which needs no acceleration and is the hand's torque through a first-order filter of K. The force is F = J⁻ᵀ r. What the
+model does not know, friction above all, is in it: at rest up to the Coulomb friction, 0.04 N at the tip.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from models.humanoid.skeleton import rest_pose
+from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
+from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
+from models.phantom.parameters import PREMIUM_1_5
+from models.scene import PHANTOM, SceneConfig
+from sim.compilation.compiled import entry_point
+from sim.world.phantom_port import ARM_JOINTS, MOTORS
+from sim.world.plant import Plant, make_plant, step
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+BANDWIDTH = 2.0 * math.pi * 30.0
+"""ω of the observer [rad/s]: above a hand's motion, below the noise of the encoders' differences."""
+RESIDUAL_GAIN = 2.0 * math.pi * 10.0
+"""K of the hand's torque [1/s]."""
+SLOW = 0.05
+"""ε, below which the direction of friction is not known [rad/s]."""
+TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "hand_force": (3,)}
+"""Position of the tip that was predicted for the tick [m], its distance from the measured one [m], the hand's force in
+H [N]."""
+
+_VISCOUS, _COULOMB = PREMIUM_1_5.viscous_friction, PREMIUM_1_5.coulomb_friction
+
+
+@njit
+def momentum_residual(
+    memory: Array, theta: tuple[float, float, float], rate: tuple[float, float, float], torque: Array, period: float,
+    gain: float,
+) -> None:  # fmt: skip
+    """One step of the residual r, a backward difference in r.
+
+    Parameters
+    ----------
+    memory : Array
+        [r (3), ∫ (3), started], written.
+    theta, rate : three floats each
+        [rad], [rad/s]
+    torque : Array
+        That acted during the period before [N m], shape (3,).
+    period, gain : float
+        T [s], K [1/s].
+    """
+    m, c, n = mass_matrix(theta), coriolis_matrix(theta, rate), gravity_torques(theta)
+    for i in range(3):
+        momentum = m[i][0] * rate[0] + m[i][1] * rate[1] + m[i][2] * rate[2]
+        if memory[6] == 0.0:
+            memory[3 + i] = momentum
+            continue
+        turned = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
+        friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / SLOW)
+        memory[3 + i] += period * (torque[i] + turned - n[i] - friction)
+        memory[i] = gain * (momentum - memory[3 + i]) / (1.0 + gain * period)
+        memory[3 + i] += period * memory[i]
+    memory[6] = 1.0
+
+
+class TwinMemory(NamedTuple):
+    """The twin as compiled code holds it.
+
+    Attributes
+    ----------
+    plant : Plant
+        The model's world, which is stepped.
+    qvel : Array
+        View of its velocities.
+    places, rates : IntArray
+        Of θ1, θ2, θ3 and the two closing joints in position and velocity, shape (5,).
+    motors : tuple of three ints
+        Of the motors in its controls.
+    of_angle, of_rate : float
+        Shares in which an error corrects angle and rate.
+    theta, rate, torque : Array
+        State [rad], [rad/s], and the torques since the last tick [N m], shape (3,).
+    residual : Array
+        Of `momentum_residual`, shape (7,).
+    last : Array
+        Number of the last tick, shape (1,).
+    """
+
+    plant: Plant
+    qvel: Array
+    places: IntArray
+    rates: IntArray
+    motors: tuple[int, int, int]
+    of_angle: float
+    of_rate: float
+    theta: Array
+    rate: Array
+    torque: Array
+    residual: Array
+    last: Array
+
+
+@njit
+def _predict(twin: TwinMemory, predicted: Array) -> None:
+    """Where the joints are after a period of the model (3,); leaves their rates there in the state."""
+    q, w, plant = twin.theta, twin.rate, twin.plant
+    angles = (q[0], q[1], q[2], q[2] - q[1], q[1] - q[2])
+    speeds = (w[0], w[1], w[2], w[2] - w[1], w[1] - w[2])
+    for i in range(5):
+        plant.qpos[twin.places[i]], twin.qvel[twin.rates[i]] = angles[i], speeds[i]
+    for i in range(3):
+        plant.ctrl[twin.motors[i]] = twin.torque[i]
+        plant.applied[plant.arm_v[i]] = twin.residual[i]
+    step(plant)
+    for i in range(3):
+        predicted[i], w[i] = plant.qpos[twin.places[i]], twin.qvel[twin.rates[i]]
+
+
+@njit
+def tip_force(theta: tuple[float, float, float], torque: Array, force: Array) -> None:
+    """F_H = J⁻ᵀ τ [N], shape (3,), by cofactors; zero where the arm is straight: a force along it cannot be told."""
+    j = jacobian(theta)
+    ax = j[1][1] * j[2][2] - j[1][2] * j[2][1]
+    ay = j[1][2] * j[2][0] - j[1][0] * j[2][2]
+    az = j[1][0] * j[2][1] - j[1][1] * j[2][0]
+    bx = j[2][1] * j[0][2] - j[2][2] * j[0][1]
+    by = j[2][2] * j[0][0] - j[2][0] * j[0][2]
+    bz = j[2][0] * j[0][1] - j[2][1] * j[0][0]
+    cx = j[0][1] * j[1][2] - j[0][2] * j[1][1]
+    cy = j[0][2] * j[1][0] - j[0][0] * j[1][2]
+    cz = j[0][0] * j[1][1] - j[0][1] * j[1][0]
+    size = j[0][0] * ax + j[0][1] * ay + j[0][2] * az
+    share = 1.0 / size if abs(size) > 1e-6 else 0.0
+    force_P = (
+        share * (ax * torque[0] + ay * torque[1] + az * torque[2]),
+        share * (bx * torque[0] + by * torque[1] + bz * torque[2]),
+        share * (cx * torque[0] + cy * torque[1] + cz * torque[2]),
+    )
+    force[0], force[1], force[2] = vector_to_hand_frame(force_P)
+
+
+@entry_point
+def follow_rows(
+    twin: TwinMemory, numbers: Array, theta: Array, torque: Array, predicted: Array, apart: Array, force: Array
+) -> None:
+    """Follow n ticks; `predicted` (n, 3), `apart` (n,) and `force` (n, 3) are written (`TWIN_CHANNELS`)."""
+    ahead = np.zeros(3)
+    for k in range(len(numbers)):
+        if numbers[k] == twin.last[0] + 1.0:
+            _predict(twin, ahead)
+        else:
+            ahead[:] = theta[k]
+            twin.rate[:] = 0.0
+            twin.residual[:] = 0.0
+        for i in range(3):
+            error = theta[k, i] - ahead[i]
+            twin.theta[i] = ahead[i] + twin.of_angle * error
+            twin.rate[i] += twin.of_rate * error
+        q = (twin.theta[0], twin.theta[1], twin.theta[2])
+        w = (twin.rate[0], twin.rate[1], twin.rate[2])
+        momentum_residual(twin.residual, q, w, twin.torque, twin.plant.period, RESIDUAL_GAIN)
+        a = vector_to_hand_frame(forward_kinematics((ahead[0], ahead[1], ahead[2])))
+        b = vector_to_hand_frame(forward_kinematics((theta[k, 0], theta[k, 1], theta[k, 2])))
+        apart[k] = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+        predicted[k, 0], predicted[k, 1], predicted[k, 2] = a
+        tip_force(q, twin.residual, force[k])
+        twin.torque[:] = torque[k]
+        twin.last[0] = numbers[k]
+
+
+class Twin:
+    """The model beside a device.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+        Its servo period is the device's.
+    """
+
+    def __init__(self, scene: SceneConfig):
+        self._world = World(scene, "none")
+        self._world.reset(np.zeros(3), rest_pose())
+        model, data = self._world.model, self._world.data
+        joints = [model.joint(PHANTOM + name) for name in (*ARM_JOINTS, "elbow", "twin")]
+        a, b, c = (int(model.actuator(PHANTOM + name).id) for name in MOTORS)
+        pole = math.exp(-BANDWIDTH * scene.servo_period)
+        self._memory = TwinMemory(
+            make_plant(self._world), data.qvel, np.array([int(joint.qposadr[0]) for joint in joints]),
+            np.array([int(joint.dofadr[0]) for joint in joints]), (a, b, c), 1.0 - pole**2,
+            (1.0 - pole) ** 2 / scene.servo_period, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7),
+            np.array([-2.0]),
+        )  # fmt: skip
+
+    def follow(self, rows: Mapping[str, Array]) -> dict[str, Array]:
+        """Follow some ticks, one after the other.
+
+        Parameters
+        ----------
+        rows : mapping
+            Of `sim.hardware.gated_servo.columns`: tick, theta, torque.
+
+        Returns
+        -------
+        dict
+            By `TWIN_CHANNELS`. Where ticks are missing the twin begins again.
+        """
+        n = len(rows["tick"])
+        found = {name: np.zeros((n, *shape)) for name, shape in TWIN_CHANNELS.items()}
+        numbers, theta, torque = (np.ascontiguousarray(rows[name]) for name in ("tick", "theta", "torque"))
+        follow_rows(self._memory, numbers, theta, torque, found["predicted"], found["apart"], found["hand_force"])
+        return found

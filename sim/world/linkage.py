@@ -1,0 +1,57 @@
+"""What a device is beside its geometry and the published masses: friction, rotors, delay, encoders."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.phantom.parameters import PREMIUM_1_5
+from models.scene import PHANTOM
+from sim.errors import SimError
+from sim.world.phantom_port import ARM_JOINTS
+from sim.world.world import World
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """What a device is beside its geometry and weights.
+
+    Parameters
+    ----------
+    coulomb : three floats
+        Friction of the joints [N m].
+    viscous : three floats
+        [N m s/rad]
+    inertia : three floats
+        Added to the published one at the joints, as a rotor's or a handle's [kg m²]; may be negative.
+    delay : float
+        From a command to the motors' torque [s], below a servo period; in steps of the physics.
+    offset : three floats
+        Encoder reading minus angle [rad].
+
+    Raises
+    ------
+    SimError
+        If a friction is negative, or takes the rotors more than their inertia.
+    """
+
+    coulomb: Triple = PREMIUM_1_5.coulomb_friction
+    viscous: Triple = PREMIUM_1_5.viscous_friction
+    inertia: Triple = (0.0, 0.0, 0.0)
+    delay: float = 0.0
+    offset: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if min(*self.coulomb, *self.viscous, self.delay) < 0.0:
+            raise SimError(f"friction {self.coulomb}, {self.viscous} and delay {self.delay} must not be negative")
+        if min(np.add(self.inertia, PREMIUM_1_5.armature)) < 0.0:
+            raise SimError(f"an added inertia of {self.inertia} kg m² is more than the rotors have to give")
+
+    def into(self, world: World) -> None:
+        """Give a world's Phantom these numbers; delay and offset are not the world's."""
+        model = world.model
+        for axis, name in enumerate(ARM_JOINTS):
+            place = int(model.joint(PHANTOM + name).dofadr[0])
+            model.dof_frictionloss[place], model.dof_damping[place] = self.coulomb[axis], self.viscous[axis]
+            model.dof_armature[place] = PREMIUM_1_5.armature[axis] + self.inertia[axis]

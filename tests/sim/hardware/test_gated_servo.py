@@ -1,0 +1,195 @@
+"""A servo behind a gate is the simulation's run where all is well, and lets go within two ticks where it is not."""
+
+import numpy as np
+import pytest
+
+from controllers.safety.arming import ARM, CLEAR, DISARM, State
+from controllers.safety.faults import FAULT_RAMP, Fault
+from controllers.safety.oscillation import OscillationDetector
+from sim.errors import SimError
+from sim.hardware.emulated import EmulatedPhantom
+from sim.hardware.gated_servo import GatedServo, Ticker
+from sim.world.linkage import Linkage
+from tests.sim.bare_servos import bare_servo, device_world, follow_program, simulated
+from tests.sim.bare_servos import run as run_bare
+from tests.sim.hardware.emulation import (
+    AT_ONCE,
+    DRIVER_FAULTS,
+    PERIOD,
+    PLACES,
+    Broken,
+    active,
+    gated_servo,
+    jump,
+    nan_in,
+    run,
+)
+
+
+def test_follow_through_a_driver_is_the_simulation_s_run_within_a_millimetre() -> None:
+    world = device_world()
+    servo = bare_servo(world, simulated(world))
+    servo.device.faults[FAULT_RAMP] = 0.0
+    pure, _ = run_bare(servo, 6000)
+    driven = run(Ticker(gated_servo(**AT_ONCE)), 6000, request=ARM)
+    assert not driven["fault"].any()
+    apart = np.linalg.norm(driven["p"] - pure.hand[:, 1:4], axis=1)
+    travelled = np.linalg.norm(np.diff(pure.hand[:, 1:4], axis=0), axis=1).sum()
+    assert travelled > 0.3
+    assert np.sqrt(np.mean(apart**2)) < 1e-3
+
+
+def test_from_arming_to_active_the_force_is_ramped_in_and_a_hand_that_lets_go_is_led() -> None:
+    ticker = Ticker(gated_servo(holds=1.5, small=5.0))
+    rows = run(ticker, 4000, request=ARM)
+    assert not rows["fault"].any()
+    states = rows["state"].ravel()
+    changes = states[np.insert(np.diff(states) != 0, 0, True)]
+    np.testing.assert_array_equal(changes, [State.ARMING, State.RAMPING, State.ACTIVE])
+    arming = states == State.ARMING
+    assert not rows["force"][arming].any()
+    assert not rows["torque"][arming].any()
+    size = np.linalg.norm(rows["force"], axis=1)
+    assert np.diff(size[:1000]).max() < 0.1
+    assert rows["distance"][-500:].max() < 3e-3
+
+
+def test_disarmed_motors_are_off() -> None:
+    rows = run(Ticker(gated_servo(holds=1.0)), 100)
+    assert not rows["torque"].any()
+    assert not rows["state"].any()
+
+
+def test_disarming_lets_go_in_its_tick() -> None:
+    ticker = Ticker(gated_servo(**AT_ONCE))
+    first = active(ticker)
+    assert ticker.row[21:24].any() or ticker.gated.force.any()
+    rows = run(ticker, 20, first, DISARM)
+    assert not rows["torque"].any()
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_reading_that_is_no_number(place: int, bad: float) -> None:
+    _lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_joint_that_jumps(axis: int) -> None:
+    _lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
+
+
+@pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
+@pytest.mark.parametrize("where", ["read_fault", "write_fault"])
+def test_a_fault_that_the_driver_tells(fault: Fault, value: float, where: str) -> None:
+    _lets_go(where, (fault, value), fault)
+
+
+@pytest.mark.parametrize("stalled", [5, 50, 500])
+def test_a_device_that_stalls_for_five_periods_or_more(stalled: int) -> None:
+    _lets_go("silent", stalled, Fault.READING_STALE, within=8)
+
+
+@pytest.mark.parametrize("stalled", [1, 3, 4])
+def test_a_device_that_stalls_for_less_than_five_periods_is_no_fault(stalled: int) -> None:
+    broken = Broken(gated_servo(**AT_ONCE).driver)
+    ticker = Ticker(gated_servo(broken, **AT_ONCE))
+    first = active(ticker)
+    broken.silent = stalled
+    rows = run(ticker, 100, first)
+    assert not rows["fault"].any()
+    assert rows["force"][-1].any()
+
+
+@pytest.mark.parametrize("part", ["limiter", "tank", "params"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_memory_or_a_field_that_is_no_number(part: str, bad: float) -> None:
+    faults = {"limiter": Fault.LIMITER_NOT_FINITE, "tank": Fault.TANK_NOT_FINITE, "params": Fault.FORCE_NOT_FINITE}
+    parts = gated_servo(program=follow_program(), **AT_ONCE)
+    ticker = Ticker(parts)
+    first = active(ticker)
+    getattr(parts.servo.field, part)[0 if part != "params" else slice(None)] = bad
+    _check(ticker, first, faults[part])
+
+
+def _lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
+    """Order a fault of the driver: the motors go off within so many ticks, and the fault stays until it is cleared."""
+    driver = gated_servo(**AT_ONCE).driver
+    assert isinstance(driver, EmulatedPhantom)
+    broken = Broken(driver)
+    ticker = Ticker(gated_servo(broken, **AT_ONCE))
+    first = active(ticker)
+    assert ticker.state is State.ACTIVE
+    setattr(broken, attribute, order)
+    _check(ticker, first, fault, within)
+    assert not broken.last.any() or attribute == "write_fault"
+    assert broken.let_go_calls > 0
+    if attribute in ("read_fault", "write_fault"):
+        setattr(broken, attribute, None)
+    broken.spoil, broken.silent = (lambda reading: None), 0
+    rows = run(ticker, 30, first + 30, ARM)
+    assert not rows["torque"].any()
+    assert ticker.fault is not None
+    run(ticker, 2, first + 60, CLEAR)
+    assert ticker.state is State.DISARMED
+    rows = run(ticker, 400, first + 62, ARM)
+    assert not rows["fault"].any()
+    assert rows["force"][-1].any()
+
+
+def _check(ticker: Ticker, first: int, fault: Fault, within: int = 2) -> None:
+    rows = run(ticker, 30, first)
+    assert ticker.fault is not None
+    assert ticker.fault.fault is fault
+    seen = int(np.argmax(rows["fault"].ravel() > 0))
+    assert seen < within
+    assert not rows["torque"][seen + 1 :].any()
+    assert not rows["force"][seen + 1 :].any()
+    assert (rows["state"][seen + 1 :] == State.FAULT).all()
+    assert all(np.isfinite(rows[name]).all() for name in ("force", "torque", "p", "v"))
+
+
+def test_encoder_offsets_are_taken_off_once_also_where_no_reading_came() -> None:
+    offset = (0.01, -0.02, 0.005)
+    parts = gated_servo(linkage=Linkage(offset=offset), **AT_ONCE)
+    ticker = Ticker(GatedServo(*parts[:4], np.array(offset)))
+    plain = Ticker(gated_servo(**AT_ONCE))
+    a, b = run(ticker, 300, request=ARM), run(plain, 300, request=ARM)
+    np.testing.assert_allclose(a["theta"], b["theta"], atol=3e-4)
+    broken = Broken(parts.driver)
+    again = Ticker(GatedServo(parts.servo, parts.world, broken, parts.gate, np.array(offset)))
+    run(again, 2)
+    before = again.row.copy()
+    broken.silent = 3
+    run(again, 3, 2)
+    np.testing.assert_array_equal(before[-15:-12], again.row[-15:-12])
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])
+def test_a_loop_that_is_too_stiff_is_quieted_and_the_hand_is_led_all_the_same(stiffness: float, damping: float) -> None:
+    """Far beyond the certificate's boundary: without the detector they shake the hand until they are too fast."""
+    program = follow_program(stiffness, damping)
+    bare = Ticker(gated_servo(program=program, holds=2.0, small=10.0, dead_man=False,
+                              oscillation=OscillationDetector(PERIOD, turns=1e9)))  # fmt: skip
+    loud = run(bare, 4000, request=ARM)
+    ticker = Ticker(gated_servo(program=program, holds=2.0, small=10.0, dead_man=False))
+    rows = run(ticker, 5000, request=ARM)
+    assert bare.fault is not None or np.linalg.norm(loud["v"][-500:], axis=1).max() > 0.5
+    assert ticker.fault is None
+    assert rows["gain"].min() < 0.5
+    assert np.linalg.norm(rows["force"][-1000:], axis=1).max() < 1.0
+    assert rows["distance"][-1000:].max() < 5e-3
+
+
+def test_only_an_exchange_can_be_gated() -> None:
+    world = device_world()
+    parts = gated_servo()._replace(servo=bare_servo(world, simulated(world)))
+    with pytest.raises(SimError, match="expected an Exchange"):
+        Ticker(parts)
+
+
+def test_a_linkage_that_cannot_be_is_refused() -> None:
+    with pytest.raises(SimError, match="must not be negative"):
+        Linkage(coulomb=(-1.0, 0.0, 0.0))
+    with pytest.raises(SimError, match="rotors have to give"):
+        Linkage(inertia=(-1.0, 0.0, 0.0))

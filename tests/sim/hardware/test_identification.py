@@ -1,0 +1,117 @@
+"""What is hidden in a simulated device is found, each quantity within its interval.
+
+``HVF_DRAWS=50`` draws fifty devices in place of one; then nine of ten have to be within all of their intervals.
+"""
+
+import os
+
+import numpy as np
+import pytest
+
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.follow import Follow
+from controllers.safety.arming import ARM
+from models.phantom.parameters import GRAVITY, PREMIUM_1_5
+from sim.errors import SimError
+from sim.hardware.gated_servo import Ticker
+from sim.hardware.identification import NAMES, WINDOW, Identified, Motion, identify_linkage, motions_of
+from sim.world.linkage import Linkage
+from tests.sim.hardware.emulation import AT_ONCE, gated_servo, run
+
+LAPS = (8.0, 5.0, 3.0)
+INERTIA = np.array([3.6e-3, 2.4e-3, 0.93e-3])  # of the linkage at θ = 0
+
+
+def drawn(rng: np.random.Generator) -> tuple[Linkage, float]:
+    """A linkage, and by how much its heavy bars are heavier than published."""
+    return Linkage(
+        coulomb=tuple(rng.uniform(0.5, 2.0, 3) * PREMIUM_1_5.coulomb_friction),
+        viscous=tuple(rng.uniform(0.3, 4.0, 3) * PREMIUM_1_5.viscous_friction),
+        inertia=tuple(rng.uniform(-0.03, 0.15, 3) * INERTIA),
+        delay=1.25e-4 * int(rng.integers(0, 9)), offset=tuple(rng.uniform(-0.03, 0.03, 3)),
+    ), float(rng.uniform(-0.01, 0.01))  # fmt: skip
+
+
+def curve(lap: float) -> Trajectory:
+    s = np.linspace(0.0, 2.0 * np.pi, 97)
+    ahead, left = 0.035 * np.sin(2 * s), 0.06 * np.sin(3 * s + 0.5)
+    points = np.stack([ahead, left, 0.05 * np.sin(s) + 0.02 * np.sin(5 * s + 1)], axis=1)
+    points[-1] = points[0]
+    return Trajectory(np.linspace(0.0, lap, 97), points, periodic=True)
+
+
+def moved(linkage: Linkage, heavier: float, lap: float) -> Motion:
+    program = Follow(curve(lap), k_r=300.0, b_d=8.0).program()
+    parts = gated_servo(linkage=linkage, program=program, **AT_ONCE)
+    model = parts.driver.world.model
+    for name, arm, axes in (("be", PREMIUM_1_5.l5, (0, 1)), ("df", PREMIUM_1_5.l6, (0, 2))):
+        bar = model.body(f"phantom/{name}").id
+        more = heavier * model.body_mass[bar]
+        model.body_mass[bar] += more
+        model.body_inertia[bar, axes] -= more * arm**2  # published inertias are about the pivots
+    ticker = Ticker(parts)
+    rows = run(ticker, 8000, request=ARM)
+    assert ticker.fault is None
+    (motion,) = motions_of(*(rows[name] for name in ("tick", "clock", "theta", "torque")), np.arange(8000) > 500)
+    return motion
+
+
+def truth(linkage: Linkage, heavier: float) -> np.ndarray:
+    p = PREMIUM_1_5
+    second = GRAVITY * (p.l1 * p.m_a + (1.0 + heavier) * p.l5 * p.m_be + 0.5 * p.l1 * p.m_c)
+    third = GRAVITY * (0.5 * p.l2 * p.m_a + p.l3 * p.m_c - (1.0 + heavier) * p.l6 * p.m_df)
+    known = *linkage.coulomb, *linkage.viscous, *linkage.inertia, linkage.delay, *linkage.offset[1:]
+    return np.array([*known, second, third])
+
+
+def identified(seed: int) -> tuple[Identified, np.ndarray]:
+    """What is found of a device, and what is true of it."""
+    linkage, heavier = drawn(np.random.default_rng(seed))
+    return identify_linkage([moved(linkage, heavier, lap) for lap in LAPS]), truth(linkage, heavier)
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Identified, np.ndarray]:
+    return identified(7)
+
+
+@pytest.mark.slow
+def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_intervals(found) -> None:
+    draws = [found, *(identified(1000 + k) for k in range(int(os.environ.get("HVF_DRAWS", "1")) - 1))]
+    outside = [
+        {name: (x - y) / m for name, x, y, m in zip(NAMES, f.values, hidden, f.margins, strict=True) if abs(x - y) > m}
+        for f, hidden in draws
+    ]
+    within = sum(not names for names in outside)
+    print(f"{within} of {len(draws)} devices within all intervals; outside: {[names for names in outside if names]}")
+    assert within >= 0.9 * len(draws)
+
+
+@pytest.mark.slow
+def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
+    result, hidden = found
+    margins = dict(zip(NAMES, result.margins, strict=True))
+    assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.01
+    assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.5 * PREMIUM_1_5.viscous_friction[0]
+    assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.02
+    assert margins["delay"] < 5e-4
+    assert result.unexplained < 0.005
+
+
+def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
+    n = 4000
+    tick, clock, zeros = np.arange(n, dtype=float), np.arange(n) * 1e-3, np.zeros((n, 3))
+    tick[1500:] += 3.0
+    used = np.ones(n, dtype=bool)
+    used[3000:3010] = used[3200:] = False
+    spans = [(m.clock[0], m.clock[-1]) for m in motions_of(tick, clock, zeros, zeros, used)]
+    np.testing.assert_allclose(spans, [(0.0, 1.499), (1.5, 2.999)])
+    assert 3 * WINDOW > 0.19
+
+
+def test_a_device_that_rests_tells_nothing() -> None:
+    clock, zeros = np.arange(3000) * 1e-3, np.zeros((3000, 3))
+    with pytest.raises(SimError, match="expected 56 of each"):
+        identify_linkage([Motion(clock, zeros, zeros)])
+    with pytest.raises(SimError, match="expected a longer run"):
+        identify_linkage([])

@@ -1,0 +1,270 @@
+"""Kill or freeze whom you like: the servo goes on, or lets go; and what was recorded can be read."""
+
+import contextlib
+import functools
+import multiprocessing
+import os
+import resource
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.safety.arming import ARM, CLEAR, State
+from controllers.safety.faults import Fault
+from models.scene import SceneConfig
+from sim.errors import SimError
+from sim.hardware.controls import HardwareRun, Look
+from sim.hardware.emulated_process import SHOWN_SIZE, SHOWN_TORQUE, SHOWN_TRIPS, EmulatedEnd, host_device
+from sim.hardware.gated_servo import ROW_SIZE
+from sim.hardware.recorder_process import RecordingJob, record_rows
+from sim.hardware.servo_process import ServoClock
+from sim.hardware.shared import SharedNumbers
+from sim.recording.recording import Recording
+from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
+
+pytestmark = pytest.mark.slow
+CLOCK = ServoClock(late=0.2, heartbeat=0.6)
+
+
+def job(path: Path) -> RecordingJob:
+    return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD))
+
+
+def until(run: HardwareRun, what: Callable[[Look], bool], seconds: float = 10.0) -> Look:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        look = run.poll()
+        if what(look):
+            return look
+        time.sleep(0.01)
+    raise AssertionError(f"not within {seconds} s: {run.poll()}")
+
+
+def active(run: HardwareRun) -> None:
+    """Arm, again where this machine was too busy to be in time."""
+    for _ in range(5):
+        run.request(ARM)
+        look = until(run, lambda look: look.state in (State.ACTIVE, State.FAULT))
+        if look.state is State.ACTIVE and np.any(until(run, lambda look: bool(look.row["force"].any())).row["torque"]):
+            return
+        run.request(CLEAR)
+        until(run, lambda look: look.state is State.DISARMED)
+    raise AssertionError(f"never active: {look.fault.words(look.value)}")
+
+
+@contextlib.contextmanager
+def running(path: Path | None = None, clock: ServoClock = CLOCK) -> Iterator[HardwareRun]:
+    with HardwareRun(in_process, PERIOD, clock, job(path) if path else None) as run:
+        run.start()
+        active(run)
+        yield run
+
+
+def goes_on(run: HardwareRun, ticks: int = 100) -> None:
+    before = float(run.poll().row["tick"])
+    look = until(run, lambda look: float(look.row["tick"]) > before + ticks)
+    assert (look.state, look.fault) == (State.ACTIVE, Fault.NONE)
+
+
+def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with running(path) as run:
+        assert run.recorder is not None
+        until(run, lambda look: look.recorded is not None and look.recorded.rows > 200)
+        os.kill(run.recorder.pid, signal.SIGSTOP)
+        goes_on(run)
+        os.kill(run.recorder.pid, signal.SIGCONT)
+        until(run, lambda look: look.recorded is not None and look.recorded.rows > 400)
+        os.kill(run.recorder.pid, signal.SIGKILL)
+        goes_on(run)
+        assert run.poll().recorded is not None
+        assert not run.poll().recorded.alive
+        ended = run.stop()
+        assert ended is not None
+        assert not ended.broken
+    with Recording(path) as recording:
+        assert recording.summary is None
+        ticks = recording.channel("ticks", "tick")[:]
+        assert len(ticks) > 100
+        assert (np.diff(ticks) > 0).all()
+        assert np.isfinite(recording.channel("ticks", "hand_force")[:]).all()
+
+
+def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with running(path) as run:
+        goes_on(run, 200)
+        ended = run.stop()
+    assert ended is not None
+    with Recording(path) as recording:
+        ticks = recording.channel("ticks", "tick")[:]
+        assert len(ticks) == ended.ticks
+        assert recording.channel("ticks", "dropped")[-1] == 0.0
+        assert recording.channel("ticks", "missed")[-1] == ended.missed
+        np.testing.assert_array_equal(np.diff(ticks) - 1, np.diff(recording.channel("ticks", "missed")[:]))
+        np.testing.assert_allclose(recording.channel("ticks", "t")[:], ticks * PERIOD, atol=1e-9)
+    assert ended.compute.times == ended.ticks
+    assert ended.compute.p50 <= ended.compute.p99 <= ended.compute.p999 <= ended.compute.longest
+    assert ended.descriptors == 0
+
+
+def bystander(status: SharedNumbers, began: SharedNumbers) -> None:
+    """Reads the servo's row for ever, as a page does."""
+    row = np.zeros(ROW_SIZE)
+    while True:
+        status.read(row)
+        began.write(np.ones(1))
+
+
+def test_a_page_that_is_frozen_and_killed_is_not_waited_for() -> None:
+    began, seen = SharedNumbers(1), np.zeros(1)
+    context = multiprocessing.get_context("spawn")
+    with running() as run:
+        page = context.Process(target=bystander, args=(run.status, began), daemon=True)
+        page.start()
+        until(run, lambda look: began.read(seen) and seen[0] > 0.0)
+        assert page.pid is not None
+        for sent in (signal.SIGSTOP, signal.SIGKILL):
+            os.kill(page.pid, sent)
+            goes_on(run)
+        page.join()
+    began.close()
+
+
+def limited(size: int, *arguments) -> None:
+    """A recorder whose disk is full at so many bytes."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+    record_rows(*arguments)
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with HardwareRun(in_process, PERIOD, CLOCK, job(path)) as run:
+        assert run.recorder is not None
+        run.recorder._target = functools.partial(limited, 1_000_000)
+        run.start()
+        active(run)
+        look = until(run, lambda look: look.recorded is not None and look.recorded.error != 0, 20.0)
+        assert not look.recorded.alive
+        goes_on(run)
+    with Recording(path) as recording:
+        ticks = recording.channel("ticks", "tick")[:]
+        assert 100 < len(ticks) < 2000
+        assert (np.diff(ticks) > 0).all()
+
+
+def test_controls_that_freeze_are_a_fault_and_controls_that_are_back_can_clear_it() -> None:
+    with running() as run:
+        time.sleep(1.2)
+        look = run.poll()
+        assert look.fault is Fault.CONTROL_LOST
+        assert not look.row["torque"].any()
+        time.sleep(0.1)
+        assert until(run, lambda look: True).state is State.FAULT
+        run.request(ARM)
+        goes_past(run)
+        assert run.poll().state is State.FAULT
+        run.request(CLEAR)
+        until(run, lambda look: look.state is State.DISARMED)
+        active(run)
+
+
+def goes_past(run: HardwareRun, ticks: int = 20) -> None:
+    before = float(run.poll().row["tick"])
+    until(run, lambda look: float(look.row["tick"]) > before + ticks)
+
+
+@pytest.mark.parametrize("stall", [0.05, 0.5])
+def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(stall: float) -> None:
+    """A stop of 50 ms is counted where 200 ms are allowed; one of 500 ms is a fault."""
+    with running() as run:
+        assert run.servo.pid is not None
+        begin, before = time.monotonic(), run.poll().row
+        os.kill(run.servo.pid, signal.SIGSTOP)
+        time.sleep(stall)
+        os.kill(run.servo.pid, signal.SIGCONT)
+        goes_past(run, round(stall / PERIOD) + 20)
+        after = run.poll().row
+        assert after["missed"] - before["missed"] >= stall / PERIOD - 2
+        ran = after["tick"] - before["tick"] - (after["missed"] - before["missed"])
+        assert ran <= (time.monotonic() - begin - stall) / PERIOD + 5
+        if stall > CLOCK.late:
+            assert Fault(int(after["fault"])) is Fault.SERVO_LATE
+            assert not after["torque"].any()
+
+
+def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    shown, seen = SharedNumbers(SHOWN_SIZE), np.zeros(SHOWN_SIZE)
+    context = multiprocessing.get_context("spawn")
+    hosted = context.Process(target=host_device, args=(device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True)
+    hosted.start()
+
+    def pushes() -> bool:
+        shown.read(seen)
+        return bool(seen[SHOWN_TORQUE : SHOWN_TORQUE + 3].any())
+
+    try:
+        with HardwareRun(functools.partial(over_packets, ours), PERIOD, CLOCK) as run:
+            run.start()
+            assert run.servo.pid is not None
+            for signals in ((signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL,)):
+                active(run)
+                until(run, lambda look: pushes())
+                trips = seen[SHOWN_TRIPS]
+                os.kill(run.servo.pid, signals[0])
+                until(run, lambda look: not pushes(), 2.0)
+                assert seen[SHOWN_TRIPS] > trips
+                until(run, lambda look: not look.alive)
+                for back in signals[1:]:
+                    time.sleep(2.0 * CLOCK.late)
+                    os.kill(run.servo.pid, back)
+                    look = until(run, lambda look: look.fault is not Fault.NONE)
+                    assert look.fault in (Fault.SERVO_LATE, Fault.CONTROL_LOST)
+                    assert not pushes()
+                    run.request(CLEAR)
+                    until(run, lambda look: look.state is State.DISARMED)
+            assert run.stop() is None
+    finally:
+        hosted.kill()
+        hosted.join()
+        shown.close()
+        ours.close()
+        theirs.close()
+
+
+def test_a_device_that_is_gone_is_a_fault() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    shown = SharedNumbers(SHOWN_SIZE)
+    context = multiprocessing.get_context("spawn")
+    hosted = context.Process(target=host_device, args=(device, EmulatedEnd(theirs, shown, PERIOD), True), daemon=True)
+    hosted.start()
+    theirs.close()
+    try:
+        with HardwareRun(functools.partial(over_packets, ours), PERIOD, CLOCK) as run:
+            run.start()
+            ours.close()
+            active(run)
+            hosted.kill()
+            look = until(run, lambda look: look.fault is not Fault.NONE)
+            assert look.fault in (Fault.UNPLUGGED, Fault.READING_STALE)
+            assert not look.row["torque"].any()
+    finally:
+        hosted.kill()
+        hosted.join()
+        shown.close()
+
+
+def refuses() -> None:
+    raise SimError("no such device; expected one that is plugged in")
+
+
+def test_a_device_that_cannot_be_opened_is_said_in_its_own_words() -> None:
+    with HardwareRun(refuses, PERIOD, CLOCK) as run, pytest.raises(SimError, match="no such device"):
+        run.start()

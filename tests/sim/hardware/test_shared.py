@@ -1,0 +1,103 @@
+"""What processes share is whole or not there, and a ring that is not emptied says how much is gone."""
+
+import pickle
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from sim.hardware.shared import Ring, SharedNumbers
+
+
+@pytest.fixture
+def numbers() -> Iterator[SharedNumbers]:
+    made = SharedNumbers(64)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ring() -> Iterator[Ring]:
+    made = Ring(8, 2)
+    yield made
+    made.close()
+
+
+def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
+    other, stop, seen = pickle.loads(pickle.dumps(numbers)), threading.Event(), np.zeros(64)
+
+    def write() -> None:
+        k = 0
+        while not stop.is_set():
+            k += 1
+            numbers.write(np.full(64, float(k)))
+
+    thread = threading.Thread(target=write)
+    thread.start()
+    try:
+        values = set()
+        for _ in range(20000):
+            if other.read(seen):
+                assert (seen == seen[0]).all()
+                values.add(seen[0])
+    finally:
+        stop.set()
+        thread.join()
+    other.close()
+    assert len(values) > 1
+
+
+def test_a_writer_that_was_killed_in_a_write_is_told_of(numbers: SharedNumbers) -> None:
+    into = np.zeros(64)
+    assert numbers.read(into)
+    numbers._sequence[0] += 1
+    assert not numbers.read(into)
+
+
+def test_a_ring_gives_every_row_once_in_order(ring: Ring) -> None:
+    for k in range(5):
+        ring.append(np.array([k, -k]))
+    rows, lost = ring.take()
+    np.testing.assert_array_equal(rows[:, 0], range(5))
+    assert lost == 0
+    ring.append(np.array([5.0, 0.0]))
+    rows, lost = ring.take()
+    np.testing.assert_array_equal(rows[:, 0], [5])
+    assert (len(ring.take()[0]), lost) == (0, 0)
+
+
+def test_a_ring_that_was_not_emptied_in_time_counts_what_is_gone(ring: Ring) -> None:
+    for k in range(30):
+        ring.append(np.array([k, 0.0]))
+    rows, lost = ring.take()
+    np.testing.assert_array_equal(rows[:, 0], range(23, 30))  # one place is where the next row is being written
+    assert lost == 23
+    ring.append(np.array([30.0, 0.0]))
+    rows, lost = ring.take()
+    assert (rows[0, 0], lost) == (30.0, 0)
+
+
+def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_given(ring: Ring) -> None:
+    for k in range(7):
+        ring.append(np.array([k, 0.0]))
+    copied = ring._rows
+
+    class Overtaken:
+        def __getitem__(self, index):
+            taken = copied[index]
+            for k in range(7, 11):
+                ring.append(np.array([k, 0.0]))
+            return taken
+
+        def __setitem__(self, index, value):
+            copied[index] = value
+
+    ring._rows = Overtaken()
+    rows, lost = ring.take()
+    ring._rows = copied
+    np.testing.assert_array_equal(rows[:, 0], [4, 5, 6])
+    assert lost == 4
+    rows, lost = ring.take()
+    np.testing.assert_array_equal(rows[:, 0], [7, 8, 9, 10])
+    assert lost == 0
