@@ -52,10 +52,10 @@ def check_steps(person: Person, physics_step: float) -> None:
                math.sqrt(LEAST_TIP / (stiffening * person.grip_stiffness)))  # fmt: skip
     if physics_step > most:
         raise SimError(
-            f"the fingers of person {person.name!r} need a physics step of {most:.2g} s or less, got {physics_step:g} s; "
-            "choose a smaller --physics-step, or a softer grip"
+            f"the fingers of person {person.name!r} need a physics step of {most:.2g} s or less, "
+            f"got {physics_step:g} s; choose a smaller --physics-step, or a softer grip"
         )
-    inertia, stiffness, damping = arm_matrices(person)
+    _, stiffness, damping = arm_matrices(person)
     slack = np.linalg.eigvalsh((1.0 - person.reflex_gain) * damping
                                - person.reflex_gain * person.reflex_delay * stiffness)  # fmt: skip
     if slack[0] <= 0.0:

@@ -32,14 +32,14 @@ INTERVALS = {
     "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012: 1 to 3 N on this very device; up to 10 N when asked to"),
     "mass": Interval(0.1, 2.5, "kg", "Speich et al. 2005: 1.46 kg (m); hand and wrist alone some 0.1 to 0.5 kg"),
     "stiffness": Interval(20.0, 800.0, "N/m", "Mussa-Ivaldi et al. 1985, Tsuji et al. 1995 (m): some 50 to 800 N/m"),
-    "damping_ratio": Interval(0.1, 1.2, "", "Perreault et al. 2004 (m): about 0.3; Tsuji et al. 1995 (m): 0.2 to 0.6"),
+    "damping_ratio": Interval(0.1, 1.2, "", "Perreault et al. 2004 (m): 0.3; Tsuji et al. 1995 (m): 0.2 to 0.6"),
     "anisotropy": Interval(1.0, 5.0, "", "Mussa-Ivaldi et al. 1985 (m): axes of the stiffness ellipse, 1.5 to 4"),
     "grip_stiffness": Interval(
         100.0, 3000.0, "N/m", "Speich et al. 2005 (m): 375 N/m; Hajian & Howe 1997 (m): to 1255"
     ),
     "grip_damping": Interval(1.0, 20.0, "N s/m", "Speich et al. 2005 (m): 7.9 N s/m; Hajian & Howe 1997 (m): 2 to 8"),
     "stiffening": Interval(0.0, 1.0, "1/N", "Hasser & Cutkosky 2002: stiffness and damping rise steadily with grip"),
-    "strength": Interval(2.0, 60.0, "N", "a hand on a pen: below tip pinch, some 70 N (Mathiowetz et al. 1985, m)"),
+    "strength": Interval(2.0, 60.0, "N", "a hand on a pen: below tip pinch, some 70 N (Mathiowetz 1985, m)"),
     "fatigue": Interval(0.0, 4.0, "1/min", "Ma et al. 2009 (m): rate k = 1 per minute; 0 for none"),
     "reflex_delay": Interval(0.03, 0.06, "s", "short and long latency stretch reflexes of the arm"),
     "reflex_gain": Interval(0.0, 0.5, "", "share of stiffness and damping that is reflex, not muscle"),
@@ -169,6 +169,5 @@ class Person:
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise SimError(f"{option.name} of person {self.name!r} is {value!r}; expected a finite number")
             if not least <= value <= most:
-                raise SimError(
-                    f"{option.name} of person {self.name!r} is {value:g}; expected {least:g} to {most:g} {unit}".rstrip()
-                )
+                expected = f"expected {least:g} to {most:g} {unit}".rstrip()
+                raise SimError(f"{option.name} of person {self.name!r} is {value:g}; {expected}")

@@ -16,8 +16,8 @@ IntArray = npt.NDArray[np.int64]
 """Numbers of a person, of her wishes, and her delays in ticks; the tremor's are of its filter."""
 
 (STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, N_MEMORY) = range(11)
-"""What she remembers: whether she has begun, ticks so far, her own clock [s], when her submovement began and how long it
-lasts [s], when she last decided [s], share of her strength that is left, the target whose turn it is, how far she is
+"""What she remembers: whether she has begun, ticks so far, her own clock [s], when her submovement began and how long
+it lasts [s], when she last decided [s], share of her strength that is left, the target whose turn it is, how far she is
 engaged, and impedance over that of the reference grip."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,
