@@ -9,6 +9,7 @@ from sim.errors import SimError
 from sim.users import person_state as at
 from sim.users.body import arm_matrices, check_steps
 from sim.users.chance import fresh_chance
+from sim.users.eye import LOOKS, no_eye
 from sim.users.person import Person
 from sim.users.person_state import PersonState
 from sim.users.submovement import refinement
@@ -66,7 +67,7 @@ class Participant:
             memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
             inertia=inertia, mobility=np.linalg.inv(inertia), stiffness=stiffness, damping=damping,
             wishes=np.ascontiguousarray(self.wishes.rows), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
-            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
+            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed), eye=no_eye(),
         )  # fmt: skip
 
     def _numbers(self, period: float, reflex: int, seen: int) -> at.Array:
@@ -77,8 +78,9 @@ class Participant:
             n[getattr(at, name.upper())] = getattr(person, name)
         n[at.PERIOD], n[at.WISH_PERIOD], n[at.LAP] = period, self.wishes.period, self.wishes.lap
         n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen
+        n[at.LOOK_TICKS] = max(1, round(LOOKS / period))
         n[at.TREMOR_A], n[at.TREMOR_B], n[at.TREMOR_GAIN] = tremor_filter(person, period)
-        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.refractory)
+        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.visual_delay)
         return n
 
 

@@ -24,7 +24,8 @@ class Wishes:
     rows : Array
         Wishes, shape (n, 10), columns as above.
     period : float
-        Time between two rows [s]; 0 where each row is a target, and the next one's turn comes when it is reached.
+        Time between two rows [s]; 0 where each row is a target, and the next one's turn comes when it is reached;
+        negative where an intent of the caller's own writes the two rows (see `sim.users.own_intent`).
     lap : float
         Time after which the wish repeats itself, for what is learned from one repetition to the next [s]; 0: never.
 
@@ -44,7 +45,7 @@ class Wishes:
             raise SimError(f"wishes of shape {rows.shape}; expected (n, {WISH_SIZE}), n ≥ 1")
         if not np.all(np.isfinite(np.delete(rows, GRIP, axis=1))) or np.any(np.isinf(rows[:, GRIP])):
             raise SimError("wishes have a number that is not finite")
-        if not (self.period >= 0.0 and np.isfinite(self.period) and self.lap >= 0.0 and np.isfinite(self.lap)):
+        if not (np.isfinite(self.period) and self.lap >= 0.0 and np.isfinite(self.lap)):
             raise SimError(f"wishes {self.period} s apart, repeated after {self.lap} s; expected finite, 0 s or more")
         if self.period == 0.0 and np.any(rows[:, WIDTH] <= 0.0):
             raise SimError("a target has no width; expected more than 0 m")
