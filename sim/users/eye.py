@@ -1,9 +1,9 @@
-"""What a person sees: the animation's pose, and where on the motion that she has in mind such a pose belongs.
+r"""What a person sees: the animation's pose, and where on the motion that she has in mind such a pose belongs.
 
 She has learned what the figure does along that motion and a little beside it, so a pose q tells her a place
 
-.. math:: p = \\varphi(s^*) + H^+(s^*)\\,\\bigl(q \\ominus h(\\varphi(s^*))\\bigr), \\qquad
-          s^* = \\arg\\min_s \\|q \\ominus h(\\varphi(s))\\|
+.. math:: p = \varphi(s^*) + H^+(s^*)\,\bigl(q \ominus h(\varphi(s^*))\bigr), \qquad
+          s^* = \arg\min_s \|q \ominus h(\varphi(s))\|
 
 with H⁺ a damped inverse of the map's derivative: what does not show in the figure she cannot see.
 """

@@ -67,7 +67,8 @@ class Participant:
             memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
             inertia=inertia, mobility=np.linalg.inv(inertia), stiffness=stiffness, damping=damping,
             wishes=np.ascontiguousarray(self.wishes.rows), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
-            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed), eye=no_eye(),
+            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
+            eye=no_eye(),
         )  # fmt: skip
 
     def _numbers(self, period: float, reflex: int, seen: int) -> at.Array:

@@ -12,6 +12,8 @@ from numba import njit
 
 from sim.users.body import REFERENCE_GRIP
 from sim.users.chance import normal
+from sim.users.eye import seen_place
+from sim.users.own_intent import call_intent
 from sim.users.person_state import (
     BEGUN,
     BELIEF,
@@ -79,9 +81,7 @@ from sim.users.person_state import (
     WISH_PERIOD,
     PersonState,
 )
-from sim.users.eye import seen_place
 from sim.users.submovement import set_submovement, submovement
-from sim.users.own_intent import call_intent
 from sim.users.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
 from sim.users.wishes import GRIP as WISHED_GRIP
 
@@ -220,7 +220,9 @@ def _want(person: PersonState, switch: Array) -> None:
         wanted_motion(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
         switch[0] = row[SWITCH]
     engaged = row[ENGAGED] > 0.0
-    m[CLOCK] += n[PERIOD] * (1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0)
+    m[CLOCK] += n[PERIOD] * (
+        1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
+    )
     grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
     follow = n[PERIOD] / ENGAGING_TIME
     m[ENGAGED_SHARE] += follow * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])

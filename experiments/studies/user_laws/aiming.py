@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.studies.user_laws.bare_device import Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
@@ -87,5 +86,3 @@ def _first_seconds(person: Person, amplitude: float, width: float) -> float:
     scatter = person.caution * person.motor_noise
     left = max(0.5 * width, refinement(scatter, person.visual_delay) * amplitude)
     return max(LEAST_SECONDS, scatter * amplitude / left)
-
-

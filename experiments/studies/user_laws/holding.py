@@ -12,7 +12,7 @@ from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
-PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.5, 12, 0.12  # [N], [s], and [s]: before any decision can be made on it
+PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # [N], [s], and [s]: a swing of the arm
 GRIPS = (1.0, 2.0, 4.0, 8.0)  # [N]
 STILL = 20.0  # [s]
 _HOLD = Wishes(following(np.zeros((2, 3))), 0.02)
@@ -47,12 +47,16 @@ def tremor(people: Sequence[Person], seed: int) -> Study:
 
 
 def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, float, float]]:
-    """Mean answer [m] to a push along x, its times [s], and mass [kg], damping [N s/m], stiffness [N/m] fitted to it."""
+    """Mean answer [m] to a push along x, its times [s], and mass [kg], damping [N s/m], stiffness [N/m] fitted to it.
+
+    She is told, as people are in such studies, not to intervene: she makes up for nothing on purpose.
+    """
+    person = replace(person, correction=0.0)
     n, period = round(REPEATS * EVERY / PERIOD), round(EVERY / PERIOD)
-    window, half = round(WINDOW / PERIOD), round(0.6 / PERIOD)
+    window = round(WINDOW / PERIOD)
     pushes = np.zeros((n, 3))
     for k in range(1, REPEATS):
-        pushes[k * period : k * period + half, 0] = PUSH * (1.0 if k % 2 else -1.0)
+        pushes[k * period : k * period + window, 0] = PUSH * (1.0 if k % 2 else -1.0)
     trace = trial(person, _HOLD, REPEATS * EVERY, seed, np.zeros(3), pushes)
     answers = [
         (1.0 if k % 2 else -1.0) * (trace.p[k * period : k * period + window, 0] - trace.p[k * period - 1, 0])

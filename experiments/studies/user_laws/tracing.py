@@ -14,10 +14,10 @@ from sim.users.wishes import Wishes, following
 
 LAPS = 7  # of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
-LAP_TIMES = (1.2, 1.6, 2.2, 3.0, 4.0)  # [s]
+LAP_TIMES = (1.0, 1.3, 1.7, 2.2, 2.8)  # [s]
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
-_SAMPLING, _CUTOFF = 0.01, 12.0  # [s] between wishes, [Hz] of the filter before curvature, as for digitised drawings
+_SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
