@@ -35,6 +35,7 @@ from experiments.sweep import Swept, sweep
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from sim.errors import SimError
+from sim.users import intents
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
 from sim.users.population import persona, population
@@ -76,6 +77,7 @@ __all__ = [
     "certify",
     "circle",
     "clips",
+    "intents",
     "law",
     "load",
     "persona",

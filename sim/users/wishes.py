@@ -13,6 +13,8 @@ Array = npt.NDArray[np.float64]
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
 """Columns of a wish: place (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target [m],
 switch, and whether the person does anything; without, she lets the stylus go where it goes."""
+OWN = -1.0
+"""Period of wishes that an intent of the caller's own writes."""
 
 
 @dataclass(frozen=True)
