@@ -46,7 +46,7 @@ class Wishes:
         if rows.ndim != 2 or rows.shape[1] != WISH_SIZE or len(rows) < 1:
             raise SimError(f"wishes of shape {rows.shape}; expected (n, {WISH_SIZE}), n ≥ 1")
         if not np.all(np.isfinite(np.delete(rows, GRIP, axis=1))) or np.any(np.isinf(rows[:, GRIP])):
-            raise SimError("wishes have a number that is not finite")
+            raise SimError("wishes have a number that is not finite; expected finite ones, but for the grip")
         if not (np.isfinite(self.period) and self.lap >= 0.0 and np.isfinite(self.lap)):
             raise SimError(f"wishes {self.period} s apart, repeated after {self.lap} s; expected finite, 0 s or more")
         if self.period == 0.0 and np.any(rows[:, WIDTH] <= 0.0):
