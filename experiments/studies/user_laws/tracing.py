@@ -14,7 +14,7 @@ from sim.users.wishes import Wishes, following
 
 LAPS = 7  # of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
-LAP_TIMES = (1.0, 1.3, 1.7, 2.2, 2.8)  # [s]
+LAP_TIMES = (1.0, 1.4, 2.0, 2.8, 4.0)  # [s]
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
 _SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
@@ -24,7 +24,7 @@ def steering(people: Sequence[Person], seed: int) -> Study:
     """Time of a lap over the length of a circular tunnel by the width that the lap needed (Accot & Zhai 1997)."""
     difficulty = list[float]()
     for lap in LAP_TIMES:
-        angle = 2.0 * np.pi * np.arange(0.0, LAPS * lap, _SAMPLING) / lap
+        angle = 2.0 * np.pi * np.arange(0.0, (LAPS + 1) * lap, _SAMPLING) / lap
         points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
         widths = [
             2.0 * np.abs(np.hypot(*part[:, :2].T) - RADIUS).max()
@@ -54,7 +54,7 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
         angle = np.linspace(0.0, 2.0 * np.pi, 257)
         drawn = np.stack([long * np.cos(angle), short * np.sin(angle), np.zeros_like(angle)], axis=1)
         times = natural_times(drawn, lap)
-        t = np.arange(0.0, LAPS * lap, _SAMPLING)
+        t = np.arange(0.0, (LAPS + 1) * lap, _SAMPLING)
         points = np.stack([np.interp(t % lap, times, drawn[:, k]) for k in range(3)], axis=1)
         trace = trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0])
         kappa, speed = _curvature(trace, lap)
