@@ -109,7 +109,7 @@ class Person:
     horizon : float
         Duration of a submovement in tracking [s].
     motor_noise : float
-        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, two thirds across [s].
+        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, 0.85 of it across [s].
     force_noise : float
         Standard deviation of a force over the force.
     tremor, tremor_frequency : float

@@ -93,7 +93,7 @@ UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 20
 ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
-ACROSS = 0.67  # scatter of endpoints across the way over that along it (Gordon et al. 1994, m)
+ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994: ellipses along the way, m)
 LEAST_SECONDS = 0.16  # [s] of the shortest submovement
 WATCHED = 0.8  # of a submovement's time: 94 % of its way, by which it is seen where it ends
 BEND = 0.1  # [s] before and after which she looks at a way to see how it bends: a third of a submovement
@@ -319,7 +319,7 @@ def _aim(person: PersonState, goal: Array, width: float) -> bool:
 def _submove(person: PersonState, goal: Array, seconds: float) -> None:
     r"""Begin a submovement from where the hand is believed to be to a goal.
 
-    It misses by σ = K A/D along its way and two thirds of that across (Schmidt et al. 1979; ellipses of endpoints:
+    It misses by σ = K A/D along its way and 0.85 of that across (Schmidt et al. 1979; ellipses of endpoints:
     Gordon et al. 1994): the noise of a motor command
     grows with it (Harris & Wolpert 1998).
     """
