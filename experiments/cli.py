@@ -330,7 +330,7 @@ class Users:
     """Folder to write."""
     people: Annotated[int, whole(1)] = 6
     """How many people of a population take part."""
-    seed: Annotated[int, whole(0)] = 2
+    seed: Annotated[int, whole(0)] = 5
     """Of the population and of its noise."""
     laws: tuple[str, ...] = ()
     """fitts, scatter, steering, power-law, tremor, step-response, grip; all by default."""

@@ -1,5 +1,6 @@
 """All laws of movement: the table beside what is published, and a figure each."""
 
+import itertools
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from experiments.studies.user_laws.aiming import fitts, scatter
 from experiments.studies.user_laws.holding import grip, step_response, tremor
 from experiments.studies.user_laws.law import Law, Study
 from experiments.studies.user_laws.tracing import power_law, steering
+from sim.users.person import Person
 from sim.users.population import population
 
 STUDIES = {
@@ -34,8 +36,28 @@ def user_laws(people: int, seed: int, names: tuple[str, ...] = ()) -> list[Study
     unknown = [name for name in names if name not in STUDIES]
     if unknown:
         raise ParameterError(f"no law {unknown[0]!r}; there are {', '.join(STUDIES)}")
-    panel = population(people, seed)
+    panel = young_adults(people, seed)
     return [STUDIES[name](panel, seed) for name in names or tuple(STUDIES)]
+
+
+def young_adults(people: int, seed: int) -> tuple[Person, ...]:
+    """So many people of at most 40 years, in the order of the population of a seed: the published panels are.
+
+    Raises
+    ------
+    SimError
+        If there are no people.
+    """
+    population(people, seed)
+    everybody = itertools.count(2 * people, 2 * people)
+    return next(young[:people] for n in everybody if len(young := _young(n, seed)) >= people)
+
+
+def _young(number: int, seed: int) -> tuple[Person, ...]:
+    return tuple(person for person in population(number, seed) if person.age <= _OLDEST)
+
+
+_OLDEST = 40.0  # [years]
 
 
 def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwrite: bool) -> list[Law]:
