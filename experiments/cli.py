@@ -328,9 +328,9 @@ class Users:
 
     out: Path = Path("runs/users")
     """Folder to write."""
-    people: Annotated[int, whole(1)] = 6
+    people: Annotated[int, whole(1)] = 3
     """How many people of a population take part."""
-    seed: Annotated[int, whole(0)] = 5
+    seed: Annotated[int, whole(0)] = 8
     """Of the population and of its noise."""
     laws: tuple[str, ...] = ()
     """fitts, scatter, steering, power-law, tremor, step-response, grip; all by default."""

@@ -132,7 +132,7 @@ class Person:
     name: str = "median"
     age: float = 30.0
     hand: Literal["right", "left"] = "right"
-    skill: float = 0.8
+    skill: float = 0.7
     grip: float = 2.0
     mass: float = 0.6
     stiffness: float = 250.0

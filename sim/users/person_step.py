@@ -301,12 +301,19 @@ def _may_decide(person: PersonState, waits: bool) -> bool:
 
 @njit
 def _aim(person: PersonState, goal: Array, width: float) -> bool:
-    """Decide on a submovement to a target; whether it is reached already."""
-    n, V = person.numbers, person.vectors
-    away = 0.0
+    """Decide on a submovement to a target; whether it is reached already.
+
+    A target is a strip across the way from the last one, as in Fitts 1954; the first one is a ball.
+    """
+    n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[TARGET])
+    away, along, apart = 0.0, 0.0, 0.0
     for k in range(3):
         away += (goal[0, k] - V[BELIEF, k]) ** 2
-    away = math.sqrt(away)
+        if 0 < turn < rows.shape[0]:
+            way = rows[turn, PLACE + k] - rows[turn - 1, PLACE + k]
+            along += way * (goal[0, k] - V[BELIEF, k])
+            apart += way * way
+    away = math.sqrt(away) if apart == 0.0 else abs(along) / math.sqrt(apart)
     if away < 0.5 * width:
         return True
     overhead = n[PERIOD] * n[SEEN_TICKS]

@@ -19,6 +19,7 @@ Of tremor as wide as the normative study's range (a factor of 20 between extreme
 inter-subject variation of arm models (a factor of about two either way); the others as coefficients of variation of a
 healthy sample, which are some 10 to 30 %.
 """
+_MEAN_SKILL = 2.0 / 3.0  # of Beta(4, 2)
 _LEFT = 0.1  # share of people who hold a pen in the left hand
 _AGING = (
     0.006  # relative slowing a year from 30 years on: choice reaction and movement times rise by 5 to 10 % a decade
@@ -89,7 +90,7 @@ def _draw(rng: np.random.Generator, name: str) -> Person:
     median = Person()
     age, skill, left = rng.uniform(20.0, 75.0), rng.beta(4.0, 2.0), rng.random() < _LEFT
     values = {key: getattr(median, key) * np.exp(spread * rng.normal()) for key, spread in _SPREAD.items()}
-    slower, clumsier = 1.0 + _AGING * max(0.0, age - 30.0), 1.0 + 0.8 * (median.skill - skill)
+    slower, clumsier = 1.0 + _AGING * max(0.0, age - 30.0), 1.0 + 0.8 * (_MEAN_SKILL - skill)
     for key in ("visual_delay", "reflex_delay", "refractory", "horizon"):
         values[key] *= slower
     for key in ("motor_noise", "horizon"):

@@ -68,7 +68,7 @@ def following(points: Array) -> Array:
 
 
 def targets(points: Array, width: float) -> Wishes:
-    """Targets (n, 3) of a width [m], one after the other; each is clicked."""
+    """Targets (n, 3) of a width [m] across the way from the last one, one after the other; each is clicked."""
     rows = following(points)
     rows[:, WIDTH] = width
     return Wishes(rows, period=0.0)
