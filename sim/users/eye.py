@@ -19,7 +19,7 @@ from controllers.rotations import logarithm, relative
 Array = npt.NDArray[np.float64]
 
 LOOKS = 0.008  # [s] between two pictures of the figure, at most: 120 a second
-_NEAR = 1.0 / 3.0  # of the motion, around where she last saw it, in which she looks for a pose
+_NEAR = 1.0 / 8.0  # of the motion, around where she feels it to be, in which she looks for a pose: steps are alike
 
 
 class Eye(NamedTuple):
@@ -49,25 +49,18 @@ def no_eye() -> Eye:
 
 
 @njit
-def seen_place(eye: Eye, last: int, difference: Array, place: Array) -> int:
-    """Set the place (3,) that the pose shown now tells, and return which of the poses along the motion is nearest.
-
-    Parameters
-    ----------
-    eye : Eye
-        With poses.
-    last : int
-        Which one was nearest before; negative where none was.
-    difference : Array
-        Room for the difference of two poses, shape (57,).
-    place : Array
-        Set [m].
-    """
-    n, q = eye.poses.shape[0], eye.pose
-    best, nearest = np.inf, 0
-    reach = n // 2 if last < 0 else max(1, int(_NEAR * n) // 2)
+def _nearest(eye: Eye, felt: Array) -> int:
+    """Which of the poses along the motion is most like the one that is shown, near where the hand is felt to be."""
+    n, q, around, best = eye.poses.shape[0], eye.pose, 0, np.inf
+    for i in range(n):
+        far = 0.0
+        for k in range(3):
+            far += (felt[k] - eye.places[i, k]) ** 2
+        if far < best:
+            around, best = i, far
+    best, nearest, reach = np.inf, around, max(1, int(0.5 * _NEAR * n))
     for step in range(-reach, reach + 1):
-        i = (max(last, 0) + step) % n
+        i = (around + step) % n
         other, far = eye.poses[i], 0.0
         for k in range(3):
             far += (q[k] - other[k]) ** 2
@@ -78,6 +71,25 @@ def seen_place(eye: Eye, last: int, difference: Array, place: Array) -> int:
             far += 4.0 * (1.0 - dot * dot)
         if far < best:
             best, nearest = far, i
+    return nearest
+
+
+@njit
+def seen_place(eye: Eye, felt: Array, difference: Array, place: Array) -> None:
+    """Set the place (3,) that the pose shown now tells.
+
+    Parameters
+    ----------
+    eye : Eye
+        With poses.
+    felt : Array
+        Where she feels her hand to be [m], shape (3,): poses of a gait are alike, she looks near there.
+    difference : Array
+        Room for the difference of two poses, shape (57,).
+    place : Array
+        Set [m].
+    """
+    q, nearest = eye.pose, _nearest(eye, felt)
     other = eye.poses[nearest]
     for k in range(3):
         difference[k] = q[k] - other[k]
@@ -89,4 +101,3 @@ def seen_place(eye: Eye, last: int, difference: Array, place: Array) -> int:
         place[k] = eye.places[nearest, k]
         for j in range(difference.shape[0]):
             place[k] += eye.inverses[nearest, k, j] * difference[j]
-    return nearest

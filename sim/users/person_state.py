@@ -17,11 +17,11 @@ IntArray = npt.NDArray[np.int64]
  N_NUMBERS) = range(28)  # fmt: skip
 """Numbers of a person, of her wishes, and her delays in ticks; the tremor's are of its filter."""
 
-(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, SIGHTED,
- CALM, N_MEMORY) = range(13)  # fmt: skip
+(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, CALM,
+ N_MEMORY) = range(12)  # fmt: skip
 """What she remembers: whether she has begun, ticks so far, her own clock [s], when her submovement began and how long
 it lasts [s], when she last decided [s], share of her strength that is left, the target whose turn it is, how far she is
-engaged, impedance over that of the reference grip, which pose along the motion she last saw, and until
+engaged, impedance over that of the reference grip, and until
 when the hand was where it should be [s]."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,

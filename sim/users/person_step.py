@@ -62,7 +62,6 @@ from sim.users.person_state import (
     SEEN_TICKS,
     SENSED,
     SHOWN,
-    SIGHTED,
     SKILL,
     STARTED,
     STIFFENING,
@@ -89,6 +88,7 @@ Array = npt.NDArray[np.float64]
 DRIFT_TIME = 60.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] of what is seen: a fixation
 CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
+DOUBTED = 0.005  # [m], and three times the noise of what is felt: what is seen further away is not believed
 UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 2002, m)
 ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
@@ -143,7 +143,7 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
         person.past[row, SEEN : SEEN + 3] = p
     memory[STARTED], memory[CAPACITY] = 1.0, 1.0
     memory[STIFFER] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
-    memory[DECIDED], memory[SIGHTED] = -person.numbers[REFRACTORY], -1.0
+    memory[DECIDED] = -person.numbers[REFRACTORY]
 
 
 @njit
@@ -195,7 +195,12 @@ def _look(person: PersonState, p: Array) -> None:
     if eye.pose.shape[0] == 0:
         V[SHOWN] = p
     elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
-        m[SIGHTED] = seen_place(eye, int(m[SIGHTED]), np.empty(eye.inverses.shape[2]), V[SHOWN])
+        felt, away = V[HAND_P] + V[DRIFT], 0.0
+        seen_place(eye, felt, np.empty(eye.inverses.shape[2]), V[SHOWN])
+        for k in range(3):
+            away += (V[SHOWN, k] - felt[k]) ** 2
+        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # she takes it for another pose
+            V[SHOWN] = felt
 
 
 @njit

@@ -93,7 +93,7 @@ def test_an_eye_finds_the_place_that_a_pose_tells() -> None:
     place = np.zeros(3)
     for p in (np.array([0.03, 0.02, 0.01]), np.array([-0.04, 0.001, -0.01])):
         eye = Eye(pose(p), np.array([pose(q) for q in places]), places, inverse)
-        seen_place(eye, -1, np.empty(57), place)
+        seen_place(eye, p + 0.002, np.empty(57), place)
         np.testing.assert_allclose(place, p, atol=1e-12)
 
 
