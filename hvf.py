@@ -35,7 +35,10 @@ from experiments.sweep import Swept, sweep
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from sim.errors import SimError
+from sim.users import intents
 from sim.users.intent import Grab, Push, Turn
+from sim.users.person import Person
+from sim.users.population import persona, population
 
 __version__ = version()
 __all__ = [
@@ -55,6 +58,7 @@ __all__ = [
     "Law",
     "ModelError",
     "ParameterError",
+    "Person",
     "Phantom",
     "Push",
     "River",
@@ -73,7 +77,10 @@ __all__ = [
     "certify",
     "circle",
     "clips",
+    "intents",
     "law",
     "load",
+    "persona",
+    "population",
     "sweep",
 ]

@@ -11,6 +11,21 @@ from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
+from sim.users.intents import (
+    Bend,
+    ChangeOver,
+    CutCorner,
+    Exaggerate,
+    GetLost,
+    Own,
+    Press,
+    Relax,
+    Resist,
+    Trace,
+)
+from sim.users.intents.intent import PersonIntent
+from sim.users.participant import Participant
+from sim.users.person import Person
 
 Array = npt.NDArray[np.float64]
 
@@ -84,7 +99,7 @@ def resolved_user(
         If a hand that traces should grab.
     """
     grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
-    if user.does == "trace" and grabs:
+    if user.traces and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
     if user.does == "turn" and not turns:
         laps = range(1, max(2, int(seconds / lap)))
@@ -96,15 +111,48 @@ def resolved_user(
         begin = first_pushed_lap(curve, grabs)
         laps = range(max(1, int((seconds - begin) / lap)))
         done = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
-    return User(does=user.does, pushes=done, turns=turns, grabs=grabs)
+    return User(does=user.does, pushes=done, turns=turns, grabs=grabs, person=user.person)
 
 
-def user_arm(user: User, curve: Trajectory, seconds: float) -> Arm:
-    """Arm and intent of a user whose doings are written out."""
+def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
+    """Hand and intent of a user whose doings are written out, for a run of so long [s] and its seed.
+
+    Raises
+    ------
+    SimError
+        If a push or a grab is none that a person can do.
+    """
+    if user.person is not None:
+        return participant(user.person, intent_of(user), curve, seconds, seed)
     if user.does == "trace":
         times = np.arange(0.0, seconds, 0.01)
         return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
+
+
+def participant(person: Person, intent: PersonIntent, curve: Trajectory, seconds: float, seed: int) -> Participant:
+    """A person who means to do something about a curve, for a run of so long [s] and its seed."""
+    own = intent if isinstance(intent, Own) else None
+    return Participant(person, intent.wishes(curve, seconds, seed), seed, own)
+
+
+def intent_of(user: User) -> PersonIntent:
+    """What a person means to do, by what is asked for.
+
+    Raises
+    ------
+    SimError
+        If a push or a grab is none that a person can do.
+    """
+    if user.grabs:
+        return Bend(user.grabs)
+    return Press(user.pushes) if user.pushes else _INTENTS[user.does]
+
+
+_INTENTS: dict[str, PersonIntent] = {
+    "relaxed": Relax(), "push": Relax(), "trace": Trace(), "exaggerate": Exaggerate(), "cut": CutCorner(),
+    "change": ChangeOver(), "resist": Resist(), "lost": GetLost(),
+}  # fmt: skip
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
@@ -114,7 +162,7 @@ def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
 
 def handled(user: User) -> tuple[tuple[float, float], ...]:
     """From and until when [s] a hand does something else than push: it grabs or traces."""
-    if user.does == "trace":
+    if user.traces:
         return ((0.0, np.inf),)
     return tuple((grab.at, grab.end) for grab in user.grabs)
 

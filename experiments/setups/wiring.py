@@ -12,6 +12,7 @@ from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.files.device_files import linkage_of
 from experiments.setups.defaults import resolved
+from experiments.setups.eyes import POSES, with_eyes
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
 from experiments.setups.parts import MapParts, Parts, Settings
@@ -40,6 +41,8 @@ from sim.reference.reference import (
 )
 from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
+from sim.users.arm import Arm
+from sim.users.participant import Participant
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
 from sim.world.world import World
@@ -122,6 +125,9 @@ def assemble(
     refined = maps.refine() if world.kind != "none" else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
+    if isinstance(parts.user, Participant) and world.kind != "none" and parts.walker is None:
+        phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
+        servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 
@@ -156,7 +162,8 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
-        device = simulated_phantom(phantom_port(world.model, world.data, period, config.device.cutoff), parts.user)
+        user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
+        device = simulated_phantom(phantom_port(world.model, world.data, period, config.device.cutoff), user)
     else:
         device = device_of(world)
     body, reference = _BODIES[world.kind](parts, world, compiled)
