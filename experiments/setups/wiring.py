@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from controllers.errors import ParameterError
@@ -47,8 +48,14 @@ MOST_PACE = 1.4  # times the clips' own that passes without a word
 Ready = Callable[[tuple[Unit, ...]], None]
 """Called before compiled code is needed, with its units (see `experiments.compiling`)."""
 
+MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]
+"""From configuration, figure and clips to what the map gives a run."""
 
-def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready = lambda units: None) -> Session:
+
+def wire(
+    config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready = lambda units: None,
+    maps_of: MapsOf = map_parts,
+) -> Session:  # fmt: skip
     """Put a run together.
 
     Parameters
@@ -59,6 +66,8 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         In place of those that it names.
     ready : callable
         See `Ready`.
+    maps_of : callable
+        What makes the map's parts, as `map_parts` does; many runs on one map may share them.
 
     Raises
     ------
@@ -71,7 +80,7 @@ def wire(config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready 
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     check_rates(config)
     world = World(config.scene, config.figure.kind)
-    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
+    return assemble(world, maps_of(config, world.figure, clips), lambda maps: parts_of(config, maps), ready)
 
 
 def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready) -> Session:
