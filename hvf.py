@@ -36,6 +36,8 @@ from models.errors import ModelError
 from models.mocap.clip import Clip
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
+from sim.users.person import Person
+from sim.users.population import persona, population
 
 __version__ = version()
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "Law",
     "ModelError",
     "ParameterError",
+    "Person",
     "Phantom",
     "Push",
     "River",
@@ -75,5 +78,7 @@ __all__ = [
     "clips",
     "law",
     "load",
+    "persona",
+    "population",
     "sweep",
 ]

@@ -17,9 +17,11 @@ from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
 from experiments.compiling import compile_once
 from experiments.config.run_config import Clock, Figure, Phantom
+from experiments.config.run_config import User as RunUser
 from experiments.run_result import Run
 from experiments.setups.budget import SPAN, fastest, tank_for
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, reached
+from experiments.setups.hands import wishes_of
 from experiments.setups.parts import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.stylus import stylus_path
@@ -29,6 +31,8 @@ from models.scene import SceneConfig
 from sim.loop.loop import Loop
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push, Turn
+from sim.users.participant import Participant
+from sim.users.person import Person
 from sim.world.world import World
 
 _SECONDS = 1e9  # [s] a hand that traces does so as long as anybody runs it
@@ -106,15 +110,28 @@ class User:
         What it does.
     traces : Trajectory, optional
         A curve that it means to trace, again and again.
+    person : Person, optional
+        Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
     """
 
     pushes: Sequence[Push] = ()
     turns: Sequence[Turn] = ()
     grabs: Sequence[Grab] = ()
     traces: Trajectory | None = field(default=None, repr=False)
+    person: Person | None = None
 
-    def arm(self, seconds: float) -> Arm:
-        """The hand for a run of so long [s]."""
+    def hand(self, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
+        """The hand for a run of so long [s] about a curve, with a seed.
+
+        Raises
+        ------
+        ParameterError
+            If a person is to do what only an arm can.
+        """
+        if self.person is not None:
+            does = "relaxed" if self.traces is None else "trace"
+            user = RunUser(does=does, pushes=tuple(self.pushes), turns=tuple(self.turns), grabs=tuple(self.grabs))
+            return Participant(self.person, wishes_of(user, self.traces or curve, seconds), seed)
         if self.traces is None:
             return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
         path = self.traces.point(np.arange(0.0, seconds, 0.01))
@@ -213,7 +230,7 @@ class Simulation:
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(
             config=self, maps=maps, field=self.field, program=program, course=maps.curve,
-            user=self.user.arm(seconds), tank=tank, gains=maps.gains,
+            user=self.user.hand(maps.curve, seconds, self.seed), tank=tank, gains=maps.gains,
             notes=Notes(type(self.field).__name__.upper(), maps.reach),
             argument_at=lambda nearest, phases: stylus_path(nearest),
             handled=((0.0, np.inf),) if self.user.traces is not None else handled,

@@ -11,6 +11,7 @@ from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
+from sim.users.person import Person
 from sim.world.world import FigureKind
 
 
@@ -30,12 +31,15 @@ class User:
         By default of a hand that turns: one lap to the left and right, one down and up, one over to either side.
     grabs : tuple of Grab
         By default, where a curve is stretched: a tour of what can be done.
+    person : Person, optional
+        Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
     """
 
     does: Literal["relaxed", "trace", "push", "turn", "lead"] = "relaxed"
     pushes: tuple[Push, ...] = ()
     turns: tuple[Turn, ...] = ()
     grabs: tuple[Grab, ...] = ()
+    person: Person | None = None
 
 
 @part

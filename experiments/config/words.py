@@ -17,6 +17,7 @@ from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
 from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
 from experiments.config.run_config import Clock, Figure, Phantom, RunConfig, User, load_config
+from sim.users.population import PERSONAS, persona
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
@@ -125,13 +126,19 @@ def run_config(
     config = RunConfig(
         mode=mode_part,  # pyright: ignore[reportArgumentType]
         map=map_cls(**taken.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
-        user=User(does=user or "relaxed", **taken.of(User)),  # pyright: ignore[reportArgumentType]
+        user=User(does=user or "relaxed", **_with_person(taken.of(User))),  # pyright: ignore[reportArgumentType]
         figure=Figure(kind=figure, **taken.of(Figure)),  # pyright: ignore[reportArgumentType]
         device=Phantom(**taken.of(Phantom)), clock=Clock(**taken.of(Clock)),
         **taken.of(RunConfig, ("seconds", "seed")),
     )  # fmt: skip
     taken.check_empty()
     return config
+
+
+def _with_person(words: dict[str, Any]) -> dict[str, Any]:
+    """Words of a user, with a person who is given by name."""
+    named = words.get("person")
+    return words | {"person": persona(named)} if isinstance(named, str) else words
 
 
 def _named(what: str, name: str, parts: tuple[type, ...]) -> Any:
@@ -213,6 +220,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
     yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + ".", "")
+    yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)
     yield option("seed", int | None, top["seed"] + " Default: 1.", None)

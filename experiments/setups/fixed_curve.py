@@ -14,7 +14,7 @@ from experiments.config.run_config import RunConfig
 from experiments.results.measures import trace_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import tank_for
-from experiments.setups.hands import handled, resolved_user, turning_remark, user_arm
+from experiments.setups.hands import handled, resolved_user, turning_remark, user_hand
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
 from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
@@ -71,7 +71,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
     program = with_moment(field.law.program(), mode.orientation, field.course, field.tube)
     return Parts(
         config=replace(config, user=user), maps=maps, field=field.law, program=with_walls(program, mode.walls, maps),
-        course=field.course, user=user_arm(user, maps.curve, config.seconds),
+        course=field.course, user=user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, field.springs, maps.reach, limiter),
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),

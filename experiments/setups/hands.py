@@ -11,6 +11,8 @@ from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
+from sim.users.participant import Participant
+from sim.users.wishes import Wishes, following, resting
 
 Array = npt.NDArray[np.float64]
 
@@ -22,6 +24,7 @@ _CROSSING = 0.5  # of the lap, where the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before it, when a push across begins, and [s] that it lasts
 _PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
 _AWAY = 1e-3  # [m] by which beginnings differ
+_WISH_PERIOD = 0.02  # [s] between two wishes of a person: shorter than any submovement
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
 
 
@@ -96,15 +99,38 @@ def resolved_user(
         begin = first_pushed_lap(curve, grabs)
         laps = range(max(1, int((seconds - begin) / lap)))
         done = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
-    return User(does=user.does, pushes=done, turns=turns, grabs=grabs)
+    return User(does=user.does, pushes=done, turns=turns, grabs=grabs, person=user.person)
 
 
-def user_arm(user: User, curve: Trajectory, seconds: float) -> Arm:
-    """Arm and intent of a user whose doings are written out."""
+def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
+    """Hand and intent of a user whose doings are written out, for a run of so long [s] and its seed.
+
+    Raises
+    ------
+    ParameterError
+        If a person is to do what only an arm can.
+    """
+    if user.person is not None:
+        return Participant(user.person, wishes_of(user, curve, seconds), seed)
     if user.does == "trace":
         times = np.arange(0.0, seconds, 0.01)
         return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
+
+
+def wishes_of(user: User, curve: Trajectory, seconds: float) -> Wishes:
+    """What a person wants who does what a user does.
+
+    Raises
+    ------
+    ParameterError
+        If that is not a person's.
+    """
+    if user.turns or user.grabs or user.does not in ("relaxed", "trace"):
+        raise ParameterError(f"a person cannot {user.does} yet; choose --user relaxed or trace, or leave out --person")
+    times = np.arange(0.0, seconds + _WISH_PERIOD, _WISH_PERIOD)
+    rows = resting(len(times)) if user.does == "relaxed" else following(curve.point(curve.start + times))
+    return Wishes(rows, _WISH_PERIOD, curve.duration)
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:

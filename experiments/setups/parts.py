@@ -24,6 +24,7 @@ from sim.body.figure import FigureGains
 from sim.recording.recording import Recording
 from sim.users.arm import Arm
 from sim.users.intent import Push
+from sim.users.participant import Participant
 
 Map = TypeVar("Map", bound=HapticMap, covariant=True)
 Static = Mapping[str, npt.ArrayLike | str]
@@ -229,7 +230,7 @@ class Parts:
         The field as it runs, with all that is added.
     course : Trajectory
         Along which it leads.
-    user : Arm
+    user : Arm or Participant
         The hand.
     tank : EnergyTank
         What the field may inject.
@@ -258,7 +259,7 @@ class Parts:
     field: Law
     program: Program
     course: Trajectory
-    user: Arm
+    user: Arm | Participant
     tank: EnergyTank
     notes: Notes
     gains: FigureGains

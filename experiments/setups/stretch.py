@@ -31,7 +31,7 @@ from experiments.setups.hands import (
     handled,
     resolved_user,
     turning_remark,
-    user_arm,
+    user_hand,
 )
 from experiments.setups.lifted_runs import HELD_GAINS
 from experiments.setups.parts import ClipMapParts, Measuring, Notes, Parts
@@ -115,7 +115,7 @@ def _parts(
     return Parts(
         config=replace(config, user=user), maps=maps, field=tubes,
         program=with_walls(tubes.program(), mode.walls, maps), course=course,
-        user=user_arm(user, maps.curve, config.seconds),
+        user=user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
         gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
         # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.

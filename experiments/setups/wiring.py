@@ -39,6 +39,7 @@ from sim.reference.reference import (
 )
 from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
+from sim.users.arm import Arm
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
 from sim.world.world import World
@@ -147,7 +148,8 @@ def _servo(parts: Parts, world: World) -> Servo:
         # The field moves the walker, the map shows it.
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
-    device = simulated_phantom(port, parts.user)
+    user = parts.user if isinstance(parts.user, Arm) else parts.user.compiled(period, config.clock.physics_step)
+    device = simulated_phantom(port, user)
     body, reference = _BODIES[world.kind](parts, world, compiled)
     return Servo(
         plant=make_plant(world), device=device, field=field, reference=reference, figure=body,

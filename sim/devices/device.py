@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numba.extending import overload
 
 from sim.compilation.compiled import entry_point
+from sim.compilation.units import Unit
 from sim.devices.exchange import Exchange, actuate_exchange, advance_exchange, sense_exchange
 from sim.devices.replayed import ReplayedHand, actuate_replayed, advance_replayed, sense_replayed
 from sim.devices.simulated import SimulatedPhantom, actuate_simulated, advance_simulated, sense_simulated
@@ -77,6 +78,17 @@ def write_device(device: DeviceState, plant: Plant, t: float, force: Array, appl
     """`actuate` and `advance`, from Python, where no servo runs; `applied` (substeps, columns) is written."""
     actuate(device, force)
     advance(device, plant, t, False, applied)
+
+
+def device_units(device: DeviceState) -> tuple[Unit, ...]:
+    """Units of compiled code that a device calls by their address."""
+    return device.units() if isinstance(device, SimulatedPhantom) else ()
+
+
+def link_device(device: DeviceState) -> None:
+    """Find the addresses that a device calls; compiles what is not kept."""
+    if isinstance(device, SimulatedPhantom):
+        device.link()
 
 
 def ticks_of(device: DeviceState) -> int | None:

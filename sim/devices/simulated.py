@@ -6,7 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from sim.compilation.units import Unit
 from sim.users.arm import Arm
+from sim.users.person_state import PersonState
+from sim.users.person_unit import link_person, person_unit
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
 
@@ -35,9 +38,18 @@ class SimulatedPhantom(NamedTuple):
     faults: Array
     force: Array
 
-    def held_by(self, arm: Arm) -> "SimulatedPhantom":
+    def held_by(self, user: Arm | PersonState) -> "SimulatedPhantom":
         """The same device in another hand."""
-        return simulated_phantom(self.port, arm)
+        return simulated_phantom(self.port, user)
+
+    def units(self) -> tuple[Unit, ...]:
+        """Units of compiled code that its user needs."""
+        return () if self.user.person.numbers.size == 0 else (person_unit(),)
+
+    def link(self) -> None:
+        """Find the address of its user's code; compiles what is not kept."""
+        if self.user.person.numbers.size > 0:
+            link_person(self.user.person)
 
     @property
     def user_torques(self) -> int:
@@ -45,10 +57,10 @@ class SimulatedPhantom(NamedTuple):
         return hand_torques(self.user)
 
 
-def simulated_phantom(port: PhantomPort, arm: Arm) -> SimulatedPhantom:
+def simulated_phantom(port: PhantomPort, user: Arm | PersonState) -> SimulatedPhantom:
     """The Phantom of a world (see `sim.world.phantom_port.phantom_port`) in a hand."""
-    user = make_hand(arm)
-    return SimulatedPhantom(port, user, port.hand, port.torque, port.faults, user.force)
+    hand = make_hand(user)
+    return SimulatedPhantom(port, hand, port.hand, port.torque, port.faults, hand.force)
 
 
 @njit

@@ -6,6 +6,7 @@ from controllers.fields.law import Program
 from sim.body.drive import follow_units
 from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
+from sim.devices.device import device_units
 from sim.loop.loop import make_logs
 from sim.loop.servo import Servo, run_block
 from sim.reference.reference import NO_MAP, poses_unit
@@ -26,6 +27,7 @@ def run_units(servo: Servo, program: Program) -> tuple[Unit, ...]:
     maps = units_of_map(reference.kind, reference.params) if reference.kind != NO_MAP else ()
     return (
         Unit.of(run_block, typeof(servo), number, number, flag, typeof(ticks), typeof(frames)),
+        *device_units(servo.device),
         *follow_units(servo.figure, reference),
         *maps,
         *units_of_laws(program),

@@ -32,7 +32,7 @@ from controllers.safety.limiter import ForceLimiter, renew_limiter
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
-from sim.devices.device import DeviceState, actuate, advance, sense
+from sim.devices.device import DeviceState, actuate, advance, link_device, sense
 from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
 from sim.world.plant import Plant
@@ -101,6 +101,7 @@ class Servo(NamedTuple):
 
     def linked(self, program: Program) -> "Servo":
         """The same with the addresses of all kernels that it and its field call; compiles what is not kept."""
+        link_device(self.device)
         reference = self.reference
         if reference.kind != NO_MAP:
             reference = reference._replace(units=map_units([(reference.kind, reference.params)]))

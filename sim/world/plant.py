@@ -6,11 +6,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.kernel_call import call_as_given
 from controllers.safety.faults import is_silent
 from models.scene import PHANTOM
 from sim.compilation.native import mj_step
 from sim.users.arm import Arm, CompiledArm, hand_force
 from sim.users.fingers import turning_moment
+from sim.users.person_state import PersonState, nobody
 from sim.world.phantom_port import ARM_JOINTS, PhantomPort, let_go, true_motion, true_turn
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
@@ -52,6 +54,7 @@ class Hand(NamedTuple):
     """The simulated user, in H what the hand feels (true position, velocity, Jacobian) and its force.
 
     And the same of a hand that turns the stylus: true orientation (wxyz), angular velocity, gimbal axes, its moment.
+    A person, if there is one, moves the stylus in the place of the arm.
     """
 
     arm: CompiledArm
@@ -63,6 +66,7 @@ class Hand(NamedTuple):
     w: Array
     axes: Array
     moment: Array
+    person: PersonState
 
 
 def make_plant(world: World | RobotWorld) -> Plant:
@@ -75,10 +79,11 @@ def make_plant(world: World | RobotWorld) -> Plant:
     )  # fmt: skip
 
 
-def make_hand(arm: Arm) -> Hand:
+def make_hand(user: Arm | PersonState) -> Hand:
     """A simulated user before its first tick."""
     linear = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
-    return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+    arm, person = (user, nobody()) if isinstance(user, Arm) else (Arm(), user)
+    return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3), person)
 
 
 def hand_torques(hand: Hand) -> int:
@@ -110,7 +115,14 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
     for i in range(plant.substeps):
         if not replay:
             true_motion(port, hand.p, hand.v, hand.jacobian)
-            hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)
+            if hand.person.units[0] != 0:
+                when, dt = t + i * plant.period / plant.substeps, plant.period / plant.substeps
+                call_as_given(
+                    hand.person.units[0],
+                    (hand.person, when, dt, i, hand.p, hand.v, hand.force, hand.arm.switch),
+                )
+            else:
+                hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)
             J, F = hand.jacobian, hand.force
             for j in range(3):
                 applied[i, j] = J[0, j] * F[0] + J[1, j] * F[1] + J[2, j] * F[2]

@@ -1,0 +1,91 @@
+"""A person with something to do: what the loop is given in the place of an arm."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.errors import SimError
+from sim.users import person_state as at
+from sim.users.body import arm_matrices, check_steps
+from sim.users.chance import fresh_chance
+from sim.users.person import Person
+from sim.users.person_state import PersonState
+from sim.users.submovement import refinement
+from sim.users.wishes import Wishes
+
+LONGEST_PERIOD = 0.01  # [s] of a servo whose ticks a person can be asked in: a third of the shortest reflex
+_QUALITY = 4.0  # of the tremor's resonance: a peak some 2 Hz wide
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A person and what she wants.
+
+    Parameters
+    ----------
+    person : Person
+        Her arm, senses and motor system.
+    wishes : Wishes
+        What she wants.
+    seed : int
+        Of her noise: the same seed, the same run.
+    """
+
+    person: Person = field(default_factory=Person)
+    wishes: Wishes = field(default_factory=Wishes)
+    seed: int = 1
+
+    turns: tuple[()] = ()
+    """She lets the gimbal swing."""
+
+    def compiled(self, period: float, physics_step: float) -> PersonState:
+        """The person as the servo loop holds her, without the address of her code.
+
+        Parameters
+        ----------
+        period, physics_step : float
+            Of the servo and of the physics [s].
+
+        Raises
+        ------
+        SimError
+            If the rates cannot carry her.
+        """
+        person = self.person
+        if period > LONGEST_PERIOD:
+            raise SimError(
+                f"a servo period of {period:g} s is too long for a person, who has reflexes within 0.03 s; "
+                f"expected {LONGEST_PERIOD:g} s or less"
+            )
+        check_steps(person, physics_step)
+        inertia, stiffness, damping = arm_matrices(person)
+        reflex, seen = (max(1, round(delay / period)) for delay in (person.reflex_delay, person.visual_delay))
+        return PersonState(
+            units=np.zeros(2, dtype=np.int64), numbers=self._numbers(period, reflex, seen),
+            memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
+            inertia=inertia, mobility=np.linalg.inv(inertia), stiffness=stiffness, damping=damping,
+            wishes=np.ascontiguousarray(self.wishes.rows), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
+            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
+        )  # fmt: skip
+
+    def _numbers(self, period: float, reflex: int, seen: int) -> at.Array:
+        person, n = self.person, np.zeros(at.N_NUMBERS)
+        for name in ("grip", "stiffening", "grip_stiffness", "grip_damping", "strength", "fatigue", "reflex_gain",
+                     "skill", "felt_noise", "seen_noise", "refractory", "horizon", "motor_noise", "force_noise",
+                     "correction", "caution", "entrainment", "learning"):  # fmt: skip
+            n[getattr(at, name.upper())] = getattr(person, name)
+        n[at.PERIOD], n[at.WISH_PERIOD], n[at.LAP] = period, self.wishes.period, self.wishes.lap
+        n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen
+        n[at.TREMOR_A], n[at.TREMOR_B], n[at.TREMOR_GAIN] = tremor_filter(person, period)
+        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.refractory)
+        return n
+
+
+def tremor_filter(person: Person, period: float) -> tuple[float, float, float]:
+    """Coefficients a, b, g of y = a y₋₁ + b y₋₂ + g w: white noise w to a tremor of the person's size and frequency."""
+    radius = math.exp(-math.pi * person.tremor_frequency / _QUALITY * period)
+    turn = 2.0 * math.pi * person.tremor_frequency * period
+    a, b = 2.0 * radius * math.cos(turn), -radius * radius
+    variance = (1.0 - b) / ((1.0 + b) * ((1.0 - b) ** 2 - a * a))
+    return a, b, person.tremor / math.sqrt(3.0 * variance)

@@ -1,0 +1,173 @@
+"""A person at the stylus, as numbers: arm, senses and motor system. Pure data; `population` draws them."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal, NamedTuple
+
+from sim.errors import SimError
+
+
+class Interval(NamedTuple):
+    """What a number of a person may be.
+
+    Attributes
+    ----------
+    least, most : float
+        Inclusive.
+    unit : str
+        Of both.
+    source : str
+        Where the interval is from. "(m)" marks a paper that is quoted from memory.
+    """
+
+    least: float
+    most: float
+    unit: str
+    source: str
+
+
+INTERVALS = {
+    "age": Interval(18.0, 90.0, "years", "adults"),
+    "skill": Interval(0.0, 1.0, "", "share of the arm's inertia that the motor command foresees; 1 is an expert"),
+    "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012: 1 to 3 N on this very device; up to 10 N when asked to"),
+    "mass": Interval(0.1, 2.5, "kg", "Speich et al. 2005: 1.46 kg (m); hand and wrist alone some 0.1 to 0.5 kg"),
+    "stiffness": Interval(20.0, 800.0, "N/m", "Mussa-Ivaldi et al. 1985, Tsuji et al. 1995 (m): some 50 to 800 N/m"),
+    "damping_ratio": Interval(0.1, 1.2, "", "Perreault et al. 2004 (m): 0.3; Tsuji et al. 1995 (m): 0.2 to 0.6"),
+    "anisotropy": Interval(1.0, 5.0, "", "Mussa-Ivaldi et al. 1985 (m): axes of the stiffness ellipse, 1.5 to 4"),
+    "grip_stiffness": Interval(
+        100.0, 3000.0, "N/m", "Speich et al. 2005 (m): 375 N/m; Hajian & Howe 1997 (m): to 1255"
+    ),
+    "grip_damping": Interval(1.0, 20.0, "N s/m", "Speich et al. 2005 (m): 7.9 N s/m; Hajian & Howe 1997 (m): 2 to 8"),
+    "stiffening": Interval(0.0, 1.0, "1/N", "Hasser & Cutkosky 2002: stiffness and damping rise steadily with grip"),
+    "strength": Interval(2.0, 60.0, "N", "a hand on a pen: below tip pinch, some 70 N (Mathiowetz 1985, m)"),
+    "fatigue": Interval(0.0, 4.0, "1/min", "Ma et al. 2009 (m): rate k = 1 per minute; 0 for none"),
+    "reflex_delay": Interval(0.03, 0.06, "s", "short and long latency stretch reflexes of the arm"),
+    "reflex_gain": Interval(0.0, 0.5, "", "share of stiffness and damping that is reflex, not muscle"),
+    "visual_delay": Interval(
+        0.15, 0.25, "s", "time to correct on what is seen: Keele & Posner 1968 (m): 190 to 260 ms"
+    ),
+    "felt_noise": Interval(0.0, 0.02, "m", "van Beers et al. 1998 (m): proprioceptive localisation 5 to 10 mm"),
+    "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
+    "refractory": Interval(0.1, 0.25, "s", "intermittent control: psychological refractory period 100 to 250 ms"),
+    "horizon": Interval(0.15, 0.8, "s", "duration of a submovement in tracking: Miall et al. 1993 (m): some 0.3 s"),
+    "motor_noise": Interval(0.0, 0.05, "s", "Schmidt et al. 1979: spread of endpoints is proportional to A/T"),
+    "force_noise": Interval(0.0, 0.1, "", "Jones et al. 2002 (m): coefficient of variation of force, 2 to 5 %"),
+    "tremor": Interval(
+        0.0, 0.35, "m/s²", "normative study of postural tremor, Arch Neurol 39:358, 1982: 0.015 to 0.34"
+    ),
+    "tremor_frequency": Interval(6.0, 12.0, "Hz", "Lakie et al. 2015: a clear peak between 6 and 12 Hz"),
+    "correction": Interval(0.0, 1.0, "", "share of a perceived error that the next submovement makes up for"),
+    "caution": Interval(1.0, 4.0, "", "standard deviations of her own scatter that a person keeps within a target"),
+    "entrainment": Interval(0.0, 5.0, "1/s", "how fast her own clock gives way to a motion that runs ahead or behind"),
+    "learning": Interval(0.0, 0.5, "", "Thoroughman & Shadmehr 2000 (m): share learned a repetition, 0.1 to 0.3"),
+}
+"""Interval of every number of a `Person`, with its unit and its source."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person at the stylus; every number has an interval with its source in `INTERVALS`.
+
+    Parameters
+    ----------
+    name : str
+        For tables.
+    age : float
+        [years]; what follows from it is in the numbers already, as `population` draws them.
+    hand : {"right", "left"}
+        That holds the stylus: the ellipsoids of inertia and stiffness are mirrored.
+    skill : float
+        Share of the arm's own inertia that the motor command foresees.
+    grip : float
+        Force of the fingers on the stylus [N].
+    mass : float
+        Inertia of hand and arm at the stylus, across its heaviest direction [kg].
+    stiffness : float
+        Of the arm in its stiffest direction, at a grip of 2 N [N/m].
+    damping_ratio : float
+        Of the arm.
+    anisotropy : float
+        Stiffest over softest direction in the horizontal plane; of the inertia its square root.
+    grip_stiffness, grip_damping : float
+        Of the fingers between hand and stylus, at a grip of 2 N [N/m], [N s/m].
+    stiffening : float
+        Relative rise of stiffness and damping with grip [1/N].
+    strength : float
+        Largest force on the stylus [N].
+    fatigue : float
+        Rate at which force is lost [1/min]; 0 for none.
+    reflex_delay : float
+        Of force and motion that are felt [s].
+    reflex_gain : float
+        Share of the arm's stiffness that answers with this delay.
+    visual_delay : float
+        Of what is seen [s].
+    felt_noise, seen_noise : float
+        Standard deviation of a place that is felt, and of one that is seen [m].
+    refractory : float
+        Least time between two decisions [s].
+    horizon : float
+        Duration of a submovement in tracking [s].
+    motor_noise : float
+        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, half of it across [s].
+    force_noise : float
+        Standard deviation of a force over the force.
+    tremor, tremor_frequency : float
+        Root mean square of its acceleration [m/s²], and its frequency [Hz].
+    correction : float
+        Share of a perceived error that the next submovement makes up for.
+    caution : float
+        Standard deviations of her own scatter that she keeps within a target or a tunnel.
+    entrainment : float
+        Rate at which her own clock gives way to the motion [1/s].
+    learning : float
+        Share of a repeated error that is learned a repetition; 0 for none.
+
+    Raises
+    ------
+    SimError
+        If a number is outside of its interval, or the hand is neither.
+    """
+
+    name: str = "median"
+    age: float = 30.0
+    hand: Literal["right", "left"] = "right"
+    skill: float = 0.8
+    grip: float = 2.0
+    mass: float = 0.6
+    stiffness: float = 250.0
+    damping_ratio: float = 0.5
+    anisotropy: float = 2.0
+    grip_stiffness: float = 800.0
+    grip_damping: float = 8.0
+    stiffening: float = 0.15
+    strength: float = 15.0
+    fatigue: float = 0.0
+    reflex_delay: float = 0.04
+    reflex_gain: float = 0.15
+    visual_delay: float = 0.2
+    felt_noise: float = 0.006
+    seen_noise: float = 0.0015
+    refractory: float = 0.15
+    horizon: float = 0.3
+    motor_noise: float = 0.015
+    force_noise: float = 0.03
+    tremor: float = 0.06
+    tremor_frequency: float = 9.0
+    correction: float = 0.8
+    caution: float = 2.0
+    entrainment: float = 1.0
+    learning: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.hand not in ("right", "left"):
+            raise SimError(f"the hand of person {self.name!r} is {self.hand!r}; expected right or left")
+        for option in fields(self):
+            if option.name not in INTERVALS:
+                continue
+            value, (least, most, unit, _) = getattr(self, option.name), INTERVALS[option.name]
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise SimError(f"{option.name} of person {self.name!r} is {value!r}; expected a finite number")
+            if not least <= value <= most:
+                expected = f"expected {least:g} to {most:g} {unit}".rstrip()
+                raise SimError(f"{option.name} of person {self.name!r} is {value:g}; {expected}")
