@@ -78,7 +78,7 @@ class Cluster:
         return Row(*row)
 
     def _lost(self, error: BaseException) -> StudyError:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        said = (str(error).splitlines() or [type(error).__name__])[0].rpartition("reason: ")[2].rstrip(".")
         return StudyError(
             f"{self._where}: the scheduler is lost ({said}); every trial so far is kept; start it again to go on"
         )

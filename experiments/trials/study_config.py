@@ -25,13 +25,13 @@ class Users:
         How many simulated people.
     seed : int
         Of the population that they are drawn from.
-    does : {"relaxed", "trace", "push"}
-        What they mean to do.
+    does : str
+        What they mean to do, as ``hvf run --user`` has it.
     """
 
     number: int = whole(1, default=12)
     seed: int = whole(0, default=1)
-    does: Literal["relaxed", "trace", "push"] = "trace"
+    does: str = "trace"
 
 
 @part
