@@ -31,6 +31,7 @@ from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from experiments.trials.command import Trials  # noqa: E402
+from experiments.tuning.command import Tune  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
 from sim.errors import SimError  # noqa: E402
@@ -357,6 +358,7 @@ Command = (
     | Annotated[Repair, tyro.conf.subcommand("repair")]
     | Annotated[TeleArm, tyro.conf.subcommand("arm")]
     | Annotated[Trials, tyro.conf.subcommand("trials")]
+    | Annotated[Tune, tyro.conf.subcommand("tune")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]

@@ -1,10 +1,8 @@
 """A study that is run: planned, continued where it was left, analysed."""
 
 import hashlib
-import os
 import platform
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,13 +16,13 @@ from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.tidy import table, write_table
 from experiments.trials.code_hash import code_hash
 from experiments.trials.database import Database
-from experiments.trials.drive import Executor, run_missing, warm
+from experiments.trials.drive import run_missing, warm
 from experiments.trials.errors import StudyError
+from experiments.trials.executors import executor
 from experiments.trials.measures import MEASURES, measures_of
 from experiments.trials.plan import Trial, planned
 from experiments.trials.run_trial import SHELF, Row
 from experiments.trials.study_config import StudyConfig, read_toml, study_from
-from experiments.trials.threads import Threads
 
 DATABASE, SUMMARY, REPORT, CONTRASTS = "study.sqlite", "summary.json", "report.html", "contrasts.csv"
 
@@ -212,33 +210,3 @@ def _made(rows: Mapping[str, Row]) -> str:
         f"{len(rows)} trials took {spent:.0f} s of processor time, {spent / max(1, len(rows)):.3f} s each."
         + (" More than one kind of processor: their last bits may differ." if len(processors) > 1 else "")
     )
-
-
-@contextmanager
-def executor(threads: int | None, workers: int | None, cluster: str | None) -> Iterator[Executor]:
-    """Threads of this process, processes of this machine, or a scheduler's workers.
-
-    Raises
-    ------
-    StudyError
-        If more than one is asked for, or less than one thread or worker.
-    """
-    given = {"--threads": threads, "--workers": workers, "--cluster": cluster}
-    chosen = [name for name, value in given.items() if value is not None]
-    if len(chosen) > 1:
-        raise StudyError(f"{' and '.join(chosen)} contradict each other; expected one of them")
-    for name in chosen:
-        number = given[name]
-        if isinstance(number, int) and number < 1:
-            raise StudyError(f"{name} {number}: expected 1 or more")
-    if workers is None and cluster is None:
-        yield Threads(threads or os.cpu_count() or 1)
-        return
-    from experiments.trials.cluster import cluster_at, local_cluster  # Dask takes a second to import
-
-    if workers is not None:
-        with local_cluster(workers) as made:
-            yield made
-    elif cluster is not None:
-        with cluster_at(cluster) as made:
-            yield made

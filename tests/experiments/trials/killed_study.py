@@ -1,8 +1,9 @@
 """A study whose driver and workers are killed at random moments until it is done, for the tests.
 
-``python -m tests.experiments.trials.killed_study 20`` does it with 20 kills and compares the tables.
+``python tests/experiments/trials/killed_study.py 20`` does it with 20 kills and compares the tables.
 """
 
+import contextlib
 import random
 import subprocess
 import sys
@@ -51,32 +52,40 @@ def finish(driver: subprocess.Popen[bytes]) -> None:
 
 def workers_of(driver: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """Worker processes of a driver's local cluster."""
-    try:
-        children = psutil.Process(driver.pid).children(recursive=True)
-        return [child for child in children if any("spawn_main" in part for part in child.cmdline())]
-    except psutil.Error:
-        return []
+    found: list[psutil.Process] = []
+    with contextlib.suppress(psutil.Error):
+        for child in psutil.Process(driver.pid).children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                found += [child] if "spawn_main" in " ".join(child.cmdline()) else []
+    return found
 
 
 def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str, int]:
-    """Kill driver or a worker at random moments of a study with two workers, then let it finish; how often each was."""
-    rng, killed = random.Random(seed), {"driver": 0, "worker": 0}
-    driver, orphans = start(study, out, "--workers", "2"), list[psutil.Process]()
+    """Kill driver and workers in turn at random moments of a study with two workers, then let it finish.
+
+    Returns how often each was killed: fewer than asked for if the study was done before.
+    """
+    rng, killed, orphans = random.Random(seed), {"worker": 0, "driver": 0}, list[psutil.Process]()
+    driver = start(study, out, "--workers", "2")
     try:
         while sum(killed.values()) < kills:
-            time.sleep(rng.uniform(0.2, 6.0))
-            workers = workers_of(driver)
-            victim = "driver" if rng.random() < 0.5 or not workers else "worker"
-            if driver.poll() is not None:
-                break  # it is done before all the kills
-            if victim == "worker":
-                rng.choice(workers).kill()
-            else:
-                orphans += workers
+            if killed["worker"] > killed["driver"]:
+                time.sleep(rng.uniform(0.0, 8.0))
+                orphans += workers_of(driver)
                 driver.kill()
                 driver.communicate()
                 driver = start(study, out, "--workers", "2")
-            killed[victim] += 1
+                killed["driver"] += 1
+                continue
+            while not workers_of(driver) and driver.poll() is None:
+                time.sleep(0.1)
+            time.sleep(rng.uniform(0.0, 4.0))
+            workers = workers_of(driver)
+            if driver.poll() is not None or not workers:
+                break  # it is done before all the kills
+            with contextlib.suppress(psutil.Error):
+                rng.choice(workers).kill()
+            killed["worker"] += 1
         finish(driver)
     finally:
         driver.kill()
