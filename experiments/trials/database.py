@@ -53,8 +53,6 @@ class Database:
         try:
             with self._told():
                 self._db = sqlite3.connect(path, isolation_level=None)
-                self._db.execute("PRAGMA journal_mode = WAL")
-                self._db.execute("PRAGMA synchronous = NORMAL")
                 self._begin(identity, name, text)
         except BaseException:
             os.close(self._lock)
@@ -62,6 +60,7 @@ class Database:
 
     def _begin(self, identity: str, name: str, text: str) -> None:
         if not self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+            self._db.execute("PRAGMA journal_mode = WAL")  # kept in the file
             self._db.executescript(
                 f"BEGIN; {_TABLES} PRAGMA application_id = {_MARK}; PRAGMA user_version = {SCHEMA}; COMMIT;"
             )
@@ -77,6 +76,7 @@ class Database:
                 f"{self._path}: of version {version} of the database, this program writes {SCHEMA}; go on with the "
                 "program that began it, or give another --out"
             )
+        self._db.execute("PRAGMA synchronous = NORMAL")
         held = self._db.execute("SELECT identity, name FROM study").fetchone()
         if held is None:
             self._db.execute("INSERT INTO study VALUES (?, ?, ?)", (identity, name, text))

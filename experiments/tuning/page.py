@@ -28,7 +28,7 @@ h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
 p.note {{ font-size: .9rem; color: #566072; }}
 table {{ border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }}
 th, td {{ padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; }}
-th:first-child, td:first-child {{ text-align: left; }}
+th:first-child, td:first-child, td.l {{ text-align: left; }}
 img {{ max-width: 100%; }}
 pre {{ background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }}
 </style>
@@ -66,7 +66,7 @@ def tuning_page(
         contenders=_contenders(config, judged, comparisons),
         importances=_importances(importances),
         verdicts="".join(
-            f"<tr><td>{name}</td><td>{html.escape(reason)}</td></tr>" for name, reason in verdicts.items()
+            f"<tr><td>{name}</td><td class=l>{html.escape(reason)}</td></tr>" for name, reason in verdicts.items()
         ),
         text=html.escape(text),
     )
@@ -87,7 +87,9 @@ def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Se
         cells = ""
         for k, objective in enumerate(config.objectives):
             gain = gains.get((contender.name, objective))
-            told = "" if gain is None else f"{gain.better_by:.3g} ({gain.low:.3g} to {gain.high:.3g})"
+            told = "" if gain is None else _short(gain.better_by)
+            if gain is not None and math.isfinite(gain.low):
+                told += f" ({gain.low:.3g} to {gain.high:.3g})"
             cells += f"<td>{_short(float(contender.means[k]))}</td><td>{told}</td>"
         margin = "–" if contender.stability.margin is None else f"{contender.stability.margin:.3g}"
         rows.append(f"<tr><td>{html.escape(contender.name)}</td><td>{values}</td><td>{margin}</td>{cells}</tr>")

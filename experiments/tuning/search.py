@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import optuna
 from optuna.storages.journal import JournalFileBackend
-from optuna.trial import FrozenTrial, TrialState
+from optuna.trial import TrialState
 
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.tuning.panel import Panel, panel_runs
@@ -43,18 +43,10 @@ class Candidate(NamedTuple):
 
 def sampler_of(name: str, seed: int) -> optuna.samplers.BaseSampler:
     """A sampler for the next candidate alone: by its own seed a search that was stopped goes on as it would have."""
-
-    def violation(trial: FrozenTrial) -> Sequence[float]:
-        return (trial.user_attrs["violation"],)
-
     makers: dict[str, Callable[[], optuna.samplers.BaseSampler]] = {
-        "tpe": lambda: optuna.samplers.TPESampler(
-            seed=seed, multivariate=True, n_startup_trials=STARTUP, constraints_func=violation
-        ),
+        "tpe": lambda: optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=STARTUP),
         "cma-es": lambda: optuna.samplers.CmaEsSampler(seed=seed, n_startup_trials=STARTUP),
-        "nsga-ii": lambda: optuna.samplers.NSGAIISampler(
-            seed=seed, population_size=STARTUP, constraints_func=violation
-        ),
+        "nsga-ii": lambda: optuna.samplers.NSGAIISampler(seed=seed, population_size=STARTUP),
         "random": lambda: optuna.samplers.RandomSampler(seed=seed),
     }
     return makers[name]()
@@ -99,7 +91,8 @@ def search(
         if begun:
             trial = begun.pop()  # it was under way when the search was stopped
         else:
-            study.sampler = sampler_of(sampler, config.seed * 100_003 + all_of_them)
+            mixed = np.random.SeedSequence((config.seed, *sampler.encode(), all_of_them)).generate_state(1, np.uint32)
+            study.sampler = sampler_of(sampler, int(mixed[0]))
             trial = study.ask(space)
         _try(config, study, trial, panel)
 
@@ -116,6 +109,7 @@ def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Pa
     trial.set_user_attr("verdict", stability.verdict)
     trial.set_user_attr("margin", stability.margin)
     trial.set_user_attr("violation", violation)
+    trial.set_constraint("certificate", violation)
     if violation > 0.0:
         study.tell(trial, state=TrialState.PRUNED)
         return

@@ -226,6 +226,8 @@ def _sentence(config: TuneConfig, c: Comparison) -> str:
         return f"Against {c.contender}: that is refuted by the certificate, and was not tried."
     if c.objective == MARGIN:
         return f"Against {c.contender}, {unit}: {c.tuned:.3g} for {c.mean:.3g}."
+    if c.better_by == 0.0:
+        return f"Against {c.contender}, {unit}: the same, {c.tuned:.3g}."
     word = "better" if c.better_by > 0.0 else "worse"
     shown = "" if c.low > 0.0 or c.high < 0.0 else ", so no difference is shown"
     return (
