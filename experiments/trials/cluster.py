@@ -2,7 +2,7 @@
 
 import logging
 import socket
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -91,7 +91,7 @@ class Cluster:
 
 
 @contextmanager
-def local_cluster(workers: int) -> Iterator[Cluster]:
+def local_cluster(workers: int) -> Generator[Cluster]:
     """A cluster of so many processes of this machine, a trial at a time each; it ends with the block."""
     distributed = _distributed()
     import dask
@@ -108,7 +108,7 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
 
 
 @contextmanager
-def cluster_at(address: str) -> Iterator[Cluster]:
+def cluster_at(address: str) -> Generator[Cluster]:
     """The cluster of a scheduler that runs, such as ``tcp://host:8786``.
 
     Raises

@@ -1,7 +1,7 @@
 """Where trials run: on threads, in processes, or on a cluster, as is asked for."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from experiments.trials.drive import Executor
@@ -10,7 +10,7 @@ from experiments.trials.threads import Threads
 
 
 @contextmanager
-def executor(threads: int | None, workers: int | None, cluster: str | None) -> Iterator[Executor]:
+def executor(threads: int | None, workers: int | None, cluster: str | None) -> Generator[Executor]:
     """Threads of this process, processes of this machine, or a scheduler's workers.
 
     Raises

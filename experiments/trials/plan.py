@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -120,7 +120,7 @@ def _check_apart(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:
     seen: dict[str, int] = {}
     every = conditions(study)
     for number, config in bases.items():
-        told = to_json(cast(RunConfig, config))
+        told = to_json(config)
         if told in seen:
             one, other = (" and ".join(every[k].levels.values()) for k in (seen[told], number))
             raise StudyError(

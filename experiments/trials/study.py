@@ -195,11 +195,11 @@ def _one_each(trials: Sequence[Trial]) -> list[Trial]:
 
 def _told(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
     """What a reader of the database is told of each trial."""
-    return {
-        trial.key: {**trial.meeting.condition.levels, "user": trial.meeting.user}
-        | {"repetition": trial.meeting.repetition, "position": trial.meeting.position, "seed": trial.config.seed}
-        for trial in trials
-    }
+    told: dict[str, dict[str, object]] = {}
+    for key, met, config in trials:
+        place: dict[str, object] = {"user": met.user, "repetition": met.repetition, "position": met.position}
+        told[key] = {**met.condition.levels, **place, "seed": config.seed}
+    return told
 
 
 def _made(rows: Mapping[str, Row]) -> str:

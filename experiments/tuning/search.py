@@ -11,10 +11,11 @@ from optuna.trial import TrialState
 
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.tuning.panel import Panel, panel_runs
+from experiments.tuning.samplers import STARTUP, sampler_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig
 
+_TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
 REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
-STARTUP = 10  # candidates drawn at random before a sampler that learns begins to
 
 
 class Candidate(NamedTuple):
@@ -39,17 +40,6 @@ class Candidate(NamedTuple):
     verdict: str
     margin: float | None
     state: str
-
-
-def sampler_of(name: str, seed: int) -> optuna.samplers.BaseSampler:
-    """A sampler for the next candidate alone: by its own seed a search that was stopped goes on as it would have."""
-    makers: dict[str, Callable[[], optuna.samplers.BaseSampler]] = {
-        "tpe": lambda: optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=STARTUP),
-        "cma-es": lambda: optuna.samplers.CmaEsSampler(seed=seed, n_startup_trials=STARTUP),
-        "nsga-ii": lambda: optuna.samplers.NSGAIISampler(seed=seed, population_size=STARTUP),
-        "random": lambda: optuna.samplers.RandomSampler(seed=seed),
-    }
-    return makers[name]()
 
 
 def search(
@@ -82,23 +72,19 @@ def search(
         word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
         for word, span in config.space.items()
     }
-    begun = [optuna.trial.Trial(study, t._trial_id) for t in study.get_trials(states=(TrialState.RUNNING,))]
+    for begun in study.get_trials(states=(TrialState.RUNNING,)):
+        study.tell(begun.number, state=TrialState.FAIL)  # it was under way when the search was stopped: asked for again
     while True:
-        simulated, all_of_them = _simulated(study), len(study.get_trials(deepcopy=False))
+        simulated, all_of_them = _simulated(study), len(study.get_trials(deepcopy=False, states=_TOLD))
         progress(simulated)
         if simulated >= config.candidates or all_of_them >= REFUSED_MOST * config.candidates:
             return candidates_of(study)
-        if begun:
-            trial = begun.pop()  # it was under way when the search was stopped
-        else:
-            mixed = np.random.SeedSequence((config.seed, *sampler.encode(), all_of_them)).generate_state(1, np.uint32)
-            study.sampler = sampler_of(sampler, int(mixed[0]))
-            trial = study.ask(space)
-        _try(config, study, trial, panel)
+        study.sampler = sampler_of(sampler, config.seed, all_of_them)
+        _try(config, study, study.ask(space), panel)
 
 
 def _simulated(study: optuna.Study) -> int:
-    trials = study.get_trials(deepcopy=False)
+    trials = study.get_trials(deepcopy=False, states=_TOLD)
     return sum(t.state.is_finished() and t.user_attrs.get("violation", 1.0) <= 0.0 for t in trials)
 
 
@@ -114,12 +100,10 @@ def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Pa
         study.tell(trial, state=TrialState.PRUNED)
         return
     values = _objectives(config, trial, panel, stability)
-    if values is None:
+    if values is None or not np.all(np.isfinite(values)):
         study.tell(trial, state=TrialState.PRUNED)
-    elif np.all(np.isfinite(values)):
-        study.tell(trial, values)
     else:
-        study.tell(trial, state=TrialState.FAIL)
+        study.tell(trial, values)
 
 
 def violation_of(config: TuneConfig, stability: Stability) -> float:
@@ -151,12 +135,10 @@ def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability
 def candidates_of(study: optuna.Study) -> list[Candidate]:
     """All that were proposed, in their order."""
     made: list[Candidate] = []
-    for t in study.get_trials(deepcopy=False):
+    for t in study.get_trials(deepcopy=False, states=_TOLD):
         attributes: dict[str, Any] = t.user_attrs
-        if "violation" not in attributes:
-            continue
         state = "refused" if attributes["violation"] > 0.0 else "tried" if t.values is not None else "given up"
-        values = None if t.state != TrialState.COMPLETE else tuple(t.values)
+        values = None if t.values is None else tuple(t.values)
         made.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
     return made
 

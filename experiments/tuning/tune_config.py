@@ -94,7 +94,8 @@ class TuneConfig:
 
     def config(self, values: Mapping[str, float]) -> RunConfig:
         """The run of a candidate, with nobody at the stylus yet."""
-        return run_config(**(self.run | dict(values) | {"seconds": self.seconds}))
+        words: Words = self.run | dict(values) | {"seconds": self.seconds}
+        return run_config(**words)
 
 
 def more_is_better(objective: str) -> bool:

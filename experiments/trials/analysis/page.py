@@ -32,6 +32,7 @@ p.note {{ font-size: .9rem; color: #566072; }}
 table {{ border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }}
 th, td {{ padding: .25rem .7rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; white-space: nowrap; }}
 th:first-child, td:first-child, th.l, td.l {{ text-align: left; }}
+td.says {{ white-space: normal; text-align: left; }}
 tr.weak {{ color: #7b8698; }}
 iframe {{ width: 100%; height: min(38rem, 75vh); border: 1px solid #d9dde4; border-radius: 6px; }}
 img {{ max-width: 100%; }}
@@ -176,7 +177,7 @@ def _interactions(found: Statistics) -> str:
 def _measure_row(name: str) -> str:
     measure = MEASURES[name]
     says = f"{measure.says}; {measure.better} is better"
-    return f"<tr><td>{html.escape(measure.label)}</td><td class=l>{html.escape(says)}</td></tr>"
+    return f"<tr><td>{html.escape(measure.label)}</td><td class=says>{html.escape(says)}</td></tr>"
 
 
 def _failures(failures: Mapping[str, int]) -> str:

@@ -11,7 +11,7 @@ from experiments.trials.analysis.replays import replays
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Statistics, statistics
 from experiments.trials.analysis.tidy import measured_columns
-from experiments.trials.measures import MEASURES
+from experiments.trials.measures import MEASURES, OF_CONDITIONS
 from experiments.trials.plan import Trial
 from experiments.trials.study_config import StudyConfig
 
@@ -38,7 +38,7 @@ def write_report(
     """
     import pandas as pd
 
-    measures = measured_columns(frame)
+    measures = [name for name in measured_columns(frame) if name not in OF_CONDITIONS]
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()

@@ -122,7 +122,7 @@ def statistics(
             interactions[measure] = interaction
         for factor, levels in factors.items():
             for level in levels[1:]:
-                fit = fits.get((factor, level), (np.nan,) * 4)
+                fit = fits.get((factor, level), (np.nan, np.nan, np.nan, np.nan))
                 rng = np.random.default_rng([seed, len(found)])
                 made = _contrast(rows, (measure, factor, level, levels[0]), factor in between, fit, rng)
                 if made is not None:
@@ -184,31 +184,29 @@ def _contrast(
     if level not in means.index or reference not in means.index:
         return None
     one, other = means[level], means[reference]
+    samples: tuple[Array, ...] = (one.to_numpy(), other.to_numpy()) if between else ((one - other).dropna().to_numpy(),)
     if between:
-        samples: tuple[Array, ...] = (one.to_numpy(), other.to_numpy())
-        difference, effect, agree = float(samples[0].mean() - samples[1].mean()), hedges_g(*samples), 0
-
-        def statistic(a: Array, b: Array, axis: int = -1) -> Array:
-            return np.mean(a, axis=axis) - np.mean(b, axis=axis)
+        effect, agree = hedges_g(*samples), 0
     else:
-        pairs = (one - other).dropna().to_numpy()
-        samples, difference = (pairs,), float(pairs.mean()) if len(pairs) else np.nan
-        effect, agree = cohen_dz(pairs), int(np.sum(np.sign(pairs) == np.sign(difference)))
-
-        def statistic(a: Array, axis: int = -1) -> Array:  # pyright: ignore[reportRedeclaration]
-            return np.mean(a, axis=axis)
-
+        effect, agree = cohen_dz(samples[0]), int(np.sum(np.sign(samples[0]) == np.sign(np.mean(samples[0]))))
+    difference = float(_difference(*samples))
     low = high = np.nan
     if all(len(sample) > 2 for sample in samples) and any(map(_spreads, samples)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a degenerate sample, whose interval is then NaN and shown as such
-            ends = bootstrap(samples, statistic, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
+            ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
         low, high = (float(end) for end in ends.confidence_interval)
     users = len(samples[0]) if not between else len(one) + len(other)
     return Contrast(
         measure, factor, level, reference, users, float(one.mean()), float(other.mean()), difference, low, high, *fit,
         p_holm=np.nan, effect=effect, agree=agree,
     )  # fmt: skip
+
+
+def _difference(*samples: Array, axis: int = -1) -> Array:
+    """Of the means of two samples, or the mean of one of paired differences."""
+    means = [np.mean(sample, axis=axis) for sample in samples]
+    return means[0] if len(means) == 1 else means[0] - means[1]
 
 
 def _spreads(sample: Array) -> bool:
@@ -242,6 +240,6 @@ def _corrected(found: Sequence[Contrast]) -> tuple[Contrast, ...]:
     made = list(found)
     if tested:
         corrected = multipletests([found[k].p for k in tested], method="holm")[1]
-        for k, p in zip(tested, corrected, strict=True):
+        for k, p in zip(tested, np.asarray(corrected, dtype=np.float64), strict=True):
             made[k] = replace(found[k], p_holm=float(p))
     return tuple(made)

@@ -47,11 +47,10 @@ def table(
         found = {name: row.measures.get(name, float("nan")) for name in measures}
         if row.state == "done":
             found |= {name: margins.get(met.number, float("nan")) for name in OF_CONDITIONS if name in measures}
-        records.append(
-            {"key": trial.key, "user": met.user, **met.condition.levels, "repetition": met.repetition}
-            | {"position": met.position, "seed": trial.config.seed, "state": row.state, "reason": row.reason}
-            | found
-        )
+        record: dict[str, object] = {"key": trial.key, "user": met.user, **met.condition.levels}
+        record |= {"repetition": met.repetition, "position": met.position, "seed": trial.config.seed}
+        record |= {"state": row.state, "reason": row.reason, **found}
+        records.append(record)
     return pd.DataFrame.from_records(records)
 
 
