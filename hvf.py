@@ -37,6 +37,7 @@ from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from sim.errors import SimError
+from sim.users import intents
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
 from sim.users.population import persona, population
@@ -80,6 +81,7 @@ __all__ = [
     "certify",
     "circle",
     "clips",
+    "intents",
     "law",
     "load",
     "persona",

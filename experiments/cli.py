@@ -324,6 +324,32 @@ class Bench:
         return 0
 
 
+@part
+class Users:
+    """Hold simulated people against the published laws of human movement: a table, and a figure each."""
+
+    out: Path = Path("runs/users")
+    """Folder to write."""
+    people: Annotated[int, whole(1)] = 12
+    """How many people of a population take part."""
+    seed: Annotated[int, whole(0)] = 2
+    """Of the population and of its noise."""
+    laws: tuple[str, ...] = ()
+    """fitts, scatter, steering, power-law, tremor, step-response, grip; all by default."""
+    overwrite: bool = False
+    """Replace the table that the folder holds."""
+    json: bool = False
+    """Print the table as JSON."""
+
+    def __call__(self) -> int:
+        """Exit code 0 if every law holds, 1 if one does not."""
+        from experiments.studies.user_laws.report import TABLE, laws_into, lines
+
+        laws = laws_into(self.out, self.people, self.seed, self.laws, self.overwrite)
+        print((self.out / TABLE).read_text(encoding="utf-8").rstrip() if self.json else "\n".join(lines(laws)))
+        return 0 if all(law.holds for law in laws) else 1
+
+
 @dataclass(frozen=True)
 class Clips:
     """Name the embedded clips."""
@@ -362,6 +388,7 @@ Command = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Users, tyro.conf.subcommand("users")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
 

@@ -135,7 +135,7 @@ def _simulate(
 
     laws = session.parts.program.python_laws
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
-    loop = Loop(servo, session.world, observe, block, laws)
+    loop = Loop(servo, session.world, observe, block, laws, **session.asking)
     first = servo.plant.period * servo.figure_ticks
     loop.run(first)
     first_tick = time.perf_counter() - started

@@ -21,7 +21,7 @@ from experiments.config.run_config import User as RunUser
 from experiments.run_result import Run
 from experiments.setups.budget import SPAN, fastest, tank_for
 from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, reached
-from experiments.setups.hands import wishes_of
+from experiments.setups.hands import intent_of, participant
 from experiments.setups.parts import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.stylus import stylus_path
@@ -31,6 +31,7 @@ from models.scene import SceneConfig
 from sim.loop.loop import Loop
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push, Turn
+from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person import Person
 from sim.world.world import World
@@ -112,6 +113,8 @@ class User:
         A curve that it means to trace, again and again.
     person : Person, optional
         Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
+    intent : PersonIntent, optional
+        What the person means to do, one of `hvf.intents`; by default what the above say.
     """
 
     pushes: Sequence[Push] = ()
@@ -119,6 +122,7 @@ class User:
     grabs: Sequence[Grab] = ()
     traces: Trajectory | None = field(default=None, repr=False)
     person: Person | None = None
+    intent: PersonIntent | None = None
 
     def hand(self, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
         """The hand for a run of so long [s] about a curve, with a seed.
@@ -126,12 +130,16 @@ class User:
         Raises
         ------
         ParameterError
-            If a person is to do what only an arm can.
+            If an intent has no person, or a person is to turn the stylus.
         """
+        if self.intent is not None and self.person is None:
+            raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
         if self.person is not None:
+            if self.turns:
+                raise ParameterError("a person lets the stylus swing and does not turn it; leave out the turns")
             does = "relaxed" if self.traces is None else "trace"
-            user = RunUser(does=does, pushes=tuple(self.pushes), turns=tuple(self.turns), grabs=tuple(self.grabs))
-            return Participant(self.person, wishes_of(user, self.traces or curve, seconds), seed)
+            user = RunUser(does=does, pushes=tuple(self.pushes), grabs=tuple(self.grabs))
+            return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
         if self.traces is None:
             return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
         path = self.traces.point(np.arange(0.0, seconds, 0.01))
@@ -261,7 +269,7 @@ class Simulation:
     def __iter__(self) -> Iterator[Tick]:
         """Step tick by tick, for ever: ``for tick in sim``."""
         session = self.session()
-        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws)
+        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         while True:
             ticks, frames = loop.step()
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()

@@ -14,6 +14,9 @@ from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
 from sim.world.world import FigureKind
 
+PERSONAL = ("exaggerate", "cut", "change", "resist", "lost")
+"""What only a person does, who sees and feels."""
+
 
 @part
 class User:
@@ -21,9 +24,10 @@ class User:
 
     Parameters
     ----------
-    does : {"relaxed", "trace", "push", "turn", "lead"}
+    does : {"relaxed", "trace", "push", "turn", "lead", "exaggerate", "cut", "change", "resist", "lost"}
         A hand that lets go; one that traces the curve by itself; one that pushes; one that turns the stylus; and the
-        one that leads a figure.
+        one that leads a figure. A person also exaggerates here and calms there, cuts a corner, changes over to another
+        motion, resists, or gets lost and comes back.
     pushes : tuple of Push
         By default of a hand that pushes: outwards and inwards once a lap from the second lap on; on rivers over into
         another one; on the rivers of a lifted map at the best transition, and three laps later back.
@@ -35,11 +39,26 @@ class User:
         Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
     """
 
-    does: Literal["relaxed", "trace", "push", "turn", "lead"] = "relaxed"
+    does: Literal["relaxed", "trace", "push", "turn", "lead", "exaggerate", "cut", "change", "resist", "lost"] = (
+        "relaxed"
+    )
     pushes: tuple[Push, ...] = ()
     turns: tuple[Turn, ...] = ()
     grabs: tuple[Grab, ...] = ()
     person: Person | None = None
+
+    def __post_init__(self) -> None:
+        if self.person is None and self.does in PERSONAL:
+            raise ParameterError(f"only a person can {self.does}; add a person, such as --person median")
+        if self.person is not None and (self.does == "turn" or self.turns):
+            raise ParameterError(
+                "a person lets the stylus swing and does not turn it; leave out the person or the turn"
+            )
+
+    @property
+    def traces(self) -> bool:
+        """Whether the hand moves along a way of its own."""
+        return self.does == "trace" or self.does in PERSONAL
 
 
 @part

@@ -16,13 +16,13 @@ import tyro
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
 from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
-from experiments.config.run_config import Clock, Figure, Phantom, RunConfig, User, load_config
+from experiments.config.run_config import PERSONAL, Clock, Figure, Phantom, RunConfig, User, load_config
 from sim.users.population import PERSONAS, persona
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Parts of a mode that an option switches on: its own name, or one of its numbers for those that are zero without."""
 _SWITCHES = ("governor", "walls")
-_USERS = ("relaxed", "trace", "push", "turn")
+_USERS = ("relaxed", "trace", "push", "turn", *PERSONAL)
 _NOT_WORDS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
 
 
@@ -219,7 +219,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("config", Path | None, "A configuration in a JSON file; other options change it.", None)
     yield option("mode", str, "Field of force: " + ", ".join(_kinds(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, or a map's file (.npz).", "")
-    yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + ".", "")
+    yield option("user", str, "The simulated hand: " + ", ".join(_USERS) + "; the last five of a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)

@@ -67,7 +67,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
     user = resolved_user(config.user, maps.curve, config.seconds, pushes=field.pushes)
     drag = 0.0 if mode.governor is None else mode.governor.governor_drag
     power, limiter = field.power + river_power(drag, field.urged), ForceLimiter(config.clock.servo_period)
-    traces = user.does == "trace"
+    traces = user.traces
     program = with_moment(field.law.program(), mode.orientation, field.course, field.tube)
     return Parts(
         config=replace(config, user=user), maps=maps, field=field.law, program=with_walls(program, mode.walls, maps),

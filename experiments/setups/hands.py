@@ -11,8 +11,21 @@ from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
 from sim.users.arm import Arm
 from sim.users.intent import Grab, Push
+from sim.users.intents import (
+    Bend,
+    ChangeOver,
+    CutCorner,
+    Exaggerate,
+    GetLost,
+    Own,
+    Press,
+    Relax,
+    Resist,
+    Trace,
+)
+from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
-from sim.users.wishes import Wishes, following, resting
+from sim.users.person import Person
 
 Array = npt.NDArray[np.float64]
 
@@ -24,7 +37,6 @@ _CROSSING = 0.5  # of the lap, where the wave rises through the level river
 _LEAD, _OVER = 0.05, 0.3  # [s] before it, when a push across begins, and [s] that it lasts
 _PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
 _AWAY = 1e-3  # [m] by which beginnings differ
-_WISH_PERIOD = 0.02  # [s] between two wishes of a person: shorter than any submovement
 _SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
 
 
@@ -87,7 +99,7 @@ def resolved_user(
         If a hand that traces should grab.
     """
     grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
-    if user.does == "trace" and grabs:
+    if user.traces and grabs:
         raise ParameterError("a hand that traces cannot grab; choose --user relaxed, push or turn")
     if user.does == "turn" and not turns:
         laps = range(1, max(2, int(seconds / lap)))
@@ -107,30 +119,40 @@ def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm |
 
     Raises
     ------
-    ParameterError
-        If a person is to do what only an arm can.
+    SimError
+        If a push or a grab is none that a person can do.
     """
     if user.person is not None:
-        return Participant(user.person, wishes_of(user, curve, seconds), seed)
+        return participant(user.person, intent_of(user), curve, seconds, seed)
     if user.does == "trace":
         times = np.arange(0.0, seconds, 0.01)
         return Arm(path=curve.point(times), period=0.01, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
 
 
-def wishes_of(user: User, curve: Trajectory, seconds: float) -> Wishes:
-    """What a person wants who does what a user does.
+def participant(person: Person, intent: PersonIntent, curve: Trajectory, seconds: float, seed: int) -> Participant:
+    """A person who means to do something about a curve, for a run of so long [s] and its seed."""
+    own = intent if isinstance(intent, Own) else None
+    return Participant(person, intent.wishes(curve, seconds, seed), seed, own)
+
+
+def intent_of(user: User) -> PersonIntent:
+    """What a person means to do, by what is asked for.
 
     Raises
     ------
-    ParameterError
-        If that is not a person's.
+    SimError
+        If a push or a grab is none that a person can do.
     """
-    if user.turns or user.grabs or user.does not in ("relaxed", "trace"):
-        raise ParameterError(f"a person cannot {user.does} yet; choose --user relaxed or trace, or leave out --person")
-    times = np.arange(0.0, seconds + _WISH_PERIOD, _WISH_PERIOD)
-    rows = resting(len(times)) if user.does == "relaxed" else following(curve.point(curve.start + times))
-    return Wishes(rows, _WISH_PERIOD, curve.duration)
+    if user.grabs:
+        return Bend(user.grabs)
+    return Press(user.pushes) if user.pushes else _INTENTS[user.does]
+
+
+_INTENTS: dict[str, PersonIntent] = {
+    "relaxed": Relax(), "push": Relax(), "trace": Trace(), "exaggerate": Exaggerate(), "cut": CutCorner(),
+    "change": ChangeOver(), "resist": Resist(), "lost": GetLost(),
+}  # fmt: skip
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
@@ -140,7 +162,7 @@ def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
 
 def handled(user: User) -> tuple[tuple[float, float], ...]:
     """From and until when [s] a hand does something else than push: it grabs or traces."""
-    if user.does == "trace":
+    if user.traces:
         return ((0.0, np.inf),)
     return tuple((grab.at, grab.end) for grab in user.grabs)
 

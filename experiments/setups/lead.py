@@ -21,6 +21,7 @@ from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
 from experiments.setups.figure_legs import figure_legs
+from experiments.setups.hands import participant
 from experiments.setups.led_balance import balanced_on_ground, led_gains
 from experiments.setups.parts import MapParts, Measuring, Notes, Parts
 from models.humanoid.skeleton import CONTACT_RADIUS
@@ -28,6 +29,8 @@ from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.laps import CLOSES, lap_of
 from sim.users.arm import Arm
+from sim.users.intents import Lead as LeadIntent
+from sim.users.participant import Participant
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -192,7 +195,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
         return replace(summary, lead=lead)
 
     return Parts(
-        config=config, maps=maps, field=field, program=field.program(), course=course, user=leading_hand(field),
+        config=config, maps=maps, field=field, program=field.program(), course=course, user=_hand(config, field),
         tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walker=field.walker,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
@@ -226,6 +229,14 @@ def leading_hand(field: Leading, period: float = 0.01) -> Arm:
         np.tile(end, (round(PAUSE / period), 1)), end + back[:, None] * (start - end),
     ])  # fmt: skip
     return Arm(STIFFNESS, path=path, period=period)
+
+
+def _hand(config: RunConfig, field: Leading) -> Arm | Participant:
+    """The hand that leads: an arm's, or a person's along the same path."""
+    arm, person = leading_hand(field), config.user.person
+    if person is None:
+        return arm
+    return participant(person, LeadIntent(arm.path, arm.period), s_curve(), config.seconds, config.seed)
 
 
 def walker_argument(s: Array) -> Array:

@@ -1,6 +1,8 @@
 """A run that is wired up: its parts, and what of them a recording keeps."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +16,9 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import FIGURE, P_WH
+from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
+from sim.users.participant import Participant
 from sim.world.world import World
 
 
@@ -51,6 +55,15 @@ class Session:
     def haptic_map(self) -> HapticMap:
         """The map of the figure, with gaze and lean if it has them."""
         return self.parts.maps.whole_map
+
+    @property
+    def asking(self) -> Mapping[str, Any]:
+        """What the loop is told of a person's intent in Python (see `sim.loop.loop.Loop`)."""
+        user, device = self.parts.user, self.servo.device
+        own = user.own if isinstance(user, Participant) else None
+        if own is None or own.compiled or not isinstance(device, SimulatedPhantom):
+            return {}
+        return {"ask": lambda t: own.ask(device.user.person, t), "ask_seconds": own.every}
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """What the recording keeps beside the channels."""

@@ -100,9 +100,7 @@ def _parts(
     # A press of the switch leaves the search for the rubber: its energy once a second.
     springs = ((max(seek, mode.rubber), SPAN), *performance.springs)
     power = spring_store(mode.rubber, mode.rubber_tube) + performance.power
-    notes = Notes(
-        mode.kind.upper(), mode.rubber_tube, "tube", hand_does="traces" if user.does == "trace" else "grabs or pushes"
-    )
+    notes = Notes(mode.kind.upper(), mode.rubber_tube, "tube", hand_does="traces" if user.traces else "grabs or pushes")
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
         of.save_curve(tubes.edited(of.memory))

@@ -12,6 +12,7 @@ from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved
+from experiments.setups.eyes import POSES, with_eyes
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.hands import Beginning, beginning
 from experiments.setups.parts import MapParts, Parts, Settings
@@ -40,6 +41,7 @@ from sim.reference.reference import (
 from sim.reference.reference_state import CompiledReference
 from sim.reference.settling import stood, stood_unit
 from sim.users.arm import Arm
+from sim.users.participant import Participant
 from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
 from sim.world.world import World
@@ -109,6 +111,9 @@ def assemble(world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts]
     refined = maps.refine() if world.kind != "none" else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world).linked(parts.program)
+    if isinstance(parts.user, Participant) and world.kind != "none" and parts.walker is None:
+        phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
+        servo = with_eyes(servo, parts.user, parts.maps.curve.point(phases))
     _begin(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks + _pace_remark(parts.maps))
 

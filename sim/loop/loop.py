@@ -128,6 +128,9 @@ class Loop:
     before_tick : callable, optional
         Called with the number of each tick before it, as a driver in Python is that writes the readings of an
         `Exchange` and takes its commands; it may wait for the time of the tick. Blocks then go tick by tick.
+    ask : callable, optional
+        Called with the time [s] every `ask_seconds`, rounded up to whole figure updates, before the tick: what a person
+        of the device wants (see `sim.users.intents.own`). Blocks end where it is called.
 
     Raises
     ------
@@ -143,6 +146,8 @@ class Loop:
         block_seconds: float = BLOCK_SECONDS,
         python_laws: Sequence[Callable[[HandState], Array]] = (),
         before_tick: Callable[[int], None] | None = None,
+        ask: Callable[[float], None] | None = None,
+        ask_seconds: float = BLOCK_SECONDS,
     ):
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
@@ -152,6 +157,7 @@ class Loop:
         self._slots: list[int] = servo.field.slots.tolist()
         self._laws = tuple(python_laws)
         self._before_tick = before_tick
+        self._ask, self._ask_ticks = ask, every * max(1, -int(-ask_seconds / servo.plant.period // every))
         if len(self._laws) != len(self._slots):
             raise SimError(
                 f"the field has {len(self._slots)} slots for laws in Python, {len(self._laws)} are given; "
@@ -191,6 +197,9 @@ class Loop:
         begin = time.perf_counter()
         while self._tick < first + wanted:
             n = min(self._block, first + wanted - self._tick)
+            if self._ask is not None:
+                n = min(n, self._ask_ticks - self._tick % self._ask_ticks)
+                self._asked()
             if self._laws or self._before_tick is not None:
                 self._run_with_laws(n, ticks, frames)
             else:
@@ -205,12 +214,17 @@ class Loop:
         if self._one is None:
             self._one = make_logs(self.servo, 1)
         ticks, frames = self._one
+        self._asked()
         if self._laws or self._before_tick is not None:
             self._run_with_laws(1, ticks, frames)
         else:
             run_block(self.servo, self._tick, 1, False, ticks, frames)
         self._tick += 1
         return ticks, frames
+
+    def _asked(self) -> None:
+        if self._ask is not None and self._tick % self._ask_ticks == 0:
+            self._ask(self.time)
 
     def _run_with_laws(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
         servo, every = self.servo, self.servo.figure_ticks

@@ -9,6 +9,8 @@ from sim.errors import SimError
 from sim.users import person_state as at
 from sim.users.body import arm_matrices, check_steps
 from sim.users.chance import fresh_chance
+from sim.users.eye import LOOKS, no_eye
+from sim.users.intents.own import Own
 from sim.users.person import Person
 from sim.users.person_state import PersonState
 from sim.users.submovement import refinement
@@ -30,11 +32,14 @@ class Participant:
         What she wants.
     seed : int
         Of her noise: the same seed, the same run.
+    own : Own, optional
+        The caller's own intent, that writes her wishes.
     """
 
     person: Person = field(default_factory=Person)
     wishes: Wishes = field(default_factory=Wishes)
     seed: int = 1
+    own: Own | None = None
 
     turns: tuple[()] = ()
     """She lets the gimbal swing."""
@@ -61,12 +66,14 @@ class Participant:
         check_steps(person, physics_step)
         inertia, stiffness, damping = arm_matrices(person)
         reflex, seen = (max(1, round(delay / period)) for delay in (person.reflex_delay, person.visual_delay))
+        address = 0 if self.own is None else self.own.address()
         return PersonState(
-            units=np.zeros(2, dtype=np.int64), numbers=self._numbers(period, reflex, seen),
+            units=np.array([0, address], dtype=np.int64), numbers=self._numbers(period, reflex, seen),
             memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
             inertia=inertia, mobility=np.linalg.inv(inertia), stiffness=stiffness, damping=damping,
-            wishes=np.ascontiguousarray(self.wishes.rows), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
+            wishes=self.wishes.rows.copy(), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
             plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
+            eye=no_eye(),
         )  # fmt: skip
 
     def _numbers(self, period: float, reflex: int, seen: int) -> at.Array:
@@ -77,8 +84,9 @@ class Participant:
             n[getattr(at, name.upper())] = getattr(person, name)
         n[at.PERIOD], n[at.WISH_PERIOD], n[at.LAP] = period, self.wishes.period, self.wishes.lap
         n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen
+        n[at.LOOK_TICKS] = max(1, round(LOOKS / period))
         n[at.TREMOR_A], n[at.TREMOR_B], n[at.TREMOR_GAIN] = tremor_filter(person, period)
-        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.refractory)
+        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.visual_delay)
         return n
 
 

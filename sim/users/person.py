@@ -147,10 +147,10 @@ class Person:
     reflex_gain: float = 0.15
     visual_delay: float = 0.2
     felt_noise: float = 0.006
-    seen_noise: float = 0.0015
+    seen_noise: float = 0.0004
     refractory: float = 0.15
     horizon: float = 0.3
-    motor_noise: float = 0.015
+    motor_noise: float = 0.007
     force_noise: float = 0.03
     tremor: float = 0.06
     tremor_frequency: float = 9.0

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from sim.users.eye import Eye, no_eye
 from sim.users.wishes import WISH_SIZE
 
 Array = npt.NDArray[np.float64]
@@ -12,20 +13,23 @@ IntArray = npt.NDArray[np.int64]
 
 (GRIP, STIFFENING, GRIP_STIFFNESS, GRIP_DAMPING, STRENGTH, FATIGUE, REFLEX_GAIN, SKILL, FELT_NOISE, SEEN_NOISE,
  REFRACTORY, HORIZON, MOTOR_NOISE, FORCE_NOISE, TREMOR_GAIN, TREMOR_A, TREMOR_B, CORRECTION, CAUTION, ENTRAINMENT,
- LEARNING, REFINEMENT, PERIOD, WISH_PERIOD, LAP, REFLEX_TICKS, SEEN_TICKS, N_NUMBERS) = range(28)  # fmt: skip
+ LEARNING, REFINEMENT, PERIOD, WISH_PERIOD, LAP, REFLEX_TICKS, SEEN_TICKS, LOOK_TICKS,
+ N_NUMBERS) = range(29)  # fmt: skip
 """Numbers of a person, of her wishes, and her delays in ticks; the tremor's are of its filter."""
 
-(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, N_MEMORY) = range(11)
+(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, SIGHTED,
+ CALM, N_MEMORY) = range(13)  # fmt: skip
 """What she remembers: whether she has begun, ticks so far, her own clock [s], when her submovement began and how long
 it lasts [s], when she last decided [s], share of her strength that is left, the target whose turn it is, how far she is
-engaged, and impedance over that of the reference grip."""
+engaged, impedance over that of the reference grip, which pose along the motion she last saw, and until
+when the hand was where it should be [s]."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,
- TREMOR, TREMOR_BEFORE, FELT_FORCE, N_VECTORS) = range(17)  # fmt: skip
+ TREMOR, TREMOR_BEFORE, FELT_FORCE, SHOWN, N_VECTORS) = range(18)  # fmt: skip
 """Vectors in H: the hand's position and velocity; what the muscles drive it to (position, velocity, acceleration); the
 way that was intended so far; what sight adds to what is felt; noise of what is felt and seen; where she believes her
-hand is; the force that she wants; the reflexes'; noise of force; tremor now and a tick ago; and the force that she
-feels."""
+hand is; the force that she wants; the reflexes'; noise of force; tremor now and a tick ago; the force that she
+feels; and the place that is shown."""
 
 SENSED, DEVIATION, DEVIATING, SEEN, INTENT, PRESSED, PAST_SIZE = 0, 3, 6, 9, 12, 15, 18
 """Columns of what was: place that is felt, deviation from where she is driven and its rate, place that is seen, way
@@ -56,6 +60,8 @@ class PersonState(NamedTuple):
         Forces [N] by part of a lap, shape (`LEARNED_PARTS`, 3).
     chance : Array of uint64
         Of her random numbers.
+    eye : Eye
+        What she compares the figure with.
     """
 
     units: IntArray
@@ -71,6 +77,7 @@ class PersonState(NamedTuple):
     plans: Array
     learned: Array
     chance: npt.NDArray[np.uint64]
+    eye: Eye
 
 
 def nobody() -> PersonState:
@@ -79,5 +86,5 @@ def nobody() -> PersonState:
     return PersonState(
         np.zeros(2, dtype=np.int64), none, none.copy(), square, square, square, square, square,
         np.zeros((0, WISH_SIZE)), np.zeros((0, PAST_SIZE)), np.zeros((0, 6, 3)), square,
-        np.zeros(0, dtype=np.uint64),
+        np.zeros(0, dtype=np.uint64), no_eye(),
     )  # fmt: skip

@@ -12,10 +12,13 @@ from numba import njit
 
 from sim.users.body import REFERENCE_GRIP
 from sim.users.chance import normal
+from sim.users.eye import seen_place
+from sim.users.own_intent import call_intent
 from sim.users.person_state import (
     BEGUN,
     BELIEF,
     BLUR,
+    CALM,
     CAPACITY,
     CAUTION,
     CLOCK,
@@ -45,6 +48,7 @@ from sim.users.person_state import (
     LASTS,
     LEARNED_PARTS,
     LEARNING,
+    LOOK_TICKS,
     MOTOR_NOISE,
     OFFSET,
     PERIOD,
@@ -58,6 +62,8 @@ from sim.users.person_state import (
     SEEN_NOISE,
     SEEN_TICKS,
     SENSED,
+    SHOWN,
+    SIGHTED,
     SKILL,
     STARTED,
     STIFFENING,
@@ -81,7 +87,7 @@ from sim.users.wishes import GRIP as WISHED_GRIP
 
 Array = npt.NDArray[np.float64]
 
-DRIFT_TIME = 20.0  # [s] in which the felt place of an unseen hand drifts: tens of seconds (Wann & Ibrahim 1992, m)
+DRIFT_TIME = 60.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] of what is seen: a fixation
 CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
 UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 2002, m)
@@ -89,7 +95,8 @@ ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical del
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
 LEAST_SECONDS = 0.16  # [s] of the shortest submovement
-SURPRISE = 0.004  # [m] from where it should be, a hand is looked after at once
+WATCHED = 0.8  # of a submovement's time: 94 % of its way, by which it is seen where it ends
+SURPRISE, REACTION = 0.004, 0.08  # [m] from where it should be, a hand is looked after within so long [s]
 RECOVERY = 2.4  # [1/min] at which force comes back (Liang et al. 2009, m)
 
 
@@ -127,7 +134,7 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
     """Begin where the stylus is, at its speed."""
     memory, vectors = person.memory, person.vectors
     vectors[:] = 0.0
-    for place in (HAND_P, DRIVEN_P, BELIEF):
+    for place in (HAND_P, DRIVEN_P, BELIEF, SHOWN):
         vectors[place] = p
     vectors[HAND_V] = v
     for row in range(person.past.shape[0]):
@@ -135,7 +142,7 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
         person.past[row, SEEN : SEEN + 3] = p
     memory[STARTED], memory[CAPACITY] = 1.0, 1.0
     memory[STIFFER] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
-    memory[DECIDED] = -person.numbers[REFRACTORY]
+    memory[DECIDED], memory[SIGHTED] = -person.numbers[REFRACTORY], -1.0
 
 
 @njit
@@ -158,9 +165,10 @@ def _sense(person: PersonState, p: Array, force: Array) -> None:
     tick = int(m[TICKS])
     now = past[tick % size]
     felt, seen = past[(tick - int(n[REFLEX_TICKS])) % size], past[(tick - int(n[SEEN_TICKS])) % size]
+    _look(person, p)
     kept = math.exp(-n[PERIOD] / CALIBRATION_TIME)
     for k in range(3):
-        now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k], p[k] + V[BLUR, k]
+        now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k], V[SHOWN, k] + V[BLUR, k]
         now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
         now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
@@ -180,12 +188,30 @@ def _sense(person: PersonState, p: Array, force: Array) -> None:
 
 
 @njit
+def _look(person: PersonState, p: Array) -> None:
+    """Look at the figure, or at the stylus (p) where there is none."""
+    m, V, eye = person.memory, person.vectors, person.eye
+    if eye.pose.shape[0] == 0:
+        V[SHOWN] = p
+    elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
+        m[SIGHTED] = seen_place(eye, int(m[SIGHTED]), np.empty(eye.inverses.shape[2]), V[SHOWN])
+
+
+@njit
 def _want(person: PersonState, switch: Array) -> None:
     """Read what is wanted now, decide on a submovement if it is time to, and follow the one that is under way."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = np.zeros((3, 3)), np.zeros((3, 3))
-    aims = n[WISH_PERIOD] == 0.0
-    if aims:
+    aims, owns = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
+    if owns:
+        if person.units[1] != 0:
+            call_intent(person.units[1], (m[TICKS] * n[PERIOD], V[BELIEF], V[FELT_FORCE], rows))
+        row = rows[0]
+        wanted[0], wanted[1], goal[1] = row[PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3]
+        for k in range(3):
+            goal[0, k] = wanted[0, k] + n[HORIZON] * wanted[1, k]
+        switch[0] = row[SWITCH]
+    elif aims:
         row = rows[min(int(m[TARGET]), rows.shape[0] - 1)]
         wanted[0], goal[0] = row[PLACE : PLACE + 3], row[PLACE : PLACE + 3]
         switch[0] = 0.0
@@ -194,7 +220,9 @@ def _want(person: PersonState, switch: Array) -> None:
         wanted_motion(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
         switch[0] = row[SWITCH]
     engaged = row[ENGAGED] > 0.0
-    m[CLOCK] += n[PERIOD] * (1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and not aims else 1.0)
+    m[CLOCK] += n[PERIOD] * (
+        1.0 + _ahead(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
+    )
     grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
     follow = n[PERIOD] / ENGAGING_TIME
     m[ENGAGED_SHARE] += follow * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
@@ -236,22 +264,27 @@ def _yield(person: PersonState) -> None:
 
 @njit
 def _may_decide(person: PersonState, waits: bool) -> bool:
-    """Whether it is time for a new submovement: after the last one's end, or earlier if she is surprised."""
+    """Whether it is time for a new submovement: after the last one's end, or earlier if she is surprised.
+
+    Who aims at a target `waits` until she sees where the last one ends.
+    """
     n, m, V = person.numbers, person.memory, person.vectors
     now = m[TICKS] * n[PERIOD]
     if now - m[DECIDED] < n[REFRACTORY]:
         return False
     elapsed = now - m[BEGUN]
+    if waits:
+        return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], WATCHED * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
     if m[LASTS] == 0.0 or elapsed >= m[LASTS]:
         return True
-    if waits:
-        return False
     believed = np.empty((3, 3))
     submovement(person.plans[1], m[LASTS], elapsed, believed)
     off = 0.0
     for k in range(3):
         off += (V[BELIEF, k] - believed[0, k]) ** 2
-    return elapsed >= 0.5 * m[LASTS] or off > SURPRISE * SURPRISE
+    if off < SURPRISE * SURPRISE:
+        m[CALM] = now
+    return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION
 
 
 @njit

@@ -13,6 +13,8 @@ Array = npt.NDArray[np.float64]
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
 """Columns of a wish: place (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target [m],
 switch, and whether the person does anything; without, she lets the stylus go where it goes."""
+OWN = -1.0
+"""Period of wishes that an intent of the caller's own writes."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class Wishes:
     rows : Array
         Wishes, shape (n, 10), columns as above.
     period : float
-        Time between two rows [s]; 0 where each row is a target, and the next one's turn comes when it is reached.
+        Time between two rows [s]; 0 where each row is a target, and the next one's turn comes when it is reached;
+        negative where an intent of the caller's own writes the two rows (see `sim.users.own_intent`).
     lap : float
         Time after which the wish repeats itself, for what is learned from one repetition to the next [s]; 0: never.
 
@@ -43,8 +46,8 @@ class Wishes:
         if rows.ndim != 2 or rows.shape[1] != WISH_SIZE or len(rows) < 1:
             raise SimError(f"wishes of shape {rows.shape}; expected (n, {WISH_SIZE}), n ≥ 1")
         if not np.all(np.isfinite(np.delete(rows, GRIP, axis=1))) or np.any(np.isinf(rows[:, GRIP])):
-            raise SimError("wishes have a number that is not finite")
-        if not (self.period >= 0.0 and np.isfinite(self.period) and self.lap >= 0.0 and np.isfinite(self.lap)):
+            raise SimError("wishes have a number that is not finite; expected finite ones, but for the grip")
+        if not (np.isfinite(self.period) and self.lap >= 0.0 and np.isfinite(self.lap)):
             raise SimError(f"wishes {self.period} s apart, repeated after {self.lap} s; expected finite, 0 s or more")
         if self.period == 0.0 and np.any(rows[:, WIDTH] <= 0.0):
             raise SimError("a target has no width; expected more than 0 m")

@@ -1,0 +1,60 @@
+"""What a person has learned of a figure: the poses of the motion that she has in mind, and of others near it."""
+
+import numpy as np
+
+from controllers.state import Array
+from experiments.setups.stylus import stylus_path
+from models.mocap.clip import pose_difference
+from sim.devices.simulated import SimulatedPhantom
+from sim.loop.servo import Servo
+from sim.reference.reference import poses_along
+from sim.users.eye import Eye
+from sim.users.participant import Participant
+from sim.users.wishes import ENGAGED, PLACE
+
+POSES = 128  # along a motion: some 3 degrees of a lap apart
+_BESIDE = 2e-3  # [m] by which the stylus is moved to learn what the figure does
+_BLIND = 0.15  # of the strongest effect of a movement on the figure: what shows less is not seen
+
+
+def with_eyes(servo: Servo, user: Participant, curve: Array) -> Servo:
+    """A servo whose person sees the figure that it shows.
+
+    Parameters
+    ----------
+    servo : Servo
+        Linked, of a figure whose map's argument is the stylus.
+    user : Participant
+        Whose wishes are what she has in mind; where they are none, `curve` is.
+    curve : Array
+        Places of the map's curve in H [m], shape (n, 3).
+    """
+    assert isinstance(servo.device, SimulatedPhantom)
+    wishes = user.wishes
+    rows = wishes.rows[wishes.rows[:, ENGAGED] > 0.0, PLACE : PLACE + 3]
+    if wishes.period > 0.0 and wishes.lap > 0.0:
+        rows = rows[: round(wishes.lap / wishes.period)]
+    places = rows if wishes.period >= 0.0 and len(rows) > 1 else curve
+    places = places[np.linspace(0.0, len(places) - 1.0, min(POSES, len(places))).astype(int)]
+    hand = servo.device.user
+    person = hand.person._replace(eye=learned_eye(servo, places))
+    return servo._replace(device=servo.device._replace(user=hand._replace(person=person)))
+
+
+def learned_eye(servo: Servo, places: Array) -> Eye:
+    """Poses at places (n, 3) of the stylus, and damped inverses of how they change with it."""
+    reference = servo.reference
+
+    def poses(points: Array) -> Array:
+        found = np.empty((len(points), len(reference.pose)))
+        poses_along(reference.kind, reference.params, reference.memory.copy(), stylus_path(points), found)
+        return found
+
+    effects = np.stack([
+        pose_difference(poses(places - step), poses(places + step)) / (2.0 * _BESIDE)
+        for step in _BESIDE * np.eye(3)
+    ], axis=2)  # fmt: skip
+    u, strengths, v = np.linalg.svd(effects, full_matrices=False)
+    floor = _BLIND * strengths[:, :1]
+    inverses = np.einsum("nij,ni,nki->njk", v, strengths / (strengths**2 + floor**2), u)
+    return Eye(reference.pose, poses(places), np.ascontiguousarray(places), np.ascontiguousarray(inverses))

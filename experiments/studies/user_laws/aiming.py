@@ -1,0 +1,88 @@
+"""Aiming from one target to the next: Fitts' law, and the scatter of a first submovement."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.studies.user_laws.bare_device import Trace, trial
+from experiments.studies.user_laws.law import Law, Study
+from sim.users.person import Person
+from sim.users.person_step import LEAST_SECONDS
+from sim.users.submovement import refinement
+from sim.users.wishes import targets
+
+AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
+MOVES = 14  # from side to side; the first two are practice
+_PRACTICE = 2
+_MOST_SECONDS = 25.0
+
+
+def fitts(people: Sequence[Person], seed: int) -> Study:
+    """Time from click to click over the index of difficulty log₂(A/W + 1) (MacKenzie 1992)."""
+    difficulty, times = list[float](), list[float]()
+    for amplitude, width in _conditions():
+        found = np.concatenate([
+            np.diff(_tapped(person, amplitude, width, seed + i).clicks)[_PRACTICE:] for i, person in enumerate(people)
+        ])  # fmt: skip
+        difficulty.append(np.log2(amplitude / width + 1.0))
+        times.append(float(np.mean(found)) if len(found) else np.nan)
+    x, y = np.array(difficulty), np.array(times)
+    slope, intercept = np.polyfit(x, y, 1)
+    source = "stylus: Fitts 1954 as MacKenzie 1992 fits it, 122 ms/bit; tablet: MacKenzie et al. 1991, 204 (m)"
+    return Study(
+        "fitts", "Fitts' law: movement time over index of difficulty",
+        (
+            Law("Fitts: slope", 1e3 * slope, 100.0, 230.0, "ms/bit", source),
+            Law("Fitts: intercept", 1e3 * intercept, -200.0, 400.0, "ms", "Soukoreff & MacKenzie 2004 (m)"),
+            Law("Fitts: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "", "MacKenzie 1992: above 0.9 (m)"),
+        ),
+        x, y, ("log₂(A/W + 1) [bit]", "time from click to click [s]"), (float(slope), float(intercept)),
+    )  # fmt: skip
+
+
+def scatter(people: Sequence[Person], seed: int) -> Study:
+    """Scatter of the end of a first submovement along its way, over its mean speed A/T."""
+    speeds, spreads = list[float](), list[float]()
+    for amplitude, width in _conditions():
+        speed, spread = list[float](), list[float]()
+        for i, person in enumerate(people):
+            trace = _tapped(person, amplitude, width, seed + i)
+            seconds = _first_seconds(person, amplitude, width)
+            ends = np.interp(trace.clicks[_PRACTICE:-1] + seconds, trace.t, trace.p[:, 1])
+            errors = ends - 0.5 * amplitude * np.where(np.arange(_PRACTICE, len(trace.clicks) - 1) % 2 == 0, 1.0, -1.0)
+            if len(errors) > 4:
+                spread.append(float(np.std(errors * np.sign(ends))))
+                speed.append(amplitude / seconds)
+        speeds.append(float(np.mean(speed)))
+        spreads.append(float(np.mean(spread)))
+    x, y = np.array(speeds), np.array(spreads)
+    slope, intercept = np.polyfit(x, y, 1)
+    source = "Schmidt et al. 1979, Wright & Meyer 1983: some 4 to 12 ms (m)"
+    return Study(
+        "scatter", "Scatter of a submovement over its mean speed",
+        (
+            Law("Speed–accuracy: slope of σ over A/T", 1e3 * slope, 3.0, 12.0, "ms", source, built_in=True),
+            Law("Speed–accuracy: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.8, 1.0, "",
+                "Schmidt et al. 1979: linear, r above 0.9 (m)", built_in=True),
+        ),
+        x, y, ("A/T [m/s]", "standard deviation of the end [m]"), (float(slope), float(intercept)),
+    )  # fmt: skip
+
+
+def _conditions() -> list[tuple[float, float]]:
+    return [(amplitude, width) for amplitude in AMPLITUDES for width in WIDTHS if amplitude >= 2.0 * width]
+
+
+def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
+    points = np.zeros((MOVES + 1, 3))
+    points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
+    seconds = min(_MOST_SECONDS, 1.6 * MOVES)
+    trace = trial(person, targets(points, width), seconds, seed, points[0])
+    return trace._replace(clicks=trace.clicks[: MOVES + 1])
+
+
+def _first_seconds(person: Person, amplitude: float, width: float) -> float:
+    """What a person's first submovement to a target takes, as she decides (see `sim.users.person_step`)."""
+    scatter = person.caution * person.motor_noise
+    left = max(0.5 * width, refinement(scatter, person.visual_delay) * amplitude)
+    return max(LEAST_SECONDS, scatter * amplitude / left)

@@ -1,0 +1,74 @@
+"""A person on a Phantom whose motors only carry its weight, or push her as they are told."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.state import Array
+from models.humanoid.skeleton import rest_pose
+from models.scene import SceneConfig
+from sim.compilation.compiled import entry_point
+from sim.devices.simulated import (
+    SimulatedPhantom,
+    actuate_simulated,
+    advance_simulated,
+    sense_simulated,
+    simulated_phantom,
+)
+from sim.users.participant import Participant
+from sim.users.person import Person
+from sim.users.wishes import Wishes
+from sim.world.phantom_port import phantom_port
+from sim.world.plant import Plant, make_plant
+from sim.world.world import World
+
+PERIOD, STEP, CUTOFF = 1e-3, 5e-4, 150.0  # [s], [s], [Hz]
+
+
+class Trace(NamedTuple):
+    """What happened, tick by tick.
+
+    Attributes
+    ----------
+    t : Array
+        [s], shape (n,).
+    p, v, force : Array
+        True position [m] and velocity [m/s] of the stylus and force of the hand [N], in H, shape (n, 3).
+    clicks : Array
+        When the switch was pressed [s].
+    """
+
+    t: Array
+    p: Array
+    v: Array
+    force: Array
+    clicks: Array
+
+
+@entry_point
+def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Array, rows: Array) -> None:
+    """Let the device push a person, a force [N] a tick (n, 3), and write where the stylus is, shape (n, 10)."""
+    for k in range(rows.shape[0]):
+        t = k * plant.period
+        sense_simulated(device, t)
+        actuate_simulated(device, pushes[k])
+        advance_simulated(device, plant, t, False, applied)
+        rows[k, 0:3], rows[k, 3:6], rows[k, 6:9] = device.user.p, device.user.v, device.user.force
+        rows[k, 9] = device.user.arm.switch[0]
+
+
+def trial(
+    person: Person, wishes: Wishes, seconds: float, seed: int, start: Array, pushes: Array | None = None
+) -> Trace:
+    """A person with something to do for so long [s], from a place in H [m]; `pushes` (n, 3) are the device's [N]."""
+    world = World(SceneConfig(servo_period=PERIOD, physics_step=STEP), "none")
+    world.reset(start, rest_pose())
+    port = phantom_port(world.model, world.data, PERIOD, CUTOFF)
+    device = simulated_phantom(port, Participant(person, wishes, seed).compiled(PERIOD, STEP))
+    device.link()
+    n = round(seconds / PERIOD)
+    rows, plant = np.zeros((n, 10)), make_plant(world)
+    given = np.zeros((n, 3)) if pushes is None else pushes
+    run_bare(device, plant, given, np.zeros((plant.substeps, device.user_torques)), rows)
+    t = PERIOD * np.arange(1, n + 1)
+    return Trace(t, rows[:, 0:3], rows[:, 3:6], rows[:, 6:9], t[rows[:, 9] > 0.0])

@@ -1,0 +1,94 @@
+"""Tracing a drawn path: the steering law, and the two-thirds power law."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import butter, filtfilt
+
+from controllers.state import Array
+from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
+from experiments.studies.user_laws.law import Law, Study
+from sim.users.pace import natural_times
+from sim.users.person import Person
+from sim.users.wishes import Wishes, following
+
+LAPS = 7  # of which the first is practice
+RADIUS = 0.04  # of the circular tunnel [m]
+LAP_TIMES = (1.0, 1.3, 1.7, 2.2, 2.8)  # [s]
+ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
+ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
+_SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
+
+
+def steering(people: Sequence[Person], seed: int) -> Study:
+    """Time of a lap over the length of a circular tunnel by the width that the lap needed (Accot & Zhai 1997)."""
+    difficulty = list[float]()
+    for lap in LAP_TIMES:
+        angle = 2.0 * np.pi * np.arange(0.0, LAPS * lap, _SAMPLING) / lap
+        points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        widths = [
+            2.0 * np.abs(np.hypot(*part[:, :2].T) - RADIUS).max()
+            for i, person in enumerate(people)
+            for part in _laps(trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0]), lap)
+        ]
+        difficulty.append(2.0 * np.pi * RADIUS / float(np.quantile(widths, 0.95)))
+    x, y = np.array(difficulty), np.array(LAP_TIMES)
+    slope, intercept = np.polyfit(x, y, 1)
+    return Study(
+        "steering", "Steering law: time of a lap over length by width",
+        (
+            Law("Steering: slope", 1e3 * slope, 50.0, 200.0, "ms",
+                "Accot & Zhai 1997, 1999: 78 straight, some 150 circular (m)"),
+            Law("Steering: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "", "Accot & Zhai 1997: 0.96 up (m)"),
+        ),
+        x, y, ("length / width", "time of a lap [s]"), (float(slope), float(intercept)),
+    )  # fmt: skip
+
+
+def power_law(people: Sequence[Person], seed: int) -> Study:
+    """Speed over curvature of ellipses drawn at a natural pace: v = γ κ^(−β), β = 1/3 (Lacquaniti et al. 1983)."""
+    exponents, curvatures, speeds = list[float](), list[Array](), list[Array]()
+    for i, person in enumerate(people):
+        long, short = ELLIPSES[i % len(ELLIPSES)]
+        lap = ELLIPSE_TIMES[i % len(ELLIPSE_TIMES)]
+        angle = np.linspace(0.0, 2.0 * np.pi, 257)
+        drawn = np.stack([long * np.cos(angle), short * np.sin(angle), np.zeros_like(angle)], axis=1)
+        times = natural_times(drawn, lap)
+        t = np.arange(0.0, LAPS * lap, _SAMPLING)
+        points = np.stack([np.interp(t % lap, times, drawn[:, k]) for k in range(3)], axis=1)
+        trace = trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0])
+        kappa, speed = _curvature(trace, lap)
+        exponents.append(-float(np.polyfit(np.log(kappa), np.log(speed), 1)[0]))
+        curvatures.append(kappa[::40])
+        speeds.append(speed[::40])
+    x, y = np.concatenate(curvatures), np.concatenate(speeds)
+    line = np.polyfit(np.log(x), np.log(y), 1)
+    source = "Lacquaniti et al. 1983, Viviani & Schneider 1991: 0.33, adults' ellipses 0.28 to 0.38 (m)"
+    return Study(
+        "power-law", "Two-thirds power law: speed over curvature",
+        (Law("Power law: exponent β", float(np.mean(exponents)), 0.28, 0.38, "", source),),
+        x, y, ("curvature [1/m]", "speed [m/s]"), (float(line[0]), float(line[1])), log=True,
+    )  # fmt: skip
+
+
+def _wishes(points: Array, lap: float) -> Wishes:
+    return Wishes(following(points), _SAMPLING, lap)
+
+
+def _laps(trace: Trace, lap: float) -> list[Array]:
+    """Positions of each lap but the first."""
+    n = round(lap / PERIOD)
+    return [trace.p[k * n : (k + 1) * n] for k in range(1, LAPS)]
+
+
+def _curvature(trace: Trace, lap: float) -> tuple[Array, Array]:
+    """Curvature [1/m] and speed [m/s] without the first lap and the ends, of the filtered drawing."""
+    b, a = butter(2, 2.0 * PERIOD * _CUTOFF)
+    p = filtfilt(b, a, trace.p[:, :2], axis=0)
+    v = np.gradient(p, PERIOD, axis=0)
+    acceleration = np.gradient(v, PERIOD, axis=0)
+    speed = np.linalg.norm(v, axis=1)
+    kappa = np.abs(v[:, 0] * acceleration[:, 1] - v[:, 1] * acceleration[:, 0]) / np.maximum(speed, 1e-6) ** 3
+    kept = slice(round(lap / PERIOD), -200)
+    well = (kappa[kept] > 1.0) & (speed[kept] > 0.005)
+    return kappa[kept][well], speed[kept][well]

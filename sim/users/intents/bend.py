@@ -1,0 +1,48 @@
+"""Hold and bend a tube."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from sim.errors import SimError
+from sim.users.intent import Grab, grab_table
+from sim.users.intents.intent import PERIOD, between, moments
+from sim.users.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Take hold of the curve at places with the switch, carry it, let go; in between let the stylus be led.
+
+    Parameters
+    ----------
+    grabs : sequence of Grab
+        Each with a place.
+
+    Raises
+    ------
+    SimError
+        If they overlap, or one has no place: a person knows where she wants to take hold.
+    """
+
+    grabs: Sequence[Grab]
+
+    def __post_init__(self) -> None:
+        grab_table(self.grabs)
+        if any(grab.place is None for grab in self.grabs):
+            raise SimError("a person's grab has no place; expected where she takes hold, in H [m]")
+
+    def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
+        """See `PersonIntent`."""
+        t = moments(seconds)
+        rows = resting(len(t))
+        for grab in self.grabs:
+            held = grab.at + grab.reach
+            carried = between(t, held, held + grab.seconds)
+            busy = (t >= grab.at) & (t < grab.end)
+            rows[busy, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[busy]
+            rows[busy, ENGAGED] = 1.0
+            rows[busy & (t >= held), SWITCH] = 1.0
+        return Wishes(rows, PERIOD)

@@ -1,0 +1,35 @@
+"""Lead along a path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.trajectory import Trajectory
+from sim.users.intents.intent import PERIOD, moments
+from sim.users.wishes import Wishes, following
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lead:
+    """Lead along a path, and stay at its end.
+
+    Parameters
+    ----------
+    points : Array
+        Places in H [m], shape (n, 3).
+    period : float
+        Time between two of them [s].
+    """
+
+    points: Array
+    period: float
+
+    def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
+        """See `PersonIntent`."""
+        given = self.period * np.arange(len(self.points))
+        t = moments(seconds)
+        points = np.stack([np.interp(t, given, self.points[:, k]) for k in range(3)], axis=1)
+        return Wishes(following(points), PERIOD)

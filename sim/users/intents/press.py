@@ -1,0 +1,46 @@
+"""Push at times."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from sim.errors import SimError
+from sim.users.intent import Push
+from sim.users.intents.intent import PERIOD, centre, moments
+from sim.users.wishes import FORCE, Wishes, resting
+
+
+@dataclass(frozen=True)
+class Press:
+    """Let the stylus be led, and push it at given times with a force of her own.
+
+    Parameters
+    ----------
+    pushes : sequence of Push
+        Without a place; those without a direction are away from the curve's middle.
+
+    Raises
+    ------
+    SimError
+        If one has a place: a person does not wait for her hand to be somewhere, she moves it.
+    """
+
+    pushes: Sequence[Push]
+
+    def __post_init__(self) -> None:
+        if any(push.place is not None for push in self.pushes):
+            raise SimError("a person's push has a place; expected a time and a direction")
+
+    def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
+        """See `PersonIntent`."""
+        t, middle = moments(seconds), centre(curve)
+        rows = resting(len(t))
+        outward = curve.point(curve.start + t) - middle
+        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+        for push in self.pushes:
+            phase = np.clip((t - push.at) / push.seconds, 0.0, 1.0)
+            way = outward if push.direction is None else np.array(push.direction) / np.linalg.norm(push.direction)
+            rows[:, FORCE : FORCE + 3] += (push.force * np.sin(np.pi * phase) ** 2)[:, None] * way
+        return Wishes(rows, PERIOD, curve.duration)

@@ -1,0 +1,45 @@
+r"""The pace at which a hand draws a given path: the smoothest one.
+
+.. math:: \min_{s(t)} \int_0^T \left|\frac{d^3}{dt^3} x(s(t))\right|^2 dt
+
+(Todorov & Jordan 1998: smoothness along a predefined path gives the speeds that people show.)
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize
+
+Array = npt.NDArray[np.float64]
+
+_WAVES = 6  # of the logarithm of the pace, a lap
+
+
+def natural_times(points: Array, seconds: float) -> Array:
+    """When a closed path, drawn in so long [s], passes each of its points (n, 3), the last of which is the first; (n,).
+
+    The pace along the path is exp of a Fourier sum in arc length, whose coefficients minimise the jerk.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = np.concatenate(([0.0], np.cumsum(steps)))
+    angle = 2.0 * np.pi * length / length[-1]
+    waves = np.concatenate([[np.cos(k * angle), np.sin(k * angle)] for k in range(1, _WAVES + 1)])
+    n = len(points) - 1
+    even = np.arange(n) / n
+
+    def times(coefficients: Array) -> Array:
+        slowness = np.exp(-coefficients @ waves)
+        passed = np.concatenate(([0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * steps)))
+        return passed / passed[-1]
+
+    frequencies = np.fft.fftfreq(n, 1.0 / n)[:, None]
+
+    def jerk(coefficients: Array) -> float:
+        at = times(coefficients)
+        x = np.stack([np.interp(even, at, points[:, k]) for k in range(points.shape[1])], axis=1)
+        # Of the first waves only: between its points a path is not known.
+        spectrum = np.where(np.abs(frequencies) <= 4 * _WAVES, np.fft.fft(x, axis=0), 0.0)
+        return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
+
+    first = jerk(np.zeros(2 * _WAVES))
+    found = minimize(lambda c: jerk(c) / first, np.zeros(2 * _WAVES), method="L-BFGS-B")
+    return seconds * times(found.x)
