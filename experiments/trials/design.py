@@ -122,7 +122,7 @@ def _check(study: StudyConfig) -> None:
             raise StudyError(
                 f"{where}: factors {one!r} and {other!r} both set {sorted(shared)[0]!r}; expected one factor for it"
             )
-    for word, owner in (("user", "users"), ("person", "users"), ("seconds", "seconds"), ("seed", "seed")):
+    for word, owner in (("person", "users"), ("seconds", "seconds"), ("seed", "seed")):
         if word in study.run or any(word in _words(levels.values()) for levels in study.factors.values()):
             raise StudyError(f"{where} sets {word!r} as a word of its runs; expected {owner!r} of the study itself")
 

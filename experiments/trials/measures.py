@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import PERSONAL, RunConfig
 from experiments.results.measures import FALLEN, SETTLING, TOUCH
 from experiments.results.pose_distance import geodesic_distance, seen_distance
 from experiments.results.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
@@ -58,7 +58,7 @@ _TRACKING = "RMS distance of the stylus from the curve, while the hand does not 
 _EXCHANGED = "∫ F·v dt of the device's force: what the field put into the hand, less what it took"
 _EXPRESSIVE = (
     "RMS distance in R³ × SO(3)^18 of the edited animation from the default one, while the hand means to leave the "
-    "curve if it ever does"
+    "curve: what is expressed, not what trembles"
 )
 _SEEN = "the same as it is seen: RMS distance of the 18 segments in space"
 
@@ -107,7 +107,9 @@ def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[s
 
 
 def meant_to_leave(config: RunConfig, t: Array) -> npt.NDArray[np.bool_]:
-    """When the hand means to leave the curve: while it pushes, and until it is back."""
+    """When the hand means to leave the curve: all the time by its intent, or while it pushes and until it is back."""
+    if config.user.does in PERSONAL:
+        return np.ones(len(t), dtype=bool)
     spans = [(push.at, push.at + push.seconds + SETTLING) for push in config.user.pushes]
     return np.any([(at <= t) & (t <= end) for at, end in spans], axis=0) if spans else np.zeros(len(t), dtype=bool)
 
@@ -150,8 +152,6 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
     default = default_poses(session, stride)(*(ticks[name][rows] for name in ("nearest", "phase", "river")))
     t, edited = frames["t"][::stride], frames["reference"][::stride]
     chosen = (t >= since) & meant_to_leave(config, t)
-    if not np.any(chosen):
-        chosen = t >= since
     return {
         "expressiveness": _rms(geodesic_distance(default[chosen], edited[chosen])),
         "expressiveness_seen": 1e2 * _rms(seen_distance(default[chosen], edited[chosen], session.world.figure)),

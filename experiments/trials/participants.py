@@ -1,12 +1,10 @@
-"""Who takes part in a study: from a population to the user of each run."""
+"""Who takes part in a study: people drawn from a population."""
 
-from experiments.trials.study_config import Users, Words
+from experiments.trials.study_config import Users
+from sim.users.person import Person
 from sim.users.population import population
 
 
-def participants(users: Users) -> tuple[Words, ...]:
-    """What each of the users is in a run, in its words.
-
-    Who they are depends on the seed of the population alone: the first ones of a larger number are the same people.
-    """
-    return tuple({"user": users.does, "person": person} for person in population(users.number, users.seed))
+def participants(users: Users) -> tuple[Person, ...]:
+    """The people of a study, who depend on the seed of the population alone: more of them begin with the same ones."""
+    return population(users.number, users.seed)

@@ -50,12 +50,14 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
         If the design contradicts itself, a level sets what a run has not, or there is no such clip.
     """
     people = participants(study.users)
-    bases = {number: _base(study, c.words, c.levels, people[0]) for number, c in enumerate(conditions(study))}
+    doing: Words = {"user": study.users.does, "person": people[0]}
+    bases = {number: _base(study, doing | c.words, c.levels) for number, c in enumerate(conditions(study))}
     _check_apart(study, bases)
     trials: list[Trial] = []
     for meeting in meetings(study):
-        user = run_config(**people[meeting.user]).user  # pyright: ignore[reportArgumentType]
-        config = replace(bases[meeting.number], user=user, seed=trial_seed(study.seed, meeting))
+        base = bases[meeting.number]
+        user = replace(base.user, person=people[meeting.user])
+        config = replace(base, user=user, seed=trial_seed(study.seed, meeting))
         trials.append(Trial(key_of(config), meeting, config))
     return tuple(trials)
 
@@ -103,9 +105,9 @@ def file_digest(name: str) -> str:
         ) from None
 
 
-def _base(study: StudyConfig, words: Words, levels: Mapping[str, str], person: Words) -> RunConfig:
+def _base(study: StudyConfig, words: Words, levels: Mapping[str, str]) -> RunConfig:
     try:
-        return run_config(**(study.run | words | person | {"seconds": study.seconds}))  # pyright: ignore
+        return run_config(**(study.run | words | {"seconds": study.seconds}))  # pyright: ignore
     except ParameterError as error:
         said = ", ".join(f"{factor} = {level}" for factor, level in levels.items())
         raise StudyError(f"study {study.name!r}, condition {said}: {error}") from None

@@ -26,7 +26,7 @@ class Users:
     seed : int
         Of the population that they are drawn from.
     does : str
-        What they mean to do, as ``hvf run --user`` has it.
+        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user".
     """
 
     number: int = whole(1, default=12)

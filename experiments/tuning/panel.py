@@ -7,8 +7,7 @@ import numpy as np
 
 from controllers.state import Array
 from experiments.config.part import to_json
-from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
+from experiments.config.run_config import RunConfig, User
 from experiments.trials.database import Database
 from experiments.trials.drive import Executor
 from experiments.trials.participants import participants
@@ -21,7 +20,7 @@ def panel_runs(config: RunConfig, users: Users, repetitions: int, seed: int) -> 
     """Runs of a candidate by user, with the same seeds for every candidate: what differs between them is theirs."""
     runs: list[list[RunConfig]] = []
     for number, person in enumerate(participants(users)):
-        user = run_config(**person).user  # pyright: ignore[reportArgumentType]
+        user = User(does=users.does, person=person)  # pyright: ignore[reportArgumentType]
         seeds = [np.random.SeedSequence((seed, users.seed, number, k)) for k in range(repetitions)]
         runs.append([replace(config, user=user, seed=int(s.generate_state(1, np.uint32)[0])) for s in seeds])
     return runs

@@ -14,7 +14,7 @@ _USER, _MEAN = "#9aa6b8", "#1f5fbf"
 
 def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence[str], measure: str) -> Figure:
     """Every user's mean at every level, a panel for each combination of the other factors' levels."""
-    done = frame[frame["state"].eq("done")]
+    done = frame[frame["state"].eq("done") & frame[measure].notna()]
     panels: list[tuple[str, Any]] = [("", done)]
     if rest:
         panels = [(", ".join(map(str, name)), part) for name, part in done.groupby(list(rest), sort=False)]

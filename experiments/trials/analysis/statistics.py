@@ -117,10 +117,11 @@ def statistics(
         rows = frame[frame["state"].eq("done") & frame[measure].notna()]
         if len(rows) < 3 or not np.ptp(rows[measure].to_numpy()) > 0.0:
             continue
-        fits, interaction = _models(rows, measure, factors, remarks)
+        varied = {name: levels for name, levels in factors.items() if rows[name].nunique() > 1}
+        fits, interaction = _models(rows, measure, varied, remarks) if varied else ({}, None)
         if interaction is not None:
             interactions[measure] = interaction
-        for factor, levels in factors.items():
+        for factor, levels in varied.items():
             for level in levels[1:]:
                 fit = fits.get((factor, level), (np.nan, np.nan, np.nan, np.nan))
                 rng = np.random.default_rng([seed, len(found)])
