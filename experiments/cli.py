@@ -330,7 +330,7 @@ class Users:
 
     out: Path = Path("runs/users")
     """Folder to write."""
-    people: Annotated[int, whole(1)] = 12
+    people: Annotated[int, whole(1)] = 6
     """How many people of a population take part."""
     seed: Annotated[int, whole(0)] = 2
     """Of the population and of its noise."""

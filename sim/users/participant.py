@@ -13,7 +13,6 @@ from sim.users.eye import LOOKS, no_eye
 from sim.users.intents.own import Own
 from sim.users.person import Person
 from sim.users.person_state import PersonState
-from sim.users.submovement import refinement
 from sim.users.wishes import Wishes
 
 LONGEST_PERIOD = 0.01  # [s] of a servo whose ticks a person can be asked in: a third of the shortest reflex
@@ -86,7 +85,6 @@ class Participant:
         n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen
         n[at.LOOK_TICKS] = max(1, round(LOOKS / period))
         n[at.TREMOR_A], n[at.TREMOR_B], n[at.TREMOR_GAIN] = tremor_filter(person, period)
-        n[at.REFINEMENT] = refinement(person.caution * person.motor_noise, person.visual_delay)
         return n
 
 

@@ -109,7 +109,7 @@ class Person:
     horizon : float
         Duration of a submovement in tracking [s].
     motor_noise : float
-        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, half of it across [s].
+        K in σ = K A/T, the scatter of endpoints of a submovement along its direction, 0.85 of it across [s].
     force_noise : float
         Standard deviation of a force over the force.
     tremor, tremor_frequency : float
@@ -150,7 +150,7 @@ class Person:
     seen_noise: float = 0.0004
     refractory: float = 0.15
     horizon: float = 0.3
-    motor_noise: float = 0.007
+    motor_noise: float = 0.011
     force_noise: float = 0.03
     tremor: float = 0.06
     tremor_frequency: float = 9.0

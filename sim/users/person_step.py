@@ -53,7 +53,6 @@ from sim.users.person_state import (
     OFFSET,
     PERIOD,
     PRESSED,
-    REFINEMENT,
     REFLEX,
     REFLEX_GAIN,
     REFLEX_TICKS,
@@ -81,7 +80,7 @@ from sim.users.person_state import (
     WISH_PERIOD,
     PersonState,
 )
-from sim.users.submovement import set_submovement, submovement
+from sim.users.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
 from sim.users.wishes import GRIP as WISHED_GRIP
 
@@ -94,8 +93,10 @@ UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 20
 ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
+ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994: ellipses along the way, m)
 LEAST_SECONDS = 0.16  # [s] of the shortest submovement
 WATCHED = 0.8  # of a submovement's time: 94 % of its way, by which it is seen where it ends
+BEND = 0.1  # [s] before and after which she looks at a way to see how it bends: a third of a submovement
 SURPRISE, REACTION = 0.004, 0.08  # [m] from where it should be, a hand is looked after within so long [s]
 RECOVERY = 2.4  # [1/min] at which force comes back (Liang et al. 2009, m)
 
@@ -217,7 +218,7 @@ def _want(person: PersonState, switch: Array) -> None:
         switch[0] = 0.0
     else:
         row = rows[wanted_motion(rows, n[WISH_PERIOD], m[CLOCK], wanted)]
-        wanted_motion(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
+        _foresee(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
         switch[0] = row[SWITCH]
     engaged = row[ENGAGED] > 0.0
     m[CLOCK] += n[PERIOD] * (
@@ -240,6 +241,17 @@ def _want(person: PersonState, switch: Array) -> None:
         _submove(person, goal, n[HORIZON])
     _drive(person)
     _learn(person, wanted)
+
+
+@njit
+def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
+    """Set the motion that will be wanted at a time [s]; no corner of it asks for more than `BEND` allows."""
+    before = np.zeros((3, 3))
+    wanted_motion(rows, period, t - BEND, before)
+    wanted_motion(rows, period, t + BEND, goal)
+    bend = (goal[1] - before[1]) / (2.0 * BEND)
+    wanted_motion(rows, period, t, goal)
+    goal[2] = bend
 
 
 @njit
@@ -297,8 +309,9 @@ def _aim(person: PersonState, goal: Array, width: float) -> bool:
     away = math.sqrt(away)
     if away < 0.5 * width:
         return True
-    left = max(0.5 * width, n[REFINEMENT] * away)
-    _submove(person, goal, max(LEAST_SECONDS, n[CAUTION] * n[MOTOR_NOISE] * away / left))
+    overhead = n[PERIOD] * n[SEEN_TICKS]
+    seconds = aimed_seconds(2.0 * away / width, n[CAUTION] * n[MOTOR_NOISE], overhead, LEAST_SECONDS)
+    _submove(person, goal, seconds)
     return False
 
 
@@ -306,7 +319,8 @@ def _aim(person: PersonState, goal: Array, width: float) -> bool:
 def _submove(person: PersonState, goal: Array, seconds: float) -> None:
     r"""Begin a submovement from where the hand is believed to be to a goal.
 
-    It misses by σ = K A/D along its way and half of that across (Schmidt et al. 1979): the noise of a motor command
+    It misses by σ = K A/D along its way and 0.85 of that across (Schmidt et al. 1979; ellipses of endpoints:
+    Gordon et al. 1994): the noise of a motor command
     grows with it (Harris & Wolpert 1998).
     """
     n, m, V = person.numbers, person.memory, person.vectors
@@ -319,10 +333,11 @@ def _submove(person: PersonState, goal: Array, seconds: float) -> None:
     start[0], start[1], start[2] = V[BELIEF], V[DRIVEN_V], V[DRIVEN_A]
     set_submovement(person.plans[1], start, goal, seconds)
     scatter = n[MOTOR_NOISE] * length / seconds
-    along = 0.5 * scatter * normal(person.chance)
+    across = ACROSS * scatter
+    along = math.sqrt(scatter * scatter - across * across) * normal(person.chance)
     for k in range(3):
         unit = way[k] / length if length > 0.0 else 0.0
-        miss = along * unit + 0.5 * scatter * normal(person.chance)
+        miss = along * unit + across * normal(person.chance)
         end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + miss
     start[0] = V[DRIVEN_P]
     set_submovement(person.plans[0], start, end, seconds)

@@ -26,11 +26,11 @@ _AGING = (
 
 PERSONAS = {
     "median": Person(),
-    "expert": Person(name="expert", age=35.0, skill=1.0, motor_noise=0.005, horizon=0.28, seen_noise=0.0003,
+    "expert": Person(name="expert", age=35.0, skill=1.0, motor_noise=0.008, horizon=0.28, seen_noise=0.0003,
                      tremor=0.04, correction=0.9),
-    "novice": Person(name="novice", age=24.0, skill=0.4, grip=4.0, motor_noise=0.010, horizon=0.35, correction=0.65,
+    "novice": Person(name="novice", age=24.0, skill=0.4, grip=4.0, motor_noise=0.016, horizon=0.35, correction=0.65,
                      learning=0.15, entrainment=0.6),
-    "elder": Person(name="elder", age=76.0, skill=0.7, grip=3.0, strength=9.0, motor_noise=0.009, visual_delay=0.235,
+    "elder": Person(name="elder", age=76.0, skill=0.7, grip=3.0, strength=9.0, motor_noise=0.014, visual_delay=0.235,
                     reflex_delay=0.05, refractory=0.2, horizon=0.4, tremor=0.14, tremor_frequency=7.0),
     "lefty": Person(name="lefty", hand="left"),
     "firm": Person(name="firm", grip=8.0, stiffness=420.0, strength=30.0),

@@ -7,13 +7,13 @@ is the motion of least ∫|x⃛|² between two states (position, velocity, accel
 (Flash & Henis 1991).
 """
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 Array = npt.NDArray[np.float64]
+
+MOST_STAGES = 8  # submovements to a target that are planned ahead: more leave a 2000th of the way
 
 
 @njit
@@ -57,23 +57,28 @@ def submovement(plan: Array, seconds: float, elapsed: float, state: Array) -> No
         state[2, k] = bend if beyond == 0.0 else 0.0
 
 
-def refinement(scatter: float, overhead: float) -> float:
-    r"""Share of the way to a target that a submovement should leave to the next: the fastest way to get near.
+@njit
+def aimed_seconds(difficulty: float, scatter: float, overhead: float, least: float) -> float:
+    r"""Duration of the next submovement to a target, of as many as get there soonest (Meyer et al. 1988) [s].
 
-    A submovement that leaves a share r of its way within `caution` standard deviations of scatter lasts z K/r, so a
-    factor 1/r costs D₀ + z K/r and a bit of accuracy
+    n submovements, each of which leaves the same share of its way within z standard deviations of σ = K A/D, take
 
-    .. math:: \min_r \frac{D_0 + z K/r}{\log_2 (1/r)}
-
-    (the optimised submovements of Meyer et al. 1988, as many as it takes).
+    .. math:: \min_n\ n \bigl(D_0 + \max(D_{min},\ z K x^{1/n})\bigr)
 
     Parameters
     ----------
+    difficulty : float
+        x, the way over half of the target's width; the way over what may be left of it.
     scatter : float
-        z K, standard deviations times the constant of σ = K A/T [s].
+        z K, standard deviations times the constant of σ [s].
     overhead : float
-        D₀, to see how far a submovement has come and to begin the next [s].
+        D₀, to see where a submovement ends [s].
+    least : float
+        D_min, of the shortest one [s].
     """
-    shares = np.geomspace(0.02, 0.6, 200)
-    cost = (overhead + scatter / shares) / -np.log2(shares)
-    return float(shares[int(np.argmin(cost))]) if math.isfinite(scatter) and scatter > 0.0 else float(shares[0])
+    soonest, seconds = np.inf, least
+    for n in range(1, MOST_STAGES + 1):
+        each = max(least, scatter * max(difficulty, 1.0) ** (1.0 / n))
+        if n * (overhead + each) < soonest:
+            soonest, seconds = n * (overhead + each), each
+    return seconds

@@ -8,7 +8,7 @@ from experiments.studies.user_laws.bare_device import Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.person_step import LEAST_SECONDS
-from sim.users.submovement import refinement
+from sim.users.submovement import aimed_seconds
 from sim.users.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
@@ -84,5 +84,4 @@ def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
 def _first_seconds(person: Person, amplitude: float, width: float) -> float:
     """What a person's first submovement to a target takes, as she decides (see `sim.users.person_step`)."""
     scatter = person.caution * person.motor_noise
-    left = max(0.5 * width, refinement(scatter, person.visual_delay) * amplitude)
-    return max(LEAST_SECONDS, scatter * amplitude / left)
+    return aimed_seconds(2.0 * amplitude / width, scatter, person.visual_delay, LEAST_SECONDS)

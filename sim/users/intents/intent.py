@@ -24,8 +24,8 @@ class PersonIntent(Protocol):
 
 
 def moments(seconds: float) -> Array:
-    """Times of wishes [s]."""
-    return np.arange(0.0, seconds + PERIOD, PERIOD)
+    """Times of wishes [s], beyond the run's end: her clock may run up to half as fast again, and she looks ahead."""
+    return np.arange(0.0, 1.5 * seconds + 1.0, PERIOD)
 
 
 def between(t: Array, start: float, end: float) -> Array:

@@ -20,7 +20,7 @@ from sim.users.intents import (
 )
 from sim.users.pace import natural_times
 from sim.users.participant import Participant
-from sim.users.submovement import refinement, set_submovement, submovement
+from sim.users.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.wishes import ENGAGED, FORCE, GRIP, PLACE, SWITCH, Wishes, following, targets, wanted_motion
 
 CIRCLE = Trajectory.circle(0.04, 4.0)
@@ -47,11 +47,13 @@ def test_a_submovement_meets_both_its_ends_and_has_least_jerk() -> None:
     assert abs(np.trapezoid(jerk * change, s)) < 1e-5 * np.sqrt(np.trapezoid(jerk**2, s) * np.trapezoid(change**2, s))
 
 
-def test_who_scatters_more_goes_in_more_submovements() -> None:
-    shares = [refinement(scatter, 0.2) for scatter in (0.005, 0.02, 0.08)]
-    assert shares == sorted(shares)
-    assert shares[0] >= 0.02
-    assert shares[-1] <= 0.6
+def test_a_target_is_reached_in_as_many_submovements_as_are_soonest() -> None:
+    def total(n: int, x: float, scatter: float) -> float:
+        return n * (0.2 + max(0.16, scatter * x ** (1.0 / n)))
+
+    for x, scatter in ((2.0, 0.01), (30.0, 0.02), (300.0, 0.02), (300.0, 0.08)):
+        best = min(range(1, 9), key=lambda n: total(n, x, scatter))
+        assert aimed_seconds(x, scatter, 0.2, 0.16) == pytest.approx(total(best, x, scatter) / best - 0.2)
 
 
 def test_the_smoothest_pace_of_an_ellipse_is_harmonic() -> None:
