@@ -97,7 +97,9 @@ def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[s
     since = min(SETTLING, 0.5 * float(ticks["t"][-1]))
     meant = meant_to_leave(config, ticks["t"])
     ticks, meant = {name: channel[ticks["t"] >= since] for name, channel in ticks.items()}, meant[ticks["t"] >= since]
-    found = _of_hand(ticks, meant, session) | {"faults": float(np.sum(np.diff(ticks["fault"], prepend=0.0) > 0.0))}
+    found = dict.fromkeys(measures_of(config.figure.kind), _NAN)
+    found |= _of_hand(ticks, meant, session) | {"faults": float(np.sum(np.diff(ticks["fault"], prepend=0.0) > 0.0))}
+    del found["margin_used"]
     if frames:
         stride = max(1, round(1.0 / (SEEN_RATE * session.servo.plant.period * session.servo.figure_ticks)))
         found |= _of_animation(session, log, stride, since, config)
@@ -152,6 +154,8 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
     default = default_poses(session, stride)(*(ticks[name][rows] for name in ("nearest", "phase", "river")))
     t, edited = frames["t"][::stride], frames["reference"][::stride]
     chosen = (t >= since) & meant_to_leave(config, t)
+    if not np.any(chosen):
+        return {}
     return {
         "expressiveness": _rms(geodesic_distance(default[chosen], edited[chosen])),
         "expressiveness_seen": 1e2 * _rms(seen_distance(default[chosen], edited[chosen], session.world.figure)),

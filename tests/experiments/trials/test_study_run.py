@@ -1,4 +1,5 @@
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,19 @@ def test_a_trial_that_raises_is_a_row_with_its_reason_and_not_an_end(tmp_path: P
     states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
     assert states == {"near": "done", "far": "failed"}
     assert all("reach" in row.reason or "stops" in row.reason for row in rows if row.state == "failed")
+
+
+def test_who_only_traces_expresses_nothing_and_who_exaggerates_tracks_nothing() -> None:
+    task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
+    study = small(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
+    rows = {t.meeting.condition.levels["task"]: perform(Task(t.key, to_json(t.config))) for t in study.trials}
+    assert {row.state for row in rows.values()} == {"done"}
+    for task, nothing, something in (
+        ("trace", "expressiveness", "tracking_error"),
+        ("exaggerate", "tracking_error", "expressiveness"),
+    ):
+        assert math.isnan(rows[task].measures[nothing])
+        assert rows[task].measures[something] > 0.0
 
 
 def test_what_is_wrong_with_the_machine_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
