@@ -32,6 +32,8 @@ from experiments.public import circle, clips, load, version
 from experiments.run_result import Run
 from experiments.simulation import Composite, Cylindrical, Simulation, Tick, User
 from experiments.sweep import Swept, sweep
+from experiments.trials.study import Study
+from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from sim.errors import SimError
@@ -64,9 +66,11 @@ __all__ = [
     "River",
     "RiverBundle",
     "Run",
+    "Search",
     "SimError",
     "Simulation",
     "StretchyTubes",
+    "Study",
     "Swept",
     "Tick",
     "Trajectory",
@@ -83,4 +87,5 @@ __all__ = [
     "persona",
     "population",
     "sweep",
+    "tune",
 ]

@@ -34,6 +34,8 @@ from experiments.paper_figures.options import Figures  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from experiments.render.options import Render  # noqa: E402
 from experiments.results.folder import RECORDING  # noqa: E402
+from experiments.trials.command import Trials  # noqa: E402
+from experiments.tuning.command import Tune  # noqa: E402
 from experiments.welcome import WELCOME, next_step  # noqa: E402
 from experiments.working import working  # noqa: E402
 from models.errors import ModelError  # noqa: E402
@@ -398,6 +400,8 @@ Command = (
     | Annotated[Lift, tyro.conf.subcommand("lift")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
     | Annotated[TeleArm, tyro.conf.subcommand("arm")]
+    | Annotated[Trials, tyro.conf.subcommand("trials")]
+    | Annotated[Tune, tyro.conf.subcommand("tune")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Picture, tyro.conf.subcommand("picture")]
     | Annotated[Render, tyro.conf.subcommand("render")]

@@ -51,7 +51,7 @@ def sweep(
         If there is no such number, or several laws have it.
     """
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
-    simulations = [_with(sim, chosen) for chosen in combinations]
+    simulations = [with_values(sim, chosen) for chosen in combinations]
 
     def run(simulation: Simulation) -> Run:
         return simulation.run(seconds)
@@ -63,7 +63,8 @@ def sweep(
             yield Swept(chosen, made)
 
 
-def _with(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
+def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
+    """The same simulation with numbers set, by path as `sweep` has them."""
     for path, value in chosen.items():
         sim = cast(Simulation, _set(sim, path.split("."), value, path))
     return sim

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from controllers.errors import ParameterError
@@ -52,6 +53,8 @@ MOST_PACE = 1.4  # times the clips' own that passes without a word
 Ready = Callable[[tuple[Unit, ...]], None]
 """Called before compiled code is needed, with its units (see `experiments.compiling`)."""
 
+MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]
+"""From configuration, figure and clips to what the map gives a run."""
 
 DeviceOf = Callable[[World], DeviceState]
 """Makes the device of a world; by default that is a simulated Phantom in the hand of the run's user."""
@@ -62,6 +65,7 @@ def wire(
     clips: tuple[Clip, ...] | None = None,
     ready: Ready = lambda units: None,
     device: DeviceOf | None = None,
+    maps_of: MapsOf = map_parts,
 ) -> Session:
     """Put a run together.
 
@@ -75,6 +79,8 @@ def wire(
         See `Ready`.
     device : callable, optional
         See `DeviceOf`.
+    maps_of : callable
+        What makes the map's parts, as `map_parts` does; many runs on one map may share them.
 
     Raises
     ------
@@ -89,7 +95,8 @@ def wire(
     world = World(config.scene, config.figure.kind)
     if config.device.device_file:
         linkage_of(config.device).into(world)
-    return assemble(world, map_parts(config, world.figure, clips), lambda maps: parts_of(config, maps), ready, device)
+    maps = maps_of(config, world.figure, clips)
+    return assemble(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
 
 def assemble(

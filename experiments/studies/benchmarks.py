@@ -33,6 +33,7 @@ from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
 from experiments.studies.field_cost import heaviest_field, tick_microseconds
 from experiments.studies.figure_cost import figure_cost
+from experiments.studies.trial_cost import trial_cost
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
@@ -66,6 +67,10 @@ def bench() -> None:
     print(f"kinematic figure, against the physical one: {cost.physical / cost.kinematic:.1f} × as fast (≥ 3)")
     print(f"no figure, against the physical one: {cost.physical / cost.none:.1f} × as fast (≥ 5)")
     print(f"a tick without figure: {cost.none / cost.bare_step:.1f} bare mj_steps of the linkage (≤ 3)")
+    trials = trial_cost()
+    print(f"a study beside its trials, processor time: {100 * trials.overhead:.1f} % (≤ 5)")
+    print(f"trials on two threads / twice one: {trials.scaling:.2f} (≥ 0.90)")
+    print(f"memory after 400 short trials more / before: {trials.grown:.3f} (≤ 1.01)")
     print(f"soft walls of 17 joints: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
     four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))

@@ -1,0 +1,79 @@
+"""Whether a run's loop is stable, asked many times: verdicts are kept in files by all that they depend on."""
+
+import json
+import os
+import tempfile
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.report import Outcome, hash_of
+from controllers.errors import ControllerError
+from experiments.certify.certified_field import certificate_inputs
+from experiments.config.run_config import RunConfig
+from experiments.setups.defaults import resolved
+from sim.compilation.compiled import CACHE_FOLDER
+
+_SEVERITY = ("certified", "unknown", "refuted")
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What is certain of the stability of a run's loop, with every hand of the default range.
+
+    Attributes
+    ----------
+    verdict : {"certified", "refuted", "unknown"}
+        The worst of the laws that it uses.
+    margin : float or None
+        (critical k_r)/k_r − 1, the least of them; None where there is no certificate.
+    reason : str
+        Of that verdict.
+    """
+
+    verdict: Outcome
+    margin: float | None
+    reason: str
+
+    @property
+    def used(self) -> float:
+        """k_r over the critical k_r: 0 for no stiffness, 1 at the boundary; NaN where there is no certificate."""
+        return float("nan") if self.margin is None else 1.0 / max(1.0 + self.margin, 1e-9)
+
+
+def kept_stability(config: RunConfig) -> Stability:
+    """Certify the stability of a run, or take what was found before for the same inputs and code."""
+    config, hands = resolved(config), HandRange()
+    try:
+        inputs = certificate_inputs(config, 0.0, hands, 1.0)
+    except ControllerError as error:
+        return Stability("unknown", None, str(error))
+    file = CACHE_FOLDER / f"stability-{hash_of(inputs)}.json"
+    with suppress(OSError, ValueError, TypeError):
+        return Stability(**json.loads(file.read_text(encoding="utf-8")))
+    found = _found(config, hands)
+    with suppress(OSError):
+        _write(file, json.dumps(asdict(found)))
+    return found
+
+
+def _found(config: RunConfig, hands: HandRange) -> Stability:
+    from controllers.certificates.loop.stability import stability  # brings CasADi
+    from experiments.certify.certify import certified_rivers
+
+    try:
+        verdicts = [stability(river, hands.hands()) for river in certified_rivers(config).values()]
+    except ControllerError as error:
+        return Stability("unknown", None, str(error))
+    worst = max(verdicts, key=lambda verdict: _SEVERITY.index(verdict.verdict))
+    margin = min(verdict.margin for verdict in verdicts if verdict.margin is not None)
+    return Stability(worst.verdict, margin, worst.reason)
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(name, path)

@@ -1,0 +1,74 @@
+"""Smoothness of a movement from its speed: spectral arc length, and log dimensionless jerk."""
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from controllers.state import Array
+
+CUTOFF = 20.0  # [Hz] of the profile that is differentiated twice: above what a hand does, below what encoders add
+RATE = 100.0  # [Hz] at which it is taken
+
+
+def speed_profile(velocity: Array, rate: float) -> Array:
+    """Speed |v| of a sampled velocity (n, 3), low-passed without lag (Butterworth, order 4) and taken at `RATE`."""
+    sections = butter(2, CUTOFF, fs=rate, output="sos")
+    smooth = sosfiltfilt(sections, velocity, axis=0) if len(velocity) > 30 else velocity
+    return np.linalg.norm(smooth[:: max(1, round(rate / RATE))], axis=1)
+
+
+def spectral_arc_length(
+    speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4
+) -> float:
+    r"""SPARC: minus the arc length of the normalised spectrum of the speed; 0 is smoothest.
+
+    .. math:: -\int_0^{\omega_c} \sqrt{\omega_c^{-2} + \hat V'(\omega)^2}\, d\omega,
+        \qquad \hat V(\omega) = V(\omega)/\max V
+
+    up to the last frequency ω_c below `cutoff` at which V̂ reaches `threshold`. S. Balasubramanian, A.
+    Melendez-Calderon, A. Roby-Brami, E. Burdet, "On the analysis of movement smoothness", *J. NeuroEngineering and
+    Rehabilitation* 12:112, 2015, whose cutoff, threshold and padding are the defaults.
+
+    Parameters
+    ----------
+    speed : Array
+        Shape (n,).
+    rate : float
+        [Hz]
+    cutoff, threshold, padding
+        [Hz]; share of the largest; powers of two by which the spectrum is refined.
+    """
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
+    spectrum, frequency = np.abs(np.fft.rfft(speed, size)), np.fft.rfftfreq(size, 1.0 / rate)
+    if spectrum.max() <= 0.0:
+        return 0.0
+    within = frequency <= cutoff
+    spectrum, frequency = spectrum[within] / spectrum.max(), frequency[within]
+    above = np.flatnonzero(spectrum >= threshold)
+    spectrum, frequency = spectrum[above[0] : above[-1] + 1], frequency[above[0] : above[-1] + 1]
+    if len(frequency) < 2:
+        return 0.0
+    span = frequency[-1] - frequency[0]
+    return -float(np.sum(np.hypot(np.diff(frequency) / span, np.diff(spectrum))))
+
+
+def log_dimensionless_jerk(speed: Array, rate: float) -> float:
+    r"""LDLJ: minus the logarithm of the mean square jerk without dimension; larger is smoother.
+
+    .. math:: -\ln\left(\frac{T^3}{v_{peak}^2} \int_0^T \ddot v(t)^2\, dt\right)
+
+    N. Hogan and D. Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and arrests",
+    *J. Motor Behavior* 41, 2009, of the speed as in Balasubramanian et al. 2015. NaN of a hand that rests.
+
+    Parameters
+    ----------
+    speed : Array
+        Shape (n,), n ≥ 3.
+    rate : float
+        [Hz]
+    """
+    peak = float(np.max(speed))
+    jerk = np.diff(speed, 2) * rate**2
+    total = float(np.sum(jerk**2)) / rate
+    if peak <= 0.0 or total <= 0.0:
+        return float("nan")
+    return -float(np.log((len(speed) / rate) ** 3 / peak**2 * total))

@@ -1,0 +1,69 @@
+"""What a study costs beside its trials' own time, how trials scale over threads, and whether memory grows."""
+
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+from rich.console import Console
+
+from experiments.trials.database import Database
+from experiments.trials.drive import run_missing, warm
+from experiments.trials.plan import Trial, planned
+from experiments.trials.run_trial import SHELF
+from experiments.trials.study_config import StudyConfig, study_from
+from experiments.trials.threads import Threads
+
+_THREADS = 2
+
+
+class TrialCost(NamedTuple):
+    """Ratios of one study of `_study`, without a figure, and its trials.
+
+    Attributes
+    ----------
+    overhead : float
+        Processor time of planning, driving and database over that of the trials.
+    scaling : float
+        Trials a second of two threads over twice those of one.
+    grown : float
+        Memory after 400 short trials more, over that before.
+    """
+
+    overhead: float
+    scaling: float
+    grown: float
+
+
+def trial_cost() -> TrialCost:
+    """Measure; wall-clock times, so for a machine that does nothing else."""
+    quiet = Console(stderr=True, quiet=True)
+    warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, quiet)
+    begin = time.process_time()
+    own, one = _run(_study(6, 5.0), 1, quiet)
+    overhead = (time.process_time() - begin) / own - 1.0
+    _, two = _run(_study(6, 5.0), _THREADS, quiet)
+    _run(_study(25, 0.05), 1, quiet)
+    before = psutil.Process().memory_info().rss
+    _run(_study(100, 0.05), 1, quiet)
+    return TrialCost(overhead, one / (_THREADS * two), psutil.Process().memory_info().rss / before)
+
+
+def _study(users: int, seconds: float) -> StudyConfig:
+    values: Mapping[str, object] = {
+        "name": "cost", "seconds": seconds, "run": {"figure": "none"}, "users": {"number": users},
+        "factors": {"stiffness": [100, 300], "damping": [4, 8]},
+    }  # fmt: skip
+    return study_from(values, "cost")
+
+
+def _run(study: StudyConfig, threads: int, console: Console) -> tuple[float, float]:
+    """The trials' own processor time, and the time that the study took [s]."""
+    with tempfile.TemporaryDirectory() as folder, Database(Path(folder) / "s.sqlite", "cost", "cost", "") as database:
+        begin = time.perf_counter()
+        trials: tuple[Trial, ...] = planned(study)
+        told = {trial.key: {"user": trial.meeting.user} for trial in trials}
+        run_missing(trials, database, Threads(threads), "", console, told)
+        return sum(row.seconds for row in database.rows()), time.perf_counter() - begin

@@ -1,0 +1,187 @@
+"""report.html of a study: what it found, in one file that opens from disk."""
+
+import base64
+import html
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from experiments.trials.analysis.replays import Replay
+from experiments.trials.analysis.statistics import Contrast, Statistics
+from experiments.trials.measures import MEASURES
+from experiments.trials.study_config import StudyConfig
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,">
+<title>{title}</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }}
+h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
+h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
+.found {{ font-size: 1.05rem; border-left: 4px solid #1f5fbf; padding-left: 1rem; }}
+.found p {{ margin: .4rem 0; }}
+p.note {{ font-size: .9rem; color: #566072; }}
+.wide {{ overflow-x: auto; }}
+table {{ border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }}
+th, td {{ padding: .25rem .7rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; white-space: nowrap; }}
+th:first-child, td:first-child, th.l, td.l {{ text-align: left; }}
+td.says {{ white-space: normal; text-align: left; }}
+tr.weak {{ color: #7b8698; }}
+iframe {{ width: 100%; height: min(38rem, 75vh); border: 1px solid #d9dde4; border-radius: 6px; }}
+img {{ max-width: 100%; }}
+pre {{ background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p>{question}</p>
+<div class="found">{sentences}</div>
+<h2>Users' means</h2>
+{plots}
+<h2>Every measure, level against reference</h2>
+<div class="wide">{table}</div>
+<p class="note">Difference: of users' means, with its 95 % BCa bootstrap interval over users. Model: estimate of a
+linear mixed model with a random intercept by user, with its 95 % interval; p by Wald, and corrected for all {tests}
+contrasts of the table by Holm's method. Effect: Cohen's d_z of paired differences, Hedges' g between users. Grey: the
+corrected p is 0.05 or more. {interactions}</p>
+{remarks}
+{effects}
+<h2>Measures</h2>
+<table>{measures}</table>
+{failures}
+{replays}
+<h2>The study</h2>
+<pre>{study}</pre>
+<p class="note">{made}</p>
+</body>
+</html>
+"""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the page of a study is made of.
+
+    Attributes
+    ----------
+    study : StudyConfig
+        The study.
+    text : str
+        Its file.
+    sentences : sequence of str
+        What a skimming reader should know.
+    found : Statistics
+        All contrasts.
+    plots : mapping of str to Figure
+        By caption.
+    effects : Figure or None
+        Of all measures.
+    failures : mapping of str to int
+        How often trials failed, by reason.
+    replays : sequence of Replay
+        Trials that are shown.
+    made : str
+        What it was made with.
+    """
+
+    study: StudyConfig
+    text: str
+    sentences: Sequence[str]
+    found: Statistics
+    plots: Mapping[str, Figure]
+    effects: Figure | None
+    failures: Mapping[str, int]
+    replays: Sequence[Replay]
+    made: str
+
+    def page(self) -> str:
+        """The page."""
+        names = list(dict.fromkeys(contrast.measure for contrast in self.found.contrasts))
+        return _PAGE.format(
+            title=html.escape(self.study.name),
+            question=html.escape(self.study.question),
+            sentences="".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences),
+            plots="".join(
+                f"<p class='note'>{html.escape(what)}</p>{_image(plot)}" for what, plot in self.plots.items()
+            ),
+            table=_table(self.found.contrasts),
+            tests=sum(math.isfinite(contrast.p) for contrast in self.found.contrasts),
+            interactions=_interactions(self.found),
+            remarks="".join(f"<p class='note'>{html.escape(remark)}.</p>" for remark in self.found.remarks),
+            effects="" if self.effects is None else f"<h2>Size of the effects</h2>{_image(self.effects)}",
+            measures="".join(_measure_row(name) for name in names),
+            failures=_failures(self.failures),
+            replays="".join(
+                f'<h2>{html.escape(r.title)}</h2><iframe title="Replay" srcdoc="{html.escape(r.page)}"></iframe>'
+                for r in self.replays
+            ),
+            study=html.escape(self.text),
+            made=html.escape(self.made),
+        )
+
+
+def _image(figure: Figure) -> str:
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=110)
+    return f'<img alt="plot" src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
+
+
+def _table(contrasts: Sequence[Contrast]) -> str:
+    head = "".join(
+        f"<th{' class=l' if name in ('level', 'against') else ''}>{name}</th>"
+        for name in ("measure", "level", "against", "mean", "reference", "difference", "model", "p", "p Holm", "effect",
+                     "users")
+    )  # fmt: skip
+    return f"<table><tr>{head}</tr>{''.join(_row(contrast) for contrast in contrasts)}</table>"
+
+
+def _row(c: Contrast) -> str:
+    agree = f"{c.agree} of {c.users}" if c.agree else str(c.users)
+    numbers = (
+        _short(c.mean), _short(c.reference_mean), _between(c.difference, c.low, c.high),
+        _between(c.model, c.model_low, c.model_high), _p(c.p), _p(c.p_holm), _short(c.effect), agree,
+    )  # fmt: skip
+    weak = " class=weak" if not c.p_holm < 0.05 else ""
+    cells = "".join(f"<td>{number}</td>" for number in numbers)
+    names = f"<td>{html.escape(MEASURES[c.measure].label)}</td><td class=l>{html.escape(c.level)}</td>"
+    return f"<tr{weak}>{names}<td class=l>{html.escape(c.reference)}</td>{cells}</tr>"
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def _between(value: float, low: float, high: float) -> str:
+    ends = f" ({low:.3g} to {high:.3g})" if math.isfinite(low) and math.isfinite(high) else ""
+    return _short(value) + ends
+
+
+def _p(value: float) -> str:
+    return "–" if not math.isfinite(value) else "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def _interactions(found: Statistics) -> str:
+    if not found.interactions:
+        return ""
+    told = ", ".join(f"{MEASURES[name].name.replace('_', ' ')} {_p(p)}" for name, p in found.interactions.items())
+    return f"Interactions of the factors, p by likelihood ratio, not corrected: {html.escape(told)}."
+
+
+def _measure_row(name: str) -> str:
+    measure = MEASURES[name]
+    says = f"{measure.says}; {measure.better} is better"
+    return f"<tr><td>{html.escape(measure.label)}</td><td class=says>{html.escape(says)}</td></tr>"
+
+
+def _failures(failures: Mapping[str, int]) -> str:
+    if not failures:
+        return ""
+    rows = "".join(f"<tr><td>{html.escape(reason)}</td><td>{count}</td></tr>" for reason, count in failures.items())
+    return f"<h2>Trials that failed</h2><table><tr><th>reason</th><th>trials</th></tr>{rows}</table>"

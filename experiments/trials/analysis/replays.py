@@ -1,0 +1,60 @@
+"""The median and the worst trial of a study, run once more and shown."""
+
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from experiments.results.folder import RECORDING, world_of
+from experiments.trials.measures import MEASURES
+from experiments.trials.plan import Trial
+from experiments.trials.run_trial import Shelf, recorded
+from experiments.trials.trial_log import TrialLog
+from sim.recording.recording import Recording
+from sim.viewer.replay_html import replay_html
+
+
+class Replay(NamedTuple):
+    """A trial that is shown.
+
+    Attributes
+    ----------
+    title : str
+        Which it is, and why it is shown.
+    page : str
+        The replay, a document of its own.
+    """
+
+    title: str
+    page: str
+
+
+def chosen_trials(frame: Any, measure: str) -> dict[str, int]:
+    """Places in the table of the median and the worst trial by a measure; none if none has it."""
+    values = frame.loc[frame["state"].eq("done"), measure].dropna().sort_values(kind="stable")
+    if not len(values):
+        return {}
+    worst = values.index[-1 if MEASURES[measure].better == "less" else 0]
+    return {"median": int(values.index[len(values) // 2]), "worst": int(worst)}
+
+
+def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay, ...]:
+    """Run these trials again, recorded, and draw them."""
+    shown: list[Replay] = []
+    for what, place in chosen_trials(frame, measure).items():
+        trial, value = trials[place], float(frame[measure].iloc[place])
+        met = trial.meeting
+        levels = ", ".join(f"{factor} {level}" for factor, level in met.condition.levels.items())
+        title = (
+            f"The {what} trial by {MEASURES[measure].label}, {value:.3g}: user {met.user}, {levels}, repetition "
+            f"{met.repetition + 1}"
+        )
+        shown.append(Replay(title, _page(trial)))
+    return tuple(shown)
+
+
+def _page(trial: Trial) -> str:
+    session = Shelf().session(trial.config)
+    with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
+        recorded(trial.config, session, TrialLog(session.servo, session.world), Path(folder))
+        with Recording(Path(folder) / RECORDING) as recording:
+            return replay_html(recording, world_of(recording))

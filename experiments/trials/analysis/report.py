@@ -1,0 +1,58 @@
+"""The analysis of a study's table, written: contrasts, plots, replays, and the page with all of it."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from experiments.trials.analysis.page import Report
+from experiments.trials.analysis.plots import effects_figure, levels_figure
+from experiments.trials.analysis.replays import replays
+from experiments.trials.analysis.sentences import three_sentences
+from experiments.trials.analysis.statistics import Statistics, statistics
+from experiments.trials.analysis.tidy import measured_columns
+from experiments.trials.measures import MEASURES, OF_CONDITIONS
+from experiments.trials.plan import Trial
+from experiments.trials.study_config import StudyConfig
+
+_CONTRASTS = "contrasts.csv"
+
+
+def write_report(
+    study: StudyConfig, text: str, trials: Sequence[Trial], frame: Any, path: Path, made: str
+) -> tuple[Statistics, tuple[str, ...]]:
+    """Analyse a table and write the page; returns the statistics and the three sentences.
+
+    Parameters
+    ----------
+    study, text : StudyConfig, str
+        The study, and its file.
+    trials : sequence of Trial
+        As planned, in the order of the table.
+    frame : pandas.DataFrame
+        The table.
+    path : Path
+        HTML file; the contrasts are written beside it.
+    made : str
+        What it was made with.
+    """
+    import pandas as pd
+
+    measures = [name for name in measured_columns(frame) if name not in OF_CONDITIONS]
+    factors = {name: tuple(levels) for name, levels in study.factors.items()}
+    found = statistics(frame, factors, study.between, measures, study.seed)
+    failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()
+    sentences = three_sentences(study, found, len(frame), int(failures.sum()))
+    factor, *rest = factors
+    plots = {
+        MEASURES[measure].says: levels_figure(frame, factor, factors[factor], rest, measure)
+        for measure in dict.fromkeys((study.ease, study.cost)) if measure in measures
+    }  # fmt: skip
+    shown = replays(tuple(trials), frame, study.ease) if study.ease in measures else ()
+    counts = {str(reason): int(count) for reason, count in failures.items()}
+    page = Report(study, text, sentences, found, plots, effects_figure(found, factor), counts, shown, made).page()
+    path.write_text(page, encoding="utf-8")
+    pd.DataFrame.from_records([asdict(contrast) for contrast in found.contrasts]).to_csv(
+        path.with_name(_CONTRASTS), index=False
+    )
+    return found, sentences

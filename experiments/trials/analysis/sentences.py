@@ -1,0 +1,56 @@
+"""What a skimming reader should know of a study, in three sentences."""
+
+import math
+from collections.abc import Sequence
+
+from experiments.trials.analysis.statistics import Contrast, Statistics
+from experiments.trials.measures import MEASURES
+from experiments.trials.study_config import StudyConfig
+
+
+def three_sentences(study: StudyConfig, found: Statistics, trials: int, failed: int) -> tuple[str, str, str]:
+    """Who did what; whether the first factor made it easier; and what that cost."""
+    factor = next(iter(study.factors))
+    counts = " × ".join(str(len(levels)) for levels in study.factors.values())
+    ended = "all of which came to their end" if not failed else f"of which {failed} failed"
+    first = (
+        f"{study.users.number} simulated people met {counts} conditions ({', '.join(study.factors)}), "
+        f"{_times(study.repetitions)} each: {trials} trials of {study.seconds:g} s, {ended}."
+    )
+    return (
+        first,
+        _answer(found.of(study.ease, factor), study.ease, factor),
+        _answer(found.of(study.cost, factor), study.cost, factor),
+    )
+
+
+def _answer(contrasts: Sequence[Contrast], measure: str, factor: str) -> str:
+    name = MEASURES[measure].name.replace("_", " ")
+    if not contrasts:
+        return f"Of {name}, nothing can be said: it has no numbers that differ."
+    told = "; ".join(_compared(contrast) for contrast in contrasts)
+    return f"{name[0].upper()}{name[1:]}, by {factor}: {told}."
+
+
+def _compared(c: Contrast) -> str:
+    unit = f" {MEASURES[c.measure].unit}" if MEASURES[c.measure].unit else ""
+    held = f"{_number(c.mean)} against {_number(c.reference_mean)}{unit}"
+    if not (math.isfinite(c.low) and math.isfinite(c.high)):
+        return f"{held} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
+    interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
+    if c.low <= 0.0 <= c.high:
+        return f"no difference shown between {c.level} and {c.reference} ({held}; {interval})"
+    word = "lower" if c.difference < 0.0 else "higher"
+    better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
+    agree = f", {c.agree} of {c.users} users" if c.agree else ""
+    return (
+        f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({held}; {interval}{agree})"
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _times(count: int) -> str:
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")

@@ -1,0 +1,68 @@
+"""The trials of a study as one table: a row a trial, a column a factor or a measure."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.trials.errors import StudyError
+from experiments.trials.measures import MEASURES, OF_CONDITIONS
+from experiments.trials.plan import Trial
+from experiments.trials.run_trial import Row
+
+TABLE_CSV, TABLE_PARQUET = "trials.csv", "trials.parquet"
+_MISSING = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"
+
+
+def table(
+    trials: Sequence[Trial], rows: Mapping[str, Row], measures: Sequence[str], margins: Mapping[int, float]
+) -> Any:
+    """A data frame of pandas, in the order of the plan; whoever ran a trial, and when, is no part of it.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        As planned.
+    rows : mapping of str to Row
+        Of those that have run, by key.
+    measures : sequence of str
+        Names of the columns.
+    margins : mapping of int to float
+        `margin_used` by number of the condition.
+
+    Raises
+    ------
+    StudyError
+        If a trial has not run, or pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError:
+        raise StudyError(_MISSING) from None
+    lacking = [trial for trial in trials if trial.key not in rows]
+    if lacking:
+        raise StudyError(f"{len(lacking)} of {len(trials)} trials have not run yet; start the study again to go on")
+    records: list[dict[str, object]] = []
+    for trial in trials:
+        met, row = trial.meeting, rows[trial.key]
+        found = {name: row.measures.get(name, float("nan")) for name in measures}
+        if row.state == "done":
+            found |= {name: margins.get(met.number, float("nan")) for name in OF_CONDITIONS if name in measures}
+        record: dict[str, object] = {"key": trial.key, "user": met.user, **met.condition.levels}
+        record |= {"repetition": met.repetition, "position": met.position, "seed": trial.config.seed}
+        record |= {"state": row.state, "reason": row.reason, **found}
+        records.append(record)
+    return pd.DataFrame.from_records(records)
+
+
+def write_table(frame: Any, folder: Path) -> None:
+    """Write the table as Parquet and as CSV."""
+    try:
+        frame.to_parquet(folder / TABLE_PARQUET, index=False)
+    except ImportError:
+        raise StudyError(_MISSING) from None
+    frame.to_csv(folder / TABLE_CSV, index=False)
+
+
+def measured_columns(frame: Any) -> list[str]:
+    """Measures of a table that have a number somewhere."""
+    return [name for name in MEASURES if name in frame and frame[name].notna().any()]

@@ -1,0 +1,39 @@
+"""``hvf trials``: a study, from its file to its report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from experiments.config.part import part, whole
+
+
+@part
+class Trials:
+    """Run a study of simulated people from a TOML file, or go on with one that was stopped, and report on it."""
+
+    study: Annotated[Path, tyro.conf.Positional]
+    """TOML file of the study; see docs/how-to/user-studies.md."""
+    out: Path = Path("runs/study")
+    """Folder of database, tables and report; one that holds this study is continued."""
+    users: Annotated[int | None, whole(1)] = None
+    """How many users, in place of the study's number."""
+    seed: Annotated[int | None, whole(0)] = None
+    """Of population and trials, in place of the study's."""
+    threads: Annotated[int | None, whole(1)] = None
+    """Trials at a time in this process; by default as many as there are processors."""
+    workers: Annotated[int | None, whole(1)] = None
+    """Run them in so many processes of a local Dask cluster instead."""
+    cluster: str | None = None
+    """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
+    json: bool = False
+    """Print what was found as JSON."""
+
+    def __call__(self) -> int:
+        """Run, and say what was found; exit code 1 if trials failed."""
+        from experiments.trials.study import REPORT, Study
+
+        study = Study.load(self.study).with_users(self.users, self.seed)
+        result = study.run(self.out, self.threads, self.workers, self.cluster)
+        print(result.to_json() if self.json else f"{result}\nWritten to {self.out}: {REPORT} (open it in a browser).")
+        return 1 if result.failed else 0

@@ -1,0 +1,88 @@
+"""The driver of trials: what is not in the database yet is run, and every row is kept as it comes."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Task as BarTask
+from rich.text import Text
+
+from experiments.compiling import compile_once
+from experiments.config.part import to_json
+from experiments.config.run_config import RunConfig
+from experiments.trials.database import Database
+from experiments.trials.plan import Trial
+from experiments.trials.run_trial import Row, Shelf, Task
+
+
+class Executor(Protocol):
+    """What runs tasks: threads of this process, or a cluster."""
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        """Rows of tasks, as they are done."""
+        ...
+
+
+class _Rate(ProgressColumn):
+    """Trials a minute."""
+
+    def render(self, task: BarTask) -> Text:
+        return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
+
+
+def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
+    """Compile what trials need, once for each kind of run, and make their maps."""
+    for config in {_shape(config): config for config in configs}.values():
+        shelf.session(config, lambda units: compile_once(console, units))
+
+
+def _shape(config: RunConfig) -> object:
+    """What decides which code a run needs, and which map."""
+    added = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
+    return config.mode.kind, added, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+
+
+def run_missing(
+    trials: Sequence[Trial], database: Database, executor: Executor, recordings: str, console: Console,
+    what: Mapping[str, Mapping[str, object]],
+) -> int:  # fmt: skip
+    """Run all trials that the database lacks; returns how many were run.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        All of the study.
+    database : Database
+        That rows are kept in.
+    executor : Executor
+        What runs them.
+    recordings : str
+        Folder or URL of recordings; empty for none.
+    console : Console
+        Where progress is shown.
+    what : mapping
+        By key, what a reader of the database is told of a trial.
+
+    Raises
+    ------
+    StudyError, OSError
+        If the study cannot go on; what was done is kept.
+    """
+    kept = database.keys()
+    missing = [trial for trial in trials if trial.key not in kept]
+    if not missing:
+        return 0
+    columns = (
+        TextColumn("trials"), BarColumn(), TextColumn("{task.completed} of {task.total}"), _Rate(),
+        TimeRemainingColumn(), TextColumn("{task.fields[failed]}"),
+    )  # fmt: skip
+    failed = 0
+    rows = executor.rows(Task(trial.key, to_json(trial.config), recordings) for trial in missing)
+    with Progress(*columns, console=console, speed_estimate_period=60.0) as progress:
+        bar = progress.add_task("", total=len(trials), completed=len(trials) - len(missing), failed="none failed")
+        for row in rows:
+            database.add(row, what[row.key])
+            failed += row.state == "failed"
+            progress.update(bar, advance=1, failed=f"{failed} failed" if failed else "none failed")
+    return len(missing)

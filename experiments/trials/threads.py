@@ -1,0 +1,42 @@
+"""Trials on the threads of one process: the compiled loop holds no lock, and what is made once is shared."""
+
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+from experiments.trials.run_trial import Row, Task, perform
+
+AHEAD = 2  # tasks that wait for each thread, so that none is idle; more would only be memory
+
+
+class Threads:
+    """Runs trials side by side.
+
+    Parameters
+    ----------
+    number : int
+        How many at a time.
+    """
+
+    def __init__(self, number: int):
+        self._number = number
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        """Rows of tasks, as they are done; tasks are asked for as they are needed.
+
+        Raises
+        ------
+        OSError, MemoryError
+            If the machine lacks something.
+        """
+        pool, waiting = ThreadPoolExecutor(self._number), set[Future[Row]]()
+        try:
+            for task in tasks:
+                waiting.add(pool.submit(perform, task))
+                if len(waiting) >= AHEAD * self._number:
+                    done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    yield from (future.result() for future in done)
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        finally:
+            pool.shutdown(cancel_futures=True)

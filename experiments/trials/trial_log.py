@@ -1,0 +1,53 @@
+"""What of a trial is kept in memory until it is measured."""
+
+import numpy as np
+
+from controllers.state import Array
+from sim.body.figure_state import FigureState
+from sim.loop.loop import frame_channels, tick_channels
+from sim.loop.servo import FrameLog, Servo, TickLog
+from sim.world.world import World
+
+_TICKS = ("t", "p", "v", "user", "force", "phase", "nearest", "distance", "river", "fault")
+
+
+class TrialLog:
+    """An observer of a `Loop` that keeps the channels that measures need.
+
+    Attributes
+    ----------
+    ticks, frames : dict of str to Array
+        By channel, as `sim.loop.loop.groups` names them; frames without a figure have no reference, and of one that is
+        only shown no errors and forces.
+    """
+
+    def __init__(self, servo: Servo, world: World):
+        self._every, self._pose_at = servo.figure_ticks, world.pose_at
+        self._physical, self._shown = isinstance(servo.figure, FigureState), world.kind != "none"
+        self._ticks: dict[str, list[Array]] = {name: [] for name in _TICKS}
+        self._frames: dict[str, list[Array]] = {}
+
+    def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
+        """Take a block."""
+        channels = tick_channels(ticks, n)
+        for name, blocks in self._ticks.items():
+            blocks.append(channels[name].copy())
+        if not self._shown:
+            return
+        m = -(-n // self._every)
+        of_figure = {"t": frames.t[:m], "reference": frames.reference[:m]}
+        if self._physical:
+            of_figure = frame_channels(frames, m, self._pose_at)
+            del of_figure["qpos"]
+        for name, block in of_figure.items():
+            self._frames.setdefault(name, []).append(block.copy())
+
+    @property
+    def ticks(self) -> dict[str, Array]:
+        """Channels at the servo's rate."""
+        return {name: np.concatenate(blocks) for name, blocks in self._ticks.items()}
+
+    @property
+    def frames(self) -> dict[str, Array]:
+        """Channels at the figure's rate; none without a figure."""
+        return {name: np.concatenate(blocks) for name, blocks in self._frames.items()}

@@ -1,0 +1,49 @@
+"""``hvf tune``: a tuning, from its file to a certified configuration."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from experiments.config.part import part, whole
+
+
+@part
+class Tune:
+    """Tune numbers of a run on simulated people, within what is certified, or go on with a tuning that was stopped."""
+
+    tuning: Annotated[Path, tyro.conf.Positional]
+    """TOML file of the tuning; see docs/how-to/tuning.md."""
+    out: Path = Path("runs/tune")
+    """Folder of journal, database, report and the chosen configuration; one that holds this tuning is continued."""
+    candidates: Annotated[int | None, whole(1)] = None
+    """How many are simulated, in place of the tuning's number."""
+    threads: Annotated[int | None, whole(1)] = None
+    """Trials at a time in this process; by default as many as there are processors."""
+    workers: Annotated[int | None, whole(1)] = None
+    """Run them in so many processes of a local Dask cluster instead."""
+    cluster: str | None = None
+    """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
+    json: bool = False
+    """Print what was found as JSON."""
+
+    def __call__(self) -> int:
+        """Tune, and say what was chosen."""
+        from dataclasses import replace
+
+        from experiments.trials.errors import StudyError
+        from experiments.tuning.tune_config import read_tuning
+
+        config = read_tuning(self.tuning)
+        if self.candidates is not None:
+            config = replace(config, candidates=self.candidates)
+        try:
+            from experiments.tuning.tuning import CHOSEN, REPORT, run_tuning
+        except ImportError as error:
+            missing = f"tuning needs {error.name}; expected pip install 'haptic-vector-fields[study]'"
+            raise StudyError(missing) from None
+        text = self.tuning.read_text(encoding="utf-8")
+        found = run_tuning(config, self.out, text, self.threads, self.workers, self.cluster)
+        written = f"Written to {self.out}: {REPORT} (open it in a browser), {CHOSEN} (for hvf run --config)."
+        print(found.to_json() if self.json else f"{found}\n{written}")
+        return 0

@@ -1,0 +1,166 @@
+"""The search: candidates are proposed, certified, and only then tried on the panel; all of it is kept as it goes."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import optuna
+from optuna.storages.journal import JournalFileBackend
+from optuna.trial import TrialState
+
+from experiments.certify.kept_stability import Stability, kept_stability
+from experiments.tuning.panel import Panel, panel_runs
+from experiments.tuning.samplers import STARTUP, sampler_of
+from experiments.tuning.tune_config import MARGIN, TuneConfig
+
+_TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
+REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
+
+
+class Candidate(NamedTuple):
+    """A candidate that was proposed.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        By word of a run.
+    objectives : tuple of float or None
+        In the order of the tuning; None of one that was not tried, or given up.
+    verdict : str
+        Of its stability.
+    margin : float or None
+        Of its stability.
+    state : {"tried", "given up", "refused"}
+        What became of it.
+    """
+
+    values: dict[str, float]
+    objectives: tuple[float, ...] | None
+    verdict: str
+    margin: float | None
+    state: str
+
+
+def search(
+    config: TuneConfig, journal: Path, identity: str, panel: Panel, sampler: str, progress: Callable[[int], None]
+) -> list[Candidate]:
+    """Search until enough candidates have been simulated, going on with what the journal has.
+
+    Parameters
+    ----------
+    config : TuneConfig
+        What is tuned.
+    journal : Path
+        File of optuna's journal.
+    identity : str
+        Of the tuning, by which the journal knows it.
+    panel : Panel
+        That tries candidates.
+    sampler : str
+        Who proposes; see `TuneConfig`.
+    progress : callable
+        Called with the number of simulated candidates.
+    """
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    storage = optuna.storages.JournalStorage(JournalFileBackend(str(journal)))
+    study = optuna.create_study(
+        storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
+        pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP, n_warmup_steps=1),
+    )  # fmt: skip
+    space: dict[str, optuna.distributions.BaseDistribution] = {
+        word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
+        for word, span in config.space.items()
+    }
+    for begun in study.get_trials(states=(TrialState.RUNNING,)):
+        study.tell(begun.number, state=TrialState.FAIL)  # it was under way when the search was stopped: asked for again
+    while True:
+        simulated, all_of_them = _simulated(study), len(study.get_trials(deepcopy=False, states=_TOLD))
+        progress(simulated)
+        if simulated >= config.candidates or all_of_them >= REFUSED_MOST * config.candidates:
+            return candidates_of(study)
+        study.sampler = sampler_of(sampler, config.seed, all_of_them)
+        _try(config, study, study.ask(space), panel)
+
+
+def _simulated(study: optuna.Study) -> int:
+    trials = study.get_trials(deepcopy=False, states=_TOLD)
+    return sum(t.state.is_finished() and t.user_attrs.get("violation", 1.0) <= 0.0 for t in trials)
+
+
+def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
+    made = config.config(trial.params)
+    stability = kept_stability(made)
+    violation = violation_of(config, stability)
+    trial.set_user_attr("verdict", stability.verdict)
+    trial.set_user_attr("margin", stability.margin)
+    trial.set_user_attr("violation", violation)
+    trial.set_constraint("certificate", violation)
+    if violation > 0.0:
+        study.tell(trial, state=TrialState.PRUNED)
+        return
+    values = _objectives(config, trial, panel, stability)
+    if values is None or not np.all(np.isfinite(values)):
+        study.tell(trial, state=TrialState.PRUNED)
+    else:
+        study.tell(trial, values)
+
+
+def violation_of(config: TuneConfig, stability: Stability) -> float:
+    """How far a candidate is from what may be tried: 0 or less of one that may."""
+    if stability.verdict == "refuted":
+        return 1.0 - min(0.0, stability.margin or 0.0)
+    if stability.verdict == "unknown" and not config.allow_unknown:
+        return 1.0
+    return 0.0 if stability.margin is None else max(0.0, config.least_margin - stability.margin)
+
+
+def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability: Stability) -> list[float] | None:
+    """Means over the panel; None of a candidate that is given up after part of it."""
+    measures = [name for name in config.objectives if name != MARGIN]
+    by_user = panel_runs(config.config(trial.params), config.users, config.repetitions, config.seed)
+    halfway = max(1, len(by_user) // 3)
+    parts = [by_user[:halfway], by_user[halfway:]] if config.prune and len(config.objectives) == 1 else [by_user]
+    found = np.empty((0, len(measures)))
+    for step, part in enumerate(parts):
+        found = np.vstack((found, panel.measured([run for runs in part for run in runs], measures)))
+        if step + 1 < len(parts):
+            trial.report(float(np.mean(found)), step + 1)
+            if trial.should_prune():
+                return None
+    means = dict(zip(measures, np.mean(found, axis=0), strict=True))
+    return [float(stability.margin or 0.0) if name == MARGIN else float(means[name]) for name in config.objectives]
+
+
+def candidates_of(study: optuna.Study) -> list[Candidate]:
+    """All that were proposed, in their order."""
+    made: list[Candidate] = []
+    for t in study.get_trials(deepcopy=False, states=_TOLD):
+        attributes: dict[str, Any] = t.user_attrs
+        state = "refused" if attributes["violation"] > 0.0 else "tried" if t.values is not None else "given up"
+        values = None if t.values is None else tuple(t.values)
+        made.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
+    return made
+
+
+def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
+    """Those that no other one is better than in one objective without being worse in another."""
+    tried = [candidate for candidate in candidates if candidate.objectives is not None]
+    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    costs = np.array([signs * np.array(c.objectives) for c in tried]).reshape(len(tried), len(signs))
+    return [
+        c for c, cost in zip(tried, costs, strict=True)
+        if not np.any(np.all(costs <= cost, axis=1) & np.any(costs < cost, axis=1))
+    ]  # fmt: skip
+
+
+def chosen(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
+    """Of one objective the best; of more the one of the front nearest to the best of each, scaled."""
+    best = front(candidates, directions)
+    if not best:
+        return None
+    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    costs = np.array([signs * np.array(c.objectives) for c in best])
+    low, span = costs.min(axis=0), np.ptp(costs, axis=0)
+    scaled = (costs - low) / np.where(span > 0.0, span, 1.0)
+    return best[int(np.argmin(np.linalg.norm(scaled, axis=1)))]

@@ -1,0 +1,166 @@
+"""Tuning of a simulation from Python: any of its numbers, by any cost, within what is certified."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from experiments.certify.certify_simulation import certify
+from experiments.run_result import Run
+from experiments.simulation import Simulation, User
+from experiments.sweep import with_values
+
+Cost = Callable[[Run], float | Sequence[float]]
+REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a search goes.
+
+    Parameters
+    ----------
+    candidates : int
+        How many are simulated.
+    sampler : {"tpe", "cma-es", "nsga-ii", "random"}
+        Who proposes them.
+    costs : int
+        How many numbers the cost gives; of more than one a front is sought.
+    threads : int
+        Runs at a time.
+    allow_unknown : bool
+        Try candidates of which nothing is certain, too; what is refuted is never tried.
+    journal : path, optional
+        File that keeps the search, so that it goes on where it was stopped.
+    seed : int
+        Of what is random in it.
+    """
+
+    candidates: int = 30
+    sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
+    costs: int = 1
+    threads: int = 1
+    allow_unknown: bool = False
+    journal: str | Path | None = None
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class TunedSimulation:
+    """What tuning a simulation found.
+
+    Attributes
+    ----------
+    sim : Simulation
+        With the best values set; of several costs, with those of the front that have the least of the first.
+    values : dict of str to float
+        What was set, by path.
+    costs : tuple of float
+        Means over the panel.
+    front : tuple of (dict, tuple)
+        Values and costs of all that nothing else beats.
+    tried, refused : int
+        Candidates that were simulated, and those that the certificate refused.
+    """
+
+    sim: Simulation
+    values: dict[str, float]
+    costs: tuple[float, ...]
+    front: tuple[tuple[dict[str, float], tuple[float, ...]], ...]
+    tried: int
+    refused: int
+
+
+def tune(
+    sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, panel: Sequence[User] = (),
+    seconds: float = 6.0, search: Search | None = None,
+) -> TunedSimulation:  # fmt: skip
+    """Find the numbers of a simulation at which a cost is least; what the certificate refutes is never tried.
+
+    Parameters
+    ----------
+    sim : Simulation
+        As it is else.
+    space : mapping of str to (float, float)
+        Lowest and highest, by path as `hvf.sweep` has it: ``{"field.k_r": (50, 2000)}``.
+    cost : callable
+        From a run to what is to be small: a number, or several of which the front is sought.
+    panel : sequence of User
+        Who tries each candidate; costs are means over them. By default the simulation's own user.
+    seconds : float
+        Simulated time of each run [s].
+    search : Search, optional
+        How the search goes.
+
+    Raises
+    ------
+    ParameterError
+        If the space has no such number, or none of its candidates may be tried.
+    """
+    import optuna  # an extra, that takes half a second to import
+
+    search, users = search or Search(), tuple(panel) or (sim.user,)
+    # What there is not is told, and what has to be compiled is, before anything runs.
+    with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
+    study = _study(search, space)
+    complete, ranges = (optuna.trial.TrialState.COMPLETE,), _ranges(space)
+    for asked in range(len(study.trials), REFUSED_MOST * search.candidates):
+        if len(study.get_trials(states=complete)) >= search.candidates:
+            break
+        trial = _asked(study, search, ranges, asked)
+        candidate = with_values(sim, trial.params)
+        verdict = certify(candidate).stability.verdict
+        allowed = verdict == "certified" or (verdict == "unknown" and search.allow_unknown)
+        trial.set_constraint("certificate", 0.0 if allowed else 1.0)
+        if allowed:
+            study.tell(trial, _means(candidate, users, cost, seconds, search.threads))
+        else:
+            study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+    tried = len(study.get_trials(states=complete))
+    refused = len(study.get_trials(states=(optuna.trial.TrialState.PRUNED,)))
+    if not tried:
+        raise ParameterError(f"none of {refused} candidates is certified; expected a space with some, or allow_unknown")
+    front = tuple((dict(t.params), tuple(t.values)) for t in study.best_trials)
+    values, costs = min(front, key=lambda entry: entry[1])
+    return TunedSimulation(with_values(sim, values), values, costs, front, tried, refused)
+
+
+def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    import optuna
+
+    return {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
+
+
+def _study(search: Search, space: Mapping[str, tuple[float, float]]) -> Any:
+    import optuna
+    from optuna.storages.journal import JournalFileBackend
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    kept = None
+    if search.journal is not None:
+        kept = optuna.storages.JournalStorage(JournalFileBackend(str(search.journal)))
+    name = f"hvf.tune {sorted(space.items())}"
+    directions: list[Literal["minimize", "maximize"]] = ["minimize"] * search.costs
+    return optuna.create_study(storage=kept, study_name=name, load_if_exists=True, directions=directions)
+
+
+def _asked(study: Any, search: Search, ranges: Mapping[str, Any], number: int) -> Any:
+    from experiments.tuning.samplers import sampler_of
+
+    study.sampler = sampler_of(search.sampler, search.seed, number)
+    return study.ask(dict(ranges))
+
+
+def _means(candidate: Simulation, users: Sequence[User], cost: Cost, seconds: float, threads: int) -> list[float]:
+    """Costs of a candidate, over its users."""
+
+    def run(user: User) -> Run:
+        return replace(candidate, user=user).run(seconds)
+
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        runs = pool.map(run, users)
+        return [float(mean) for mean in np.mean([np.atleast_1d(cost(run)) for run in runs], axis=0)]

@@ -1,0 +1,161 @@
+"""A tuning as it is written: one TOML file."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from pydantic import Field
+
+from experiments.config.part import above, at_least, from_dict, part, whole
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.trials.errors import StudyError
+from experiments.trials.measures import MEASURES, OF_CONDITIONS, measures_of
+from experiments.trials.study_config import Users, Words, read_toml
+
+MARGIN = "margin"
+"""Objective that is no measure: (critical k_r)/k_r − 1 of the certificate, the more the better."""
+
+
+@part
+class Range:
+    """Numbers that a word of a run may take.
+
+    Parameters
+    ----------
+    low, high : float
+        Inclusive.
+    log : bool
+        Whether their logarithm is drawn.
+    """
+
+    low: float
+    high: float
+    log: bool = False
+
+
+@part
+class TuneConfig:
+    """A tuning: which numbers, for whom, by what, and how long.
+
+    Parameters
+    ----------
+    name : str
+        What heads the report.
+    space : mapping
+        By word of a run, the range it is drawn from.
+    objectives : tuple of str
+        Measures of trials (see `experiments.trials.measures`), each the mean over the panel, or "margin"; of more than
+        one, what is best is a front.
+    run : mapping
+        What all candidates share, in the words of a run; what the space leaves out, and where tuning begins.
+    users : Users
+        The panel.
+    held_back : Users
+        Whom the result is judged on; of another seed.
+    repetitions : int
+        Trials of a candidate with every user.
+    seconds : float
+        Simulated time of a trial [s].
+    candidates : int
+        How many are simulated.
+    sampler : {"tpe", "cma-es", "nsga-ii", "random"}
+        Who proposes them.
+    prune : bool
+        Give up a candidate that is worse than the median after part of the panel; of one objective only.
+    least_margin : float
+        Of the stability certificate, below which a candidate is not tried.
+    allow_unknown : bool
+        Try candidates of which nothing is certain, too; what is refuted is never tried.
+    seed : int
+        Of the search and of the trials.
+    """
+
+    name: str
+    space: dict[str, Range]
+    objectives: tuple[str, ...] = ("tracking_error",)
+    run: Words = Field(default_factory=dict)
+    users: Users = Users(number=6, seed=1)
+    held_back: Users = Users(number=12, seed=2)
+    repetitions: int = whole(1, default=1)
+    seconds: float = above(0.0, default=6.0, unit="s")
+    candidates: int = whole(1, default=40)
+    sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
+    prune: bool = True
+    least_margin: float = at_least(0.0, default=0.0)
+    allow_unknown: bool = False
+    seed: int = whole(0, default=1)
+
+    @property
+    def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:
+        """Of the objectives."""
+        return tuple("maximize" if more_is_better(name) else "minimize" for name in self.objectives)
+
+    def config(self, values: Mapping[str, float]) -> RunConfig:
+        """The run of a candidate, with nobody at the stylus yet."""
+        words: Words = self.run | dict(values) | {"seconds": self.seconds}
+        return run_config(**words)
+
+
+def more_is_better(objective: str) -> bool:
+    """Whether an objective is to be large."""
+    return objective == MARGIN or MEASURES[objective].better == "more"
+
+
+def label_of(objective: str) -> str:
+    """An objective, for a person."""
+    return "margin of stability, (critical k_r)/k_r − 1" if objective == MARGIN else MEASURES[objective].label
+
+
+def read_tuning(path: Path) -> TuneConfig:
+    """The tuning in a TOML file.
+
+    Raises
+    ------
+    StudyError, ParameterError
+        If it cannot be read, or contradicts itself.
+    """
+    config = from_dict(TuneConfig, cast(Mapping[str, Any], read_toml(path, "a tuning")), str(path))
+    check_tuning(config)
+    return config
+
+
+def check_tuning(config: TuneConfig) -> None:
+    """Refuse a tuning that contradicts itself.
+
+    Raises
+    ------
+    StudyError, ParameterError
+        If it does.
+    """
+    where = f"tuning {config.name!r}"
+    if not config.space:
+        raise StudyError(f"{where} has an empty space; expected a word of a run with its low and high")
+    for word, span in config.space.items():
+        if not span.low < span.high or (span.log and span.low <= 0.0):
+            raise StudyError(
+                f"{where}: {word} lies between {span.low:g} and {span.high:g}; expected low < high, log of > 0"
+            )
+        if word in ("seed", "seconds"):
+            raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
+    every = [name for name in MEASURES if name not in OF_CONDITIONS]
+    for name in config.objectives:
+        if name != MARGIN and name not in every:
+            raise StudyError(f"{where}: no objective {name!r}; there are {', '.join([*every, MARGIN])}")
+    if not config.objectives or set(config.objectives) == {MARGIN}:
+        raise StudyError(f"{where} has no measure among its objectives; expected one, such as tracking_error")
+    if config.users.seed == config.held_back.seed:
+        raise StudyError(f"{where}: panel and held-back users are of the same seed {config.users.seed}; expected two")
+    if config.sampler == "cma-es" and (len(config.objectives) > 1 or len(config.space) < 2):
+        raise StudyError(f"{where}: CMA-ES needs one objective and two numbers or more; expected sampler = 'tpe'")
+    for end in ("low", "high"):
+        made = config.config({word: getattr(span, end) for word, span in config.space.items()})
+        lacking = [n for n in config.objectives if n != MARGIN and n not in measures_of(made.figure.kind)]
+        if lacking:
+            raise StudyError(f"{where}: {lacking[0]!r} needs a figure that is {MEASURES[lacking[0]].figure}")
+
+
+def judged(config: TuneConfig) -> TuneConfig:
+    """The same with the held-back users as its panel."""
+    return replace(config, users=config.held_back)

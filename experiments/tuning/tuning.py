@@ -1,0 +1,236 @@
+"""A tuning that is run: searched, held against others, certified, and told."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from experiments.certify.certify import certify_into
+from experiments.config.part import to_json
+from experiments.files.json_text import json_text
+from experiments.trials.database import Database
+from experiments.trials.drive import warm
+from experiments.trials.errors import StudyError
+from experiments.trials.executors import executor
+from experiments.trials.run_trial import SHELF
+from experiments.tuning.contenders import Contender, contenders, interval, wins
+from experiments.tuning.page import tuning_page
+from experiments.tuning.panel import Panel, panel_runs
+from experiments.tuning.plots import gains_figure, objectives_figure
+from experiments.tuning.search import Candidate, chosen, search
+from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
+
+DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
+CERTIFICATE = "certificate"
+RANDOM = "random search"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A contender against what was tuned, on one objective and the held-back users.
+
+    Attributes
+    ----------
+    contender, objective : str
+        Which.
+    mean, tuned : float
+        Over the users.
+    better_by, low, high : float
+        By how much the tuned one is better, with its 95 % bootstrap interval over users.
+    """
+
+    contender: str
+    objective: str
+    mean: float
+    tuned: float
+    better_by: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What a tuning found.
+
+    Attributes
+    ----------
+    folder : Path
+        That holds journal, database, report and the chosen configuration.
+    values : dict of str to float
+        Chosen.
+    candidates : tuple of Candidate
+        All that were proposed.
+    comparisons : tuple of Comparison
+        On the held-back users.
+    importances : dict of str to dict
+        By objective, share of each number of the space in what differs.
+    sentences : tuple of str
+        What a skimming reader should know.
+    """
+
+    folder: Path
+    values: dict[str, float]
+    candidates: tuple[Candidate, ...]
+    comparisons: tuple[Comparison, ...]
+    importances: dict[str, dict[str, float]]
+    sentences: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences)
+
+    def to_json(self) -> str:
+        """All of it but the folder."""
+        told = {"values": self.values, "sentences": self.sentences, "importances": self.importances}
+        comparisons = [asdict(comparison) for comparison in self.comparisons]
+        candidates = [candidate._asdict() for candidate in self.candidates]
+        return json_text(told | {"comparisons": comparisons, "candidates": candidates})
+
+
+def run_tuning(
+    config: TuneConfig, out: Path, text: str = "", threads: int | None = None, workers: int | None = None,
+    cluster: str | None = None, console: Console | None = None,
+) -> Tuned:  # fmt: skip
+    """Search, hold what was found against others, certify it, and write a report.
+
+    Parameters
+    ----------
+    config : TuneConfig
+        What is tuned.
+    out : Path
+        Folder; one that holds this tuning is continued.
+    text : str
+        The tuning's file, as the report shows it.
+    threads, workers, cluster
+        As of `experiments.trials.study.Study.run`.
+    console : Console, optional
+        Where progress is shown; by default stderr.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError, OSError
+        If it contradicts itself, or cannot go on; what was tried is kept.
+    """
+    console, text = console or Console(stderr=True), text or to_json(config)
+    identity = hashlib.sha256(to_json(replace(config, candidates=1, name="")).encode()).hexdigest()[:16]
+    with Database(out / DATABASE, identity, config.name, text) as database:
+        first = panel_runs(config.config({}), config.users, 1, config.seed)[0][0]
+        warm([first], SHELF, console)
+        with executor(threads, workers, cluster) as runs:
+            panel = Panel(database, runs)
+            found = _searched(config, out / JOURNAL, identity, panel, config.sampler, console)
+            best = chosen(found, config.directions)
+            if best is None:
+                raise StudyError(
+                    f"tuning {config.name!r}: none of {len(found)} candidates could be tried, as none is certified; "
+                    "expected a space with some that are, or allow_unknown = true"
+                )
+            others: dict[str, Candidate | None] = {}
+            if config.sampler != "random":
+                drawn = _searched(config, out / JOURNAL, identity, panel, "random", console)
+                others[RANDOM] = chosen(drawn, config.directions)
+            with console.status("held-back users"):
+                judged = contenders(config, best, others, panel)
+    return _told(config, out, text, found, best, judged)
+
+
+def _searched(
+    config: TuneConfig, journal: Path, identity: str, panel: Panel, sampler: str, console: Console
+) -> list[Candidate]:
+    columns = (TextColumn(f"{sampler} candidates"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
+    with Progress(*columns, TimeRemainingColumn(), console=console) as progress:
+        bar = progress.add_task("", total=config.candidates)
+        return search(config, journal, identity, panel, sampler, lambda n: progress.update(bar, completed=n))
+
+
+def _told(
+    config: TuneConfig, out: Path, text: str, found: Sequence[Candidate], best: Candidate, judged: Sequence[Contender]
+) -> Tuned:
+    tuned = judged[0]
+    (out / CHOSEN).write_text(to_json(tuned.config), encoding="utf-8")
+    certificate = certify_into(tuned.config, out / CERTIFICATE)
+    comparisons = compared(config, judged)
+    importances = importances_of(config, found)
+    sentences = _sentences(config, best, found, tuned, comparisons)
+    others = {c.name: _gains(config, c) for c in judged[1:]}
+    plots = [objectives_figure(config, found, best), gains_figure(config, found, best, others)]
+    verdicts = {name: verdict.reason for name, verdict in certificate.verdicts.items()}
+    page = tuning_page(config, text, sentences, judged, comparisons, importances, plots, verdicts)
+    (out / REPORT).write_text(page, encoding="utf-8")
+    result = Tuned(out, best.values, tuple(found), tuple(comparisons), importances, sentences)
+    (out / SUMMARY).write_text(result.to_json() + "\n", encoding="utf-8")
+    return result
+
+
+def _gains(config: TuneConfig, contender: Contender) -> dict[str, float]:
+    mode = cast(Any, contender.config.mode)
+    return {name: float(getattr(mode, name, np.nan) or np.nan) for name in ("stiffness", "damping")}
+
+
+def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison]:
+    """Every other contender against the first one, on every objective."""
+    made: list[Comparison] = []
+    for contender in judged[1:]:
+        better = wins(contender, judged[0], config.directions)
+        for k, objective in enumerate(config.objectives):
+            low, high = interval(better[:, k], config.seed)
+            means = float(contender.means[k]), float(judged[0].means[k])
+            made.append(Comparison(contender.name, objective, *means, float(np.mean(better[:, k])), low, high))
+    return made
+
+
+def importances_of(config: TuneConfig, candidates: Sequence[Candidate]) -> dict[str, dict[str, float]]:
+    """Share of each number of the space in what differs between the better candidates and all (optuna's PED-ANOVA)."""
+    import optuna
+
+    tried = [c for c in candidates if c.objectives is not None]
+    if len(tried) < 4 or len(config.space) < 2:
+        return {}
+    shares: dict[str, dict[str, float]] = {}
+    space: dict[str, optuna.distributions.BaseDistribution] = {
+        word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
+        for word, span in config.space.items()
+    }
+    for k, objective in enumerate(config.objectives):
+        study = optuna.create_study(direction=config.directions[k])
+        for c in tried:
+            value = cast(tuple[float, ...], c.objectives)[k]
+            study.add_trial(optuna.trial.create_trial(params=c.values, distributions=space, value=value))
+        evaluator = optuna.importance.PedAnovaImportanceEvaluator()
+        found = optuna.importance.get_param_importances(study, evaluator=evaluator)
+        shares[objective] = {word: float(share) for word, share in found.items()}
+    return shares
+
+
+def _sentences(
+    config: TuneConfig, best: Candidate, found: Sequence[Candidate], tuned: Contender, comparisons: Sequence[Comparison]
+) -> tuple[str, ...]:
+    counts = {state: sum(c.state == state for c in found) for state in ("tried", "given up", "refused")}
+    values = ", ".join(f"{word} {value:.4g}" for word, value in best.values.items())
+    margin = "" if tuned.stability.margin is None else f", with a margin of {tuned.stability.margin:.3g} in k_r"
+    return (
+        f"Chosen: {values}; its stability is {tuned.stability.verdict}{margin}.",
+        f"{counts['tried']} candidates were tried on {config.users.number} users, {counts['given up']} given up on the "
+        f"way, {counts['refused']} refused untried by the certificate.",
+        *(_sentence(config, comparison) for comparison in comparisons),
+    )
+
+
+def _sentence(config: TuneConfig, c: Comparison) -> str:
+    unit = label_of(c.objective)
+    if not np.isfinite(c.mean):
+        return f"Against {c.contender}: that is refuted by the certificate, and was not tried."
+    if c.objective == MARGIN:
+        return f"Against {c.contender}, {unit}: {c.tuned:.3g} for {c.mean:.3g}."
+    if c.better_by == 0.0:
+        return f"Against {c.contender}, {unit}: the same, {c.tuned:.3g}."
+    word = "better" if c.better_by > 0.0 else "worse"
+    shown = "" if c.low > 0.0 or c.high < 0.0 else ", so no difference is shown"
+    return (
+        f"Against {c.contender}, on {config.held_back.number} held-back users, {unit}: {c.tuned:.3g} for {c.mean:.3g}, "
+        f"{word} by {abs(c.better_by):.3g} (95 % interval of what is gained {c.low:.3g} to {c.high:.3g}{shown})."
+    )

@@ -1,0 +1,112 @@
+"""A study whose driver and workers are killed at random moments until it is done, for the tests.
+
+``python tests/experiments/trials/killed_study.py 20`` does it with 20 kills and compares the tables.
+"""
+
+import contextlib
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+
+STUDY = """
+name = "killed"
+seconds = 0.5
+repetitions = {repetitions}
+ease = "tracking_error"
+cost = "effort"
+measures = ["tracking_error", "effort", "sparc"]
+[run]
+figure = "none"
+[users]
+number = 4
+[factors]
+stiffness = [100, 300]
+damping = [4, 8]
+"""
+
+
+def written(folder: Path, repetitions: int) -> Path:
+    """The study's file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "killed.toml"
+    path.write_text(STUDY.format(repetitions=repetitions), encoding="utf-8")
+    return path
+
+
+def start(study: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+    """A driver in a process of its own."""
+    command = [sys.executable, "-m", "experiments.cli", "trials", str(study), "--out", str(out), *options]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def finish(driver: subprocess.Popen[bytes]) -> None:
+    """Wait for a driver that is left alone."""
+    _, said = driver.communicate(timeout=500)
+    assert driver.returncode == 0, said.decode()
+
+
+def workers_of(driver: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    """Worker processes of a driver's local cluster."""
+    found: list[psutil.Process] = []
+    with contextlib.suppress(psutil.Error):
+        for child in psutil.Process(driver.pid).children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                found += [child] if "spawn_main" in " ".join(child.cmdline()) else []
+    return found
+
+
+def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str, int]:
+    """Kill driver and workers in turn at random moments of a study with two workers, then let it finish.
+
+    Returns how often each was killed: fewer than asked for if the study was done before.
+    """
+    rng, killed, orphans = random.Random(seed), {"worker": 0, "driver": 0}, list[psutil.Process]()
+    driver = start(study, out, "--workers", "2")
+    try:
+        while sum(killed.values()) < kills:
+            if killed["worker"] > killed["driver"]:
+                time.sleep(rng.uniform(0.0, 8.0))
+                orphans += workers_of(driver)
+                driver.kill()
+                driver.communicate()
+                driver = start(study, out, "--workers", "2")
+                killed["driver"] += 1
+                continue
+            while not workers_of(driver) and driver.poll() is None:
+                time.sleep(0.1)
+            time.sleep(rng.uniform(0.0, 4.0))
+            workers = workers_of(driver)
+            if driver.poll() is not None or not workers:
+                break  # it is done before all the kills
+            with contextlib.suppress(psutil.Error):
+                rng.choice(workers).kill()
+            killed["worker"] += 1
+        finish(driver)
+    finally:
+        driver.kill()
+        driver.communicate()
+        _, alive = psutil.wait_procs(orphans, timeout=30)
+        for process in alive:
+            process.kill()
+    assert not alive, "workers outlive their driver"
+    return killed
+
+
+def main(kills: int, repetitions: int, seed: int) -> None:
+    """Compare a study that is killed with one that is not, and with one on one thread."""
+    with tempfile.TemporaryDirectory() as folder:
+        study = written(Path(folder), repetitions)
+        killed = killed_at_random(study, Path(folder) / "killed", kills, seed)
+        finish(start(study, Path(folder) / "undisturbed", "--workers", "2"))
+        finish(start(study, Path(folder) / "one", "--threads", "1"))
+        tables = [(Path(folder) / run / "trials.csv").read_bytes() for run in ("killed", "undisturbed", "one")]
+        print(killed, "rows:", tables[0].count(b"\n") - 1, "identical:", tables[0] == tables[1] == tables[2])
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 40, 1)

@@ -1,0 +1,127 @@
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from controllers.errors import ParameterError
+from experiments.config.part import to_json
+from experiments.results import smoothness
+from experiments.trials import run_trial
+from experiments.trials.database import Database
+from experiments.trials.errors import StudyError
+from experiments.trials.executors import executor
+from experiments.trials.run_trial import Row, Shelf, Task, perform
+from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
+from sim.recording.recording import Recording
+
+pytest.importorskip("pandas")
+pytest.importorskip("statsmodels")
+
+
+def small(**values: object) -> Study:
+    told: dict[str, object] = {
+        "name": "small", "seconds": 0.5, "run": {"figure": "none"}, "factors": {"stiffness": [100, 300]},
+        "users": {"number": 3}, "cost": "effort", "measures": ["tracking_error", "effort", "sparc"],
+    }  # fmt: skip
+    return Study.of(**(told | values))
+
+
+@pytest.mark.slow
+def test_a_study_is_the_same_on_one_thread_on_two_and_when_it_goes_on_where_it_was_left(tmp_path: Path) -> None:
+    one = small().run(tmp_path / "one", threads=1)
+    small().with_users(number=2).run(tmp_path / "grown", threads=2)
+    grown = small().run(tmp_path / "grown", threads=2)
+    assert (one.ran, grown.ran, one.failed) == (6, 2, 0)
+    tables = [(tmp_path / name / "trials.csv").read_bytes() for name in ("one", "grown")]
+    assert tables[0] == tables[1]
+    assert small().run(tmp_path / "one").ran == 0
+    assert one.table["user"].value_counts().to_dict() == {0: 2, 1: 2, 2: 2}
+    page = (tmp_path / "one" / REPORT).read_text(encoding="utf-8")
+    assert "The median trial" in page
+    assert "The worst trial" in page
+    assert all(sentence in page for sentence in one.sentences)
+    assert json.loads((tmp_path / "one" / SUMMARY).read_text())["trials"] == 6
+
+
+def test_another_study_in_the_folder_is_refused(tmp_path: Path) -> None:
+    changed, whole = small(factors={"stiffness": [100, 400]}), small()
+    Database(tmp_path / DATABASE, whole._identity(), "small", "").close()
+    with pytest.raises(StudyError, match="holds another study"):
+        changed.run(tmp_path, threads=1)
+    assert small(repetitions=3, name="larger").with_users(number=9)._identity() == whole._identity()
+
+
+def test_a_trial_that_raises_is_a_row_with_its_reason_and_not_an_end(tmp_path: Path) -> None:
+    # A curve that the Phantom does not reach is known only when the run is wired up.
+    factors = {"around": {"near": {"radius": 0.0477}, "far": {"radius": 0.4}}}
+    study = small(factors=factors, users={"number": 2})
+    trials = study.trials
+    rows = [perform(Task(trial.key, to_json(trial.config)), Shelf()) for trial in trials]
+    states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
+    assert states == {"near": "done", "far": "failed"}
+    assert all("reach" in row.reason or "stops" in row.reason for row in rows if row.state == "failed")
+
+
+def test_who_only_traces_expresses_nothing_and_who_exaggerates_tracks_nothing() -> None:
+    task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
+    study = small(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
+    rows = {t.meeting.condition.levels["task"]: perform(Task(t.key, to_json(t.config))) for t in study.trials}
+    assert {row.state for row in rows.values()} == {"done"}
+    for task, nothing, something in (
+        ("trace", "expressiveness", "tracking_error"),
+        ("exaggerate", "tracking_error", "expressiveness"),
+    ):
+        assert math.isnan(rows[task].measures[nothing])
+        assert rows[task].measures[something] > 0.0
+
+
+def test_what_is_wrong_with_the_machine_is_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial = small().trials[0]
+
+    def full(*_: object) -> Row:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(run_trial, "_simulated", full)
+    with pytest.raises(OSError, match="No space left"):
+        perform(Task(trial.key, to_json(trial.config)))
+
+
+def test_maps_from_the_shelf_change_nothing() -> None:
+    trials = small().trials[:3]
+    shelf = Shelf()
+    shared = [perform(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
+    alone = [perform(Task(t.key, to_json(t.config)), Shelf()).measures for t in trials]
+    assert shared == alone
+
+
+def test_recordings_are_kept_where_they_are_asked_for(tmp_path: Path) -> None:
+    pytest.importorskip("fsspec")
+    trial = small().trials[0]
+    (tmp_path / "kept").mkdir()
+    row = perform(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
+    with Recording(tmp_path / "kept" / f"{trial.key}.h5") as recording:
+        assert recording.complete
+        assert len(recording.channel("ticks", "t")) == 496  # whole updates of the figure
+    assert row.measures == perform(Task(trial.key, to_json(trial.config))).measures
+
+
+def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
+    from experiments.trials import code_hash
+
+    assert Path(smoothness.__file__).parent.name in {Path(folder).name for folder in code_hash._SOURCES}
+
+
+@pytest.mark.parametrize(
+    ("threads", "workers", "cluster", "says"),
+    [
+        (2, 2, None, "--threads and --workers contradict"),
+        (0, None, None, "--threads 0"),
+        (None, 0, None, "--workers 0"),
+    ],
+)
+def test_where_trials_run_is_one_place(
+    threads: int | None, workers: int | None, cluster: str | None, says: str
+) -> None:
+    with pytest.raises((StudyError, ParameterError), match=says), executor(threads, workers, cluster):
+        pass

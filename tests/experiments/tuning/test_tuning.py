@@ -1,0 +1,138 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("optuna")
+
+from controllers.errors import ParameterError
+from experiments.certify.kept_stability import Stability, kept_stability
+from experiments.config.run_config import load_config
+from experiments.config.words import run_config
+from experiments.trials.database import Database
+from experiments.trials.errors import StudyError
+from experiments.trials.threads import Threads
+from experiments.tuning import search as searching
+from experiments.tuning.panel import Panel
+from experiments.tuning.search import Candidate, chosen, front, search, violation_of
+from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
+from experiments.tuning.tuning import CHOSEN, run_tuning
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples/studies"
+TUNING: dict[str, object] = {
+    "name": "t", "run": {"figure": "none"}, "seconds": 0.5, "candidates": 11,
+    "space": {"stiffness": {"low": 20.0, "high": 20000.0, "log": True}, "damping": {"low": 2.0, "high": 20.0}},
+    "users": {"number": 2, "seed": 1}, "held_back": {"number": 3, "seed": 2},
+}  # fmt: skip
+
+
+def tuning(**values: object) -> TuneConfig:
+    return TuneConfig(**(TUNING | values))  # pyright: ignore
+
+
+@pytest.fixture
+def certificates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A boundary at 5000 N/m in the place of CasADi's, which takes seconds a candidate."""
+
+    def verdict(config) -> Stability:
+        margin = 5000.0 / config.mode.stiffness - 1.0
+        return Stability("certified" if margin > 0.0 else "refuted", margin, "a boundary at 5000 N/m")
+
+    monkeypatch.setattr(searching, "kept_stability", verdict)
+
+
+def searched(config: TuneConfig, folder: Path, sampler: str = "tpe") -> list[Candidate]:
+    with Database(folder / "tune.sqlite", "identity", config.name, "") as database:
+        return search(config, folder / "journal", "identity", Panel(database, Threads(1)), sampler, lambda n: None)
+
+
+@pytest.mark.usefixtures("certificates")
+def test_what_is_refuted_is_never_tried(tmp_path: Path) -> None:
+    found = searched(tuning(), tmp_path)
+    refused = [c for c in found if c.values["stiffness"] >= 5000.0]
+    assert refused
+    assert all(c.state == "refused" and c.objectives is None and c.verdict == "refuted" for c in refused)
+    assert sum(c.state != "refused" for c in found) == 11
+
+
+@pytest.mark.usefixtures("certificates")
+@pytest.mark.parametrize("sampler", ["tpe", "random"])
+def test_a_search_that_is_stopped_goes_on_as_it_would_have(tmp_path: Path, sampler: str) -> None:
+    whole = searched(tuning(), tmp_path / "whole", sampler)
+    searched(tuning(candidates=4), tmp_path / "stopped", sampler)
+    _begin_one_and_die(tmp_path / "stopped", sampler)
+    assert searched(tuning(), tmp_path / "stopped", sampler) == whole
+
+
+def _begin_one_and_die(folder: Path, sampler: str) -> None:
+    import optuna
+    from optuna.storages.journal import JournalFileBackend
+
+    storage = optuna.storages.JournalStorage(JournalFileBackend(str(folder / "journal")))
+    optuna.load_study(study_name=f"identity-{sampler}", storage=storage).ask()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "margin", "allow", "allowed"),
+    [("refuted", -0.1, True, False), ("unknown", None, False, False), ("unknown", None, True, True),
+     ("certified", 0.4, False, False), ("certified", 0.6, False, True)],
+)  # fmt: skip
+def test_a_certificate_is_a_constraint(verdict: str, margin: float | None, allow: bool, allowed: bool) -> None:
+    config = tuning(allow_unknown=allow, least_margin=0.5)
+    assert (violation_of(config, Stability(verdict, margin, "")) <= 0.0) == allowed  # pyright: ignore
+
+
+def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle() -> None:
+    places = [(1.0, 9.0), (2.0, 3.0), (9.0, 1.0), (3.0, 4.0), (9.0, 9.0)]
+    found = [Candidate({"k": float(i)}, place, "certified", 1.0, "tried") for i, place in enumerate(places)]
+    assert [c.objectives for c in front(found, ["minimize", "minimize"])] == places[:3]
+    best = chosen(found, ["minimize", "minimize"])
+    assert best is not None
+    assert best.objectives == (2.0, 3.0)
+    assert [c.objectives for c in front(found, ["minimize", "maximize"])] == [(1.0, 9.0)]
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"space": {}}, "empty space"),
+        ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "--stifness is not known"),
+        ({"space": {"stiffness": {"low": 2.0, "high": 1.0}}}, "lies between 2 and 1"),
+        ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "low > 0 for log|log of > 0"),
+        ({"objectives": ["speed"]}, "no objective 'speed'"),
+        ({"objectives": ["margin"]}, "no measure among its objectives"),
+        ({"objectives": ["expressiveness"]}, "kinematic"),
+        ({"held_back": {"number": 3, "seed": 1}}, "same seed"),
+        ({"sampler": "cma-es", "objectives": ["tracking_error", "effort"]}, "CMA-ES needs one objective"),
+    ],
+)
+def test_a_tuning_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
+    with pytest.raises((StudyError, ParameterError), match=says) as raised:
+        check_tuning(tuning(**values))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["tune", "trade"])
+def test_the_shipped_tunings_can_be_read(name: str) -> None:
+    assert read_tuning(EXAMPLES / f"{name}.toml").candidates >= 20
+
+
+@pytest.mark.slow
+def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain() -> None:
+    soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
+    assert (soft.verdict, stiff.verdict) == ("certified", "refuted")
+    assert kept_stability(run_config(stiffness=300.0, figure="none")) == soft
+    assert soft.margin is not None
+    doubled = kept_stability(run_config(stiffness=600.0, figure="none"))
+    assert doubled.used == pytest.approx(2.0 * soft.used, rel=1e-3)  # the critical gain is the same
+
+
+@pytest.mark.slow
+def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path: Path) -> None:
+    config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
+    found = run_tuning(replace(config, prune=False), tmp_path, threads=2)
+    taken = load_config(tmp_path / CHOSEN)
+    assert taken.mode.stiffness == found.values["stiffness"]  # pyright: ignore
+    assert kept_stability(taken).verdict == "certified"
+    assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
+    assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
