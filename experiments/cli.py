@@ -29,6 +29,7 @@ from experiments.config.part import above, at_least, part, whole  # noqa: E402
 from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
+from experiments.live.live_options import Live  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from models.errors import ModelError  # noqa: E402
 from models.mocap.clip import Clip  # noqa: E402
@@ -347,6 +348,7 @@ class Clips:
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Live, tyro.conf.subcommand("live")]
     | Annotated[Clips, tyro.conf.subcommand("clips")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Prepare, tyro.conf.subcommand("prepare")]

@@ -304,7 +304,8 @@ class Desk:
             raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
         if len(content) > MOST_BYTES:
             raise SimError(
-                f"{file} has {len(content) / 1e6:.0f} MB; expected {MOST_BYTES / 1e6:.0f} MB or less, hvf prepare takes more"
+                f"{file} has {len(content) / 1e6:.0f} MB; expected {MOST_BYTES / 1e6:.0f} MB or less; hvf prepare "
+                "takes larger ones"
             )
         if self.preparing is not None:
             raise SimError(f"{self.preparing[0]} is being prepared; expected one file after the other")

@@ -1,4 +1,4 @@
-"""What the page asks of the engine's process, and what that tells it; numbers that change all the time are on boards."""
+"""What the page asks of the engine's process, and what that tells it; what changes all the time is on boards."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -48,7 +48,7 @@ class Page:
     folder : Path
         Where takes and clips are kept.
     port : int
-        On 127.0.0.1; the next free one is taken if it is in use.
+        On 127.0.0.1; the next free one is taken if it is in use, and any for 0.
     """
 
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080):

@@ -41,11 +41,13 @@ class RunPanel:
         maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS)  # pyright: ignore
         self._file = config.map.file if config.map.kind == "file" else ""
         with gui.add_folder("Run"):
-            self._mode = gui.add_dropdown("Mode", modes, config.mode.kind)
+            self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)
             self._map = gui.add_dropdown(
-                "Map", tuple(kind for kind in maps if kind != "file" or self._file), _map_kind(config)
+                "Map",
+                tuple(kind for kind in maps if kind != "file" or self._file),
+                initial_value=_map_kind(config),
             )
-            self._figure = gui.add_dropdown("Figure", ("physical", "kinematic"), config.figure.kind)
+            self._figure = gui.add_dropdown("Figure", ("physical", "kinematic"), initial_value=config.figure.kind)
             self._folder = gui.add_folder("Clips")
             self._build = gui.add_button("Run this", icon=viser.Icon.PLAYER_PLAY, color="blue")
         self._slots: list[viser.GuiDropdownHandle[Any]] = []
@@ -110,7 +112,7 @@ class RunPanel:
         with self._folder:
             for k, label in enumerate(labels):
                 name = chosen[k] if k < len(chosen) and chosen[k] in known else defaults[min(k, len(defaults) - 1)]
-                self._slots.append(self._gui.add_dropdown(label, known, name))
+                self._slots.append(self._gui.add_dropdown(label, known, initial_value=name))
         self._chosen = ()
 
     def _names_shown(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 Dragged = Callable[[Any, Array, bool], None]
 """Called with viser's event, the place of the hand in H [m], shape (3,), and whether shift is held."""
 
-RADIUS = 0.045  # drawn [m]: large enough for a finger
+RADIUS = 0.085  # drawn [m]: it covers the magnified gimbal, and is large enough for a finger
 
 
 class HandBall:
@@ -27,7 +27,7 @@ class HandBall:
     """
 
     def __init__(self, scene: viser.SceneApi):
-        self._ball = scene.add_icosphere("/hand", RADIUS, color=rgb(USER), opacity=0.75, cast_shadow=False)
+        self._ball = scene.add_icosphere("/hand", RADIUS, color=rgb(USER), cast_shadow=False)
         self._offset = np.zeros(3)
 
     def on_drag(self, told: Dragged) -> None:

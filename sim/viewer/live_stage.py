@@ -15,7 +15,7 @@ import viser
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.palette import FIELD, USER, rgb
-from sim.viewer.shapes import body_shapes, tube
+from sim.viewer.shapes import body_shapes, coarser, tube
 
 Array = npt.NDArray[np.float64]
 
@@ -28,6 +28,7 @@ TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force on a slice
 FOLLOWED = 0.05  # share of the way by which the view comes after a figure that travels, at each picture
 TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
+FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
 LEAPS = 5.0  # [m] a figure that is so far from where the view has it was put there
 
 
@@ -39,11 +40,11 @@ class View(NamedTuple):
 
 
 VIEWS = {
-    "both": View((1.0, -5.6, 2.2), (0.5, 0.0, 0.92)),
-    "workspace": View((1.45, -2.6, 1.75), (1.45, -0.4, 1.0)),
-    "stage": View((0.2, -4.2, 1.7), (-0.45, 0.0, 0.85)),
+    "both": View((1.55, -5.7, 2.2), (0.95, 0.0, 0.92)),
+    "workspace": View((1.75, -2.9, 1.95), (1.75, -0.4, 1.05)),
+    "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
 }
-"""By what they show."""
+"""By what they show; a little to the right of it, for the panel covers a fifth of the page."""
 FIELD_OF_VIEW = np.deg2rad(34.0)
 
 
@@ -110,9 +111,9 @@ class LiveStage:
         shapes = body_shapes(model, "figure/")
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "figure/root")
         self._root = int(model.jnt_qposadr[joint]) if joint >= 0 else -1
-        self._phantom = Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION)
-        self._figure = Actor(scene, "figure", shapes, 1.0)
-        self._ghost = Actor(scene, "ghost", shapes if ghost else [], 1.0, GHOST)
+        self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
+        self._figure = Actor(scene, "figure", coarser(shapes, FIGURE_CELL), 1.0)
+        self._ghost = Actor(scene, "ghost", coarser(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
         self._followed, self._origin = np.zeros(2), np.full(2, np.nan)
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
@@ -142,7 +143,7 @@ class LiveStage:
         line = drawn_at(points)
         self._draw_tube(f"/curve/{k}/line", line, 0.006, 8, {"color": rgb(course.line), "cast_shadow": False})
         if radius > 0.0:
-            looks = {"color": rgb(course.tube), "opacity": 0.2, "side": "double", "receive_shadow": False}
+            looks = {"color": rgb(course.tube), "opacity": 0.14, "side": "double", "receive_shadow": False}
             self._draw_tube(f"/curve/{k}/tube", line, MAGNIFICATION * radius, 20, looks | {"cast_shadow": False})
 
     def _draw_tube(self, node: str, line: Array, radius: float, sides: int, looks: dict[str, Any]) -> None:
