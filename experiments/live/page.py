@@ -29,7 +29,8 @@ from models.scene import P_WH, SceneConfig
 from sim.errors import SimError
 from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
-from sim.viewer.live_stage import VIEWS, LiveStage, Shown, set_view
+from sim.viewer.live_stage import VIEWS, LiveStage, set_view
+from sim.viewer.shown import Shown
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] between two pictures

@@ -16,11 +16,12 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import body_shapes, coarser, tube
+from sim.viewer.shown import Shown
 
 Array = npt.NDArray[np.float64]
 
-MAGNIFICATION = 5.0
-PHANTOM_AT = np.array([1.45, -0.6, 1.05])  # where the origin of the hand frame is drawn [m]
+MAGNIFICATION = 6.0
+PHANTOM_AT = np.array([1.6, -0.6, 1.25])  # where the origin of the hand frame is drawn [m]
 GHOST_AT = np.array([-0.95, -0.35, 0.0])  # the ghost's distance from the figure [m]
 METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] below which a force is not drawn
@@ -40,38 +41,12 @@ class View(NamedTuple):
 
 
 VIEWS = {
-    "both": View((1.55, -5.7, 2.2), (0.95, 0.0, 0.92)),
-    "workspace": View((1.75, -2.9, 1.95), (1.75, -0.4, 1.05)),
+    "both": View((1.65, -5.6, 2.3), (1.05, 0.0, 1.0)),
+    "workspace": View((1.9, -3.3, 2.2), (1.9, -0.4, 1.25)),
     "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
 }
 """By what they show; a little to the right of it, for the panel covers a fifth of the page."""
 FIELD_OF_VIEW = np.deg2rad(34.0)
-
-
-class Shown(NamedTuple):
-    """What is drawn of a run at one time.
-
-    Attributes
-    ----------
-    t : float
-        [s]
-    qpos : Array
-        Configuration of the world, with the figure.
-    ghost : Array
-        Pose of the ghost, shape (75,), or nothing.
-    p, force, user : Array
-        Stylus tip [m], force of the device and of the hand on it [N], in H, shape (3,).
-    target : Array
-        Where the hand means to be, in H [m], shape (3,); NaN where it has let go.
-    """
-
-    t: float
-    qpos: Array
-    ghost: Array
-    p: Array
-    force: Array
-    user: Array
-    target: Array
 
 
 def drawn_at(p_H: Array) -> Array:
@@ -127,7 +102,7 @@ class LiveStage:
         self._courses = [(course, self._drawn_radius(course, radius)) for course in drawn]
         for k in range(len(self._courses)):
             self.draw_course(k, self._courses[k][0].points)
-        self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.0, 0.0, 0.78]))
+        self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
         self._figure_label = self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
         if ghost:
             self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
