@@ -218,6 +218,7 @@ class Page:
             stage.draw_slice(arrows[:, :3] if self._field.value else arrows[:0, :3], arrows[:, 3:])
             if not desk.holds:
                 ball.rest(now["p"])
+            stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
 
     def _write(self) -> None:

@@ -27,10 +27,10 @@ METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] below which a force is not drawn
 TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force on a slice
-FOLLOWED = 0.05  # share of the way by which the view comes after a figure that travels, at each picture
+FOLLOWS = 0.5  # [s] by which the view is behind a figure that travels
 TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
-LEAPS = 5.0  # [m] a figure that is so far from where the view has it was put there
+LEAPS = 3.0  # [m] a figure that is so far from where the view has it was put there
 
 
 class View(NamedTuple):
@@ -89,7 +89,7 @@ class LiveStage:
         self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
         self._figure = Actor(scene, "figure", coarser(shapes, FIGURE_CELL), 1.0)
         self._ghost = Actor(scene, "ghost", coarser(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
-        self._followed, self._origin = np.zeros(2), np.full(2, np.nan)
+        self._followed, self._origin, self._t = np.zeros(2), np.full(2, np.nan), 0.0
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
@@ -97,20 +97,28 @@ class LiveStage:
         self._slice = scene.add_arrows(
             "/slice", np.zeros((1, 2, 3)), (120, 135, 160), shaft_radius=0.004, head_radius=0.010, head_length=0.022
         )
-        self._lag = scene.add_line_segments("/lag", np.zeros((1, 2, 3)), rgb(USER), line_width=3.0, visible=False)
+        self._lag = scene.add_line_segments(
+            "/lag", np.zeros((1, 2, 3)), rgb(USER), thickness=3.0, thickness_units="screen", visible=False
+        )
         self._tubes: dict[str, viser.MeshHandle] = {}
         self._courses = [(course, self._drawn_radius(course, radius)) for course in drawn]
         for k in range(len(self._courses)):
             self.draw_course(k, self._courses[k][0].points)
         self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
-        self._figure_label = self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
-        if ghost:
+        if self._root >= 0:
+            self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
+        if self._root >= 0 and ghost:
             self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
 
     @property
     def configuration_size(self) -> int:
         """Numbers in a configuration of the world."""
         return int(self._model.nq)
+
+    def shows_ghost(self, shows: bool) -> None:
+        """Whether the ghost is seen, or something else stands in its place."""
+        if self._ghost.visible != shows:
+            self._ghost.visible = shows
 
     def draw_course(self, k: int, points: Array) -> None:
         """Draw one of the curves where it is now: points in the hand frame [m], shape (m, 3)."""
@@ -140,7 +148,7 @@ class LiveStage:
 
     def show(self, shown: Shown) -> None:
         """Draw one moment."""
-        data, shift = self._data, self._follow(shown.qpos)
+        data, shift = self._data, self._follow(shown.t, shown.qpos)
         data.qpos[:] = shown.qpos
         mujoco.mj_kinematics(self._model, data)
         self._phantom.pose(data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
@@ -160,7 +168,7 @@ class LiveStage:
         if held:
             self._lag.points = np.array([[tip, drawn_at(shown.target)]], dtype=np.float32)
 
-    def _follow(self, qpos: Array) -> Array:
+    def _follow(self, t: float, qpos: Array) -> Array:
         """What is subtracted from places of the figure: nothing, or the way that it has travelled, smoothed."""
         if self._root < 0:
             return np.zeros(3)
@@ -171,7 +179,9 @@ class LiveStage:
         if np.linalg.norm(way - self._followed) > LEAPS:
             self._followed = way if np.linalg.norm(way) > TRAVELS else np.zeros(2)
         elif np.linalg.norm(way) > TRAVELS or np.any(self._followed != 0.0):
-            self._followed = self._followed + FOLLOWED * (way - self._followed)
+            share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)
+            self._followed = self._followed + share * (way - self._followed)
+        self._t = t
         return np.array([*self._followed, 0.0])
 
     def _arrow(self, name: str, color: str) -> viser.ArrowsHandle:
