@@ -1,6 +1,7 @@
 """Numbers that two processes share: one writes, the other reads the newest whole set of them, and neither waits."""
 
 import itertools
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+
+_PATIENCE = 1.0  # [s] no writing lasts longer
 
 
 class Board:
@@ -50,10 +53,11 @@ class Board:
         self._all[0] += 1.0
 
     def read(self) -> dict[str, Array]:
-        """A copy of all rows as they were written together; after a hundred tries, as they are."""
-        for _ in range(100):
+        """A copy of all rows as they were written together; as they are, if the writer ended in the middle of writing."""
+        end = time.monotonic() + _PATIENCE
+        while True:
             before = self._all[0]
             found = {name: row.copy() for name, row in self.rows.items()}
-            if before % 2.0 == 0.0 and before == self._all[0]:
+            if (before % 2.0 == 0.0 and before == self._all[0]) or time.monotonic() > end:
                 return found
-        return {name: row.copy() for name, row in self.rows.items()}
+            time.sleep(0.0)

@@ -1,6 +1,7 @@
 """A reader of a board never sees half of what was written."""
 
 import threading
+import time
 
 import numpy as np
 
@@ -32,6 +33,7 @@ def test_a_reader_beside_a_busy_writer_sees_whole_sets():
         while not ended.is_set():
             k += 1.0
             writer.write({"a": np.full(3, k), "b": np.full(500, k)})
+            time.sleep(1e-5)
 
     thread = threading.Thread(target=write)
     thread.start()
