@@ -53,7 +53,7 @@ class Board:
         self._all[0] += 1.0
 
     def read(self) -> dict[str, Array]:
-        """A copy of all rows as they were written together; as they are, if the writer ended in the middle of writing."""
+        """A copy of all rows as they were written together; as they are, if the writer ended in the middle of it."""
         end = time.monotonic() + _PATIENCE
         while True:
             before = self._all[0]

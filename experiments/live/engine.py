@@ -24,6 +24,7 @@ from sim.users.dragged import dragged, relaxed, tremor
 
 BLOCK = 8  # ticks between two looks at the hand: 8 ms, in which nobody sees a hand stop
 STRONGEST = 8.0  # [N] about what the motors can give for a moment; a person pulls no harder
+FASTEST = 0.6  # [m/s] of the hand: a quick reach over the Phantom's workspace
 HAND_TIME = 0.03  # [s] in which the hand comes to where the mouse is: two or three pictures of the page
 KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be gone back to, and how many there are
 _UNTIL = 4  # of the parameters of `stretchy_wrench`: when stretching ends
