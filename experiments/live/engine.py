@@ -111,7 +111,7 @@ class Engine:
     def advance(self) -> tuple[TickLog, FrameLog]:
         """Run a block; its logs are used again by the next one."""
         t, seconds = self.time, self.seconds
-        if self.drag is None:
+        if self.drag is None or self.tick == 0:  # where the stylus is, nobody knows before it has been sensed
             arm = relaxed(self._arm)
             self._intended[:] = np.nan
         else:
