@@ -117,9 +117,8 @@ class Engine:
         else:
             start = self.stylus.copy() if np.isnan(self._intended[0]) else self._intended
             share = 1.0 - np.exp(-seconds / HAND_TIME)
-            end = _within_reach(
-                start + share * (self.drag.target - start), self.stylus, STRONGEST / self._arm.stiffness
-            )
+            wanted = _within_reach(start + share * (self.drag.target - start), start, FASTEST * seconds)
+            end = _within_reach(wanted, self.stylus, STRONGEST / self._arm.stiffness)
             arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
             self._intended = end
         device = self._device._replace(user=self._device.user._replace(arm=arm))
