@@ -2,11 +2,11 @@
 
 import secrets
 from dataclasses import replace
+from pathlib import Path
 
 from controllers.errors import ParameterError
-from experiments.config.words import config_of_options
+from experiments.config.run_config import RunConfig
 from experiments.live.gate import HERE, Gate
-from experiments.live.live_options import Live
 from experiments.live.page import Page
 from experiments.live.run_panel import FOR_EVER
 from sim.errors import SimError
@@ -14,32 +14,42 @@ from sim.errors import SimError
 LEAST_TOKEN = 16  # characters: none that can be guessed
 
 
-def live(told: Live) -> None:
-    """Serve the page.
+def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") -> None:
+    """Serve the page of a run that is driven.
+
+    Parameters
+    ----------
+    config : RunConfig
+        What runs first.
+    host, port
+        To listen on; the next free port is taken if it is in use.
+    out : Path
+        Folder for takes and clips.
+    given : str
+        The token; by default a new one, where one is needed.
 
     Raises
     ------
     ParameterError
-        If a token is too short, or there is none to be had.
+        If a token is too easily guessed, or there is no figure to be shown.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
-    config = replace(config_of_options(told.options), seconds=FOR_EVER)
     if config.figure.kind == "none":
         raise ParameterError("the live page shows a figure; expected --figure physical or kinematic")
-    token = token_for(told.host, told.token)
-    if told.out.exists() and not told.out.is_dir():
-        raise SimError(f"{told.out}: is a file; expected a folder for takes and clips")
-    page = Page(config, told.out, port=0)
+    token = token_for(host, given)
+    if out.exists() and not out.is_dir():
+        raise SimError(f"{out}: is a file; expected a folder for takes and clips")
+    page = Page(replace(config, seconds=FOR_EVER), out, port=0)
     try:
-        gate = Gate(told.host, told.port, page.port, token)
+        gate = Gate(host, port, page.port, token)
         try:
-            print("\n".join(_lines(told, gate.port, token)), flush=True)
+            print("\n".join(_lines(host, gate.port, out, token)), flush=True)
             page.serve()
         finally:
             gate.close()
     except KeyboardInterrupt:
-        print(f"\nEnded; takes and clips are in {told.out}. hvf report {told.out}/takes/NAME draws a take.")
+        print(f"\nEnded; takes and clips are in {out}. hvf report {out}/takes/NAME draws a take.")
     finally:
         page.close()
 
@@ -59,10 +69,10 @@ def token_for(host: str, given: str) -> str | None:
     return given or secrets.token_hex(16)
 
 
-def _lines(told: Live, port: int, token: str | None) -> list[str]:
+def _lines(host: str, port: int, out: Path, token: str | None) -> list[str]:
     if token is None:
-        return [f"Open http://127.0.0.1:{port} and drag the orange ball; Ctrl-C ends.", f"Takes go to {told.out}."]
+        return [f"Open http://127.0.0.1:{port} and drag the orange ball; Ctrl-C ends.", f"Takes go to {out}."]
     return [
-        f"Open http://{told.host}:{port}/?token={token} and drag the orange ball; Ctrl-C ends.",
-        f"Takes go to {told.out}. The token goes over the network as it is: through one that is not yours, use ssh -L.",
+        f"Open http://{host}:{port}/?token={token} and drag the orange ball; Ctrl-C ends.",
+        f"Takes go to {out}. The token goes over the network as it is: through one that is not yours, use ssh -L.",
     ]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import tyro
 
-from experiments.config.words import RunOptions
+from experiments.config.words import RunOptions, config_of_options
 
 
 @dataclass(frozen=True)
@@ -26,5 +26,5 @@ class Live:
         """Serve until Ctrl-C."""
         from experiments.live.command import live
 
-        live(self)
+        live(config_of_options(self.options), self.host, self.port, self.out, self.token)
         return 0
