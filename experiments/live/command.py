@@ -31,12 +31,14 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     Raises
     ------
     ParameterError
-        If a token is too easily guessed, or there is no figure to be shown.
+        If a token is too easily guessed, there is no figure to be shown, or the hand is somebody else's.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
     if config.figure.kind == "none":
         raise ParameterError("the live page shows a figure; expected --figure physical or kinematic")
+    if config.user.does not in ("relaxed", "lead") or config.user.pushes or config.user.grabs:
+        raise ParameterError("on the live page the hand is yours; leave out --user and what it does")
     token = token_for(host, given)
     if out.exists() and not out.is_dir():
         raise SimError(f"{out}: is a file; expected a folder for takes and clips")

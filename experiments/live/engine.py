@@ -11,7 +11,7 @@ from controllers.errors import ParameterError
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.stretchy_tubes import StretchyTubes
-from controllers.state import Array
+from controllers.state import HAND_SWITCH, Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
 from experiments.setups.setups import parts_of
@@ -173,11 +173,15 @@ class Engine:
 
     def undo(self) -> bool:
         """Take the last bend back; False if there is none."""
-        return self.tubes is not None and self.drag is None and undo_bend(self.memory, self._record)
+        return self._may_edit() and undo_bend(self.memory, self._record)
 
     def redo(self) -> bool:
         """Bend again what was taken back; False if there is nothing."""
-        return self.tubes is not None and self.drag is None and redo_bend(self.memory, self._record)
+        return self._may_edit() and redo_bend(self.memory, self._record)
+
+    def _may_edit(self) -> bool:
+        """Whether there is a curve that nobody has in his hand, also as the field has it."""
+        return self.tubes is not None and self.drag is None and self._device.hand[HAND_SWITCH] == 0.0
 
     def bends(self) -> int:
         """How many bends are in force."""

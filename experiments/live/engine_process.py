@@ -141,12 +141,15 @@ class _Runner:
                 time.sleep(ahead)
             elif ahead < -LATE:
                 origin, before = time.perf_counter(), 0.0
-        if self._take is not None and self._engine is not None:
-            self._take.end(self._engine)
+        if self._engine is not None:
+            self._stop(self._engine)
 
-    def _block(self, engine: Engine) -> None:
+    def _hold(self, engine: Engine) -> None:
         held = self._held.rows
         engine.drag = Drag(held["target"].copy(), held["pressed"][0] > 0.0) if held["grip"][0] > 0.0 else None
+
+    def _block(self, engine: Engine) -> None:
+        self._hold(engine)
         logs = engine.advance()
         if self._take is not None:
             self._take.add(logs, engine)
@@ -169,6 +172,7 @@ class _Runner:
         elif isinstance(order, Quit):
             self._going = False
         elif self._engine is not None:
+            self._hold(self._engine)
             self._do(order, self._engine)
             self._changed = True
 
@@ -197,8 +201,10 @@ class _Runner:
             return
         take, self._take = self._take, None
         self._told.put(Progress("saving the take", 0.5))
-        lines = take.end(engine)
-        self._told.put(Saved(take.folder, lines))
+        try:
+            self._told.put(Saved(take.folder, take.end(engine)))
+        except SimError as error:
+            self._told.put(Refused(str(error)))
 
     def _build(self, order: Build) -> None:
         if self._engine is not None:

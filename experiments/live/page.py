@@ -62,7 +62,7 @@ class Page:
         set_view(self.server.initial_camera, VIEWS["both"])
         self.stage: LiveStage | None = None
         self._ball: HandBall | None = None
-        self._builds, self._curve, self._sequence = 0, -1.0, 0
+        self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
         self._lay_out(config)
         self.server.on_client_disconnect(self._left)
@@ -179,7 +179,7 @@ class Page:
         self._ball = HandBall(self.server.scene)
         self._ball.on_drag(self._dragged)
         self._takes.stage_set(world.full_model())
-        self._curve, self._sequence = -1.0, 0
+        self._curve, self._moment = -1.0, (-1.0, -1.0)
         self._run.show(built)
         self._gains.rebuild()
 
@@ -194,9 +194,10 @@ class Page:
     def _draw(self) -> None:
         stage, ball, desk = self.stage, self._ball, self.desk
         now = desk.at(self._clock.seconds_ago)
-        if stage is None or ball is None or int(now["t"][0] * 1e6) == self._sequence:
+        moment = float(now["t"][0]), float(now["curve"][0])
+        if stage is None or ball is None or (moment == self._moment and not self._takes.compares):
             return
-        self._sequence = int(now["t"][0] * 1e6)
+        self._moment = moment
         self.pictures += 1
         nq = stage.configuration_size
         with self.server.atomic():
