@@ -48,7 +48,7 @@ class ClockPanel:
         self._back.on_update(acts(lambda event: desk.pause(True)))
         self._from.on_click(acts(lambda event: self._go_on()))
         self._rearm.on_click(acts(lambda event: desk.rearm()))
-        keys = {
+        keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
             "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
             "Step": ("S", lambda event: desk.step()),
             "Reset": ("R", lambda event: desk.reset()),
@@ -57,7 +57,7 @@ class ClockPanel:
             "Grab or let go": ("G", lambda event: self._toggle()),
         }
         for label, (key, does) in keys.items():
-            gui.add_command(label, hotkey=key).on_trigger(acts(does))  # pyright: ignore[reportArgumentType]
+            gui.add_command(label, hotkey=key).on_trigger(acts(does))
 
     @property
     def pressed(self) -> bool:

@@ -121,4 +121,10 @@ class GainVerdicts:
 
 def _key(river: River) -> tuple[object, ...]:
     curve = river.curve
-    return (river.law, river.width, river.sampling, curve.periodic, curve.positions.tobytes(), tuple(curve.times))
+    return (
+        river.law,
+        river.width,
+        river.sampling,
+        curve.periodic,
+        *(np.asarray(a).tobytes() for a in (curve.positions, curve.times)),
+    )

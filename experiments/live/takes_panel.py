@@ -39,10 +39,10 @@ class TakesPanel:
         self._lines: dict[str, str] = {}
         self._name = gui.add_text("Name", "take 1")
         self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
-        self._list = gui.add_dropdown("Take", (NONE,))
+        self._list: viser.GuiDropdownHandle[Any] = gui.add_dropdown("Take", (NONE,))
         self._get = gui.add_button_group("Download", ("BVH", "Recording", "Configuration"))
         with gui.add_folder("Compare and mix", expand_by_default=False):
-            self._other = gui.add_dropdown("With", (NONE,))
+            self._other: viser.GuiDropdownHandle[Any] = gui.add_dropdown("With", (NONE,))
             self._compare = gui.add_checkbox("Show both", False, hint="In place of the default animation.")
             self._legend = gui.add_html("")
             self._plot = gui.add_uplot(

@@ -57,7 +57,7 @@ class Worker:
 
 def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(5)  # the servo goes before
+    os.nice(2)  # the servo goes before
     does(asked, told)
 
 
