@@ -29,7 +29,7 @@ from models.scene import P_WH, SceneConfig
 from sim.errors import SimError
 from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
-from sim.viewer.live_stage import VIEWS, LiveStage, set_view
+from sim.viewer.live_stage import NARROW, VIEWS, LiveStage, set_view
 from sim.viewer.shown import Shown
 from sim.world.world import World
 
@@ -65,6 +65,7 @@ class Page:
         self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
         self._lay_out(config)
+        self.server.on_client_connect(_looks)
         self.server.on_client_disconnect(self._left)
         self.desk.build(config)
 
@@ -235,6 +236,12 @@ class Page:
         self._uploads.write()
         self._run.write()
         self._plots.write(desk.history)
+
+
+def _looks(client: viser.ClientHandle) -> None:
+    """Let a browser that is higher than wide look at the workspace."""
+    if client.camera.aspect < 1.0:
+        set_view(client.camera, NARROW)
 
 
 def _status(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:

@@ -46,6 +46,8 @@ VIEWS = {
     "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
 }
 """By what they show; a little to the right of it, for the panel covers a fifth of the page."""
+NARROW = View((1.6, -5.6, 1.6), (1.6, 0.0, 0.35))
+"""Where a phone looks that is held upright: at the workspace, above the panel."""
 FIELD_OF_VIEW = np.deg2rad(34.0)
 
 

@@ -16,7 +16,7 @@ from sim.viewer.live_stage import FIELD_OF_VIEW, VIEWS, drawn_at
 
 CHROMIUM = shutil.which("chromium")
 ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-PATIENCE = 90.0  # [s] for what takes a second on a machine that does nothing else
+PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 
 
 def needs_chromium() -> None:

@@ -13,7 +13,7 @@ from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh
 from sim.errors import SimError
 
-PATIENCE = 120.0  # [s] for what takes a second or two on a machine that does nothing else
+PATIENCE = 300.0  # [s] for what takes a second or two on a machine that does nothing else
 
 pytestmark = pytest.mark.slow
 
