@@ -30,6 +30,7 @@ from experiments.config.run_config import ArmConfig, RunConfig  # noqa: E402
 from experiments.config.words import RunOptions, config_of_options  # noqa: E402
 from experiments.files.json_text import json_text  # noqa: E402
 from experiments.hardware.command import Hardware  # noqa: E402
+from experiments.live.live_options import Live  # noqa: E402
 from experiments.paper_figures.options import Figures  # noqa: E402
 from experiments.preparation.prepare_options import Prepare  # noqa: E402
 from experiments.render.options import Render  # noqa: E402
@@ -392,6 +393,7 @@ class Clips:
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Live, tyro.conf.subcommand("live")]
     | Annotated[Clips, tyro.conf.subcommand("clips")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Prepare, tyro.conf.subcommand("prepare")]

@@ -66,11 +66,13 @@ def reproduce(folder: Path) -> int:
     Raises
     ------
     SimError
-        If it is no recording, or the file of its map has changed.
+        If it is no recording, the file of its map has changed, or a person's hand made it.
     OSError
         If a file cannot be read.
     """
     with Recording(folder / RECORDING) as recording:
+        if "live" in recording.texts:
+            raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
         _tell_what_is_other(recording.versions)
         config = config_of(recording)
         _check_map(config, recording)

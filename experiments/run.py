@@ -43,6 +43,7 @@ from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.page import NullPage, Page
+from sim.viewer.shown import Shown
 
 BVH_FPS = 50.0
 VIEW_BLOCK_SECONDS = 0.032  # a new picture for every block
@@ -127,11 +128,17 @@ def _simulate(
     servo = session.servo
     record = record_into(recorder, servo, session.world)
     page = _live_page(session) if view else NullPage()
-    clock = RealTime()
+    clock, simulated = RealTime(), session.world.kind == "physical"
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         record(ticks, frames, n)
-        page.show(shown_configuration(servo), ticks.hand[n - 1, 1:4], ticks.force[n - 1])
+        hand = ticks.hand[n - 1]
+        page.show(
+            Shown(
+                hand[0], shown_configuration(servo), servo.reference.pose if simulated else hand[:0], hand[1:4],
+                ticks.force[n - 1], ticks.user[n - 1], np.full(3, np.nan),
+            )
+        )  # fmt: skip
 
     laws = session.parts.program.python_laws
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
@@ -159,7 +166,8 @@ def _live_page(session: Session) -> Page:
     from sim.viewer.live_page import LivePage  # viser takes a third of a second, and is rarely watched
 
     static = session.static()
-    return LivePage(session.world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH)
+    radius = float(np.asarray(static["tube_radius"]))
+    return LivePage(session.world.full_model(), courses(static), radius, P_WH, session.world.kind)
 
 
 def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:

@@ -76,7 +76,7 @@ def shortest_arc(u: Array, v: Array) -> Array:
     return q / np.linalg.norm(q)
 
 
-def slerped(q: Array, r: Array, share: float) -> Array:
+def slerped(q: Array, r: Array, share: float | Array) -> Array:
     """Rotations a share of the way from q to r along the shortest turn, shape (..., 4)."""
     half = share / 2 * logarithm(product(conjugate(q), r))
     angle = np.linalg.norm(half, axis=-1, keepdims=True)

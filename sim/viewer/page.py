@@ -2,17 +2,14 @@
 
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
+from sim.viewer.shown import Shown
 
 
 class Page(Protocol):
     """What a run shows itself to."""
 
-    def show(self, qpos: Array, p_H: Array, force_H: Array) -> None:
-        """Show the world's configuration, and in the hand frame the stylus tip and the force of the field."""
+    def show(self, shown: Shown) -> None:
+        """Show a moment of it."""
         ...
 
     def close(self) -> None:
@@ -23,7 +20,7 @@ class Page(Protocol):
 class NullPage:
     """The page of a run that nobody watches."""
 
-    def show(self, qpos: Array, p_H: Array, force_H: Array) -> None:
+    def show(self, shown: Shown) -> None:
         """Do nothing."""
 
     def close(self) -> None:

@@ -16,10 +16,11 @@ import numpy.typing as npt
 import viser
 
 from sim.recording.recording import Recording
+from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course, courses
 from sim.viewer.framing import followed, typical_peak
-from sim.viewer.palette import FIELD, PUSH, TUBE, USER, rgb
-from sim.viewer.shapes import Shape, body_shapes, tube
+from sim.viewer.palette import FIELD, PUSH, USER, rgb
+from sim.viewer.shapes import body_shapes, tube
 
 Array = npt.NDArray[np.float64]
 
@@ -99,33 +100,6 @@ def drawn_tube(recording: Recording) -> float:
     return min(float(recording.array("tube_radius")), TUBE_SHARE * extent)
 
 
-class _Actor:
-    """Bodies of the model that are drawn in one style and placed by position and quaternion."""
-
-    def __init__(self, scene: viser.SceneApi, name: str, shapes: list[Shape], scale: float, ghost: bool):
-        self._frames: dict[int, viser.FrameHandle] = {}
-        for i, shape in enumerate(shapes):
-            node = f"/{name}/{shape.body}"
-            if shape.body not in self._frames:
-                self._frames[shape.body] = scene.add_frame(node, show_axes=False)
-            opacity = 0.35 if ghost else shape.rgba[3]
-            scene.add_mesh_simple(
-                f"{node}/{i}",
-                shape.vertices * scale,
-                shape.faces,
-                color=rgb(TUBE) if ghost else shape.rgba[:3],
-                opacity=None if opacity == 1 else opacity,
-                cast_shadow=not ghost,
-                receive_shadow=False,
-            )
-
-    def pose(self, data: mujoco.MjData, origin: Array, scale: float, at: Array) -> None:
-        """Draw each body at ``at + scale (x − origin)``."""
-        for body, frame in self._frames.items():
-            frame.position = at + scale * (data.xpos[body] - origin)
-            frame.wxyz = data.xquat[body]
-
-
 class _Stage:
     """Everything that is drawn, and how it moves."""
 
@@ -145,9 +119,9 @@ class _Stage:
         self._travels = first is not None and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
         self._p_WH = recording.array("p_WH")
         figure = body_shapes(model, target.prefix)
-        self._phantom = _Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION, ghost=False)
-        self._figure = _Actor(scene, "figure", figure, 1.0, ghost=False)
-        self._ghost = _Actor(scene, "ghost", figure if self._simulated else [], 1.0, ghost=True)
+        self._phantom = Actor(scene, "phantom", body_shapes(model, "phantom/"), MAGNIFICATION)
+        self._figure = Actor(scene, "figure", figure, 1.0)
+        self._ghost = Actor(scene, "ghost", figure if self._simulated else [], 1.0, GHOST)
         peak = max(typical_peak(self._ticks["force"]), typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
             name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))

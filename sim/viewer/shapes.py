@@ -69,6 +69,28 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
     return shapes
 
 
+def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
+    """Shapes with fewer triangles: vertices within a cube are one, at their mean (Rossignac & Borrel 1993).
+
+    Parameters
+    ----------
+    shapes : list of Shape
+        Which stay as they are.
+    cell : float
+        Width [m].
+    """
+    made: list[Shape] = []
+    for shape in shapes:
+        cells, cluster = np.unique(np.floor(shape.vertices / cell).astype(np.int64), axis=0, return_inverse=True)
+        cluster = cluster.ravel()
+        counts = np.bincount(cluster, minlength=len(cells))
+        sums = [np.bincount(cluster, shape.vertices[:, k], minlength=len(cells)) for k in range(3)]
+        faces = np.sort(cluster[shape.faces], axis=1), cluster[shape.faces]
+        whole = (faces[0][:, 0] != faces[0][:, 1]) & (faces[0][:, 1] != faces[0][:, 2])
+        made.append(shape._replace(vertices=np.stack(sums, axis=1) / counts[:, None], faces=faces[1][whole]))
+    return made
+
+
 def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, npt.NDArray[np.int64]]:
     """Surface of the tube around a polyline, without caps; closed where the last point is the first.
 

@@ -1,0 +1,106 @@
+"""Time on the page: pause, step, slow motion, reset, looking back; and what the hand does with its fingers."""
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from experiments.live.desk import REMEMBERED, Desk
+
+Acts = Callable[[Callable[[Any], None]], Callable[[Any], None]]
+PACES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
+
+
+class ClockPanel:
+    """Buttons of the clock and of the hand.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        Where they are laid.
+    desk : Desk
+        What they work on.
+    acts : callable
+        Around what they do: see `Page.acts`.
+    """
+
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
+        self._desk = desk
+        self._press = gui.add_checkbox(
+            "Grab (press the switch)", False, hint="With it a drag takes hold of the curve and bends it; so does shift."
+        )
+        self._keep = gui.add_checkbox("Hold on when the mouse lets go", False)
+        self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
+        self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
+        self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
+        self._pace = gui.add_dropdown("Pace", tuple(PACES))
+        self._back = gui.add_slider(
+            "Look back [s]", 0.0, REMEMBERED, 0.1, 0.0, hint="Time stands still while you look back."
+        )
+        self._from = gui.add_button("Go on from there", visible=False)
+        self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
+        self._press.on_update(acts(lambda event: desk.press(self._press.value)))
+        self._keep.on_update(acts(lambda event: None if self._keep.value else desk.let_go()))
+        self._perform.on_click(acts(lambda event: desk.perform(not self._performs)))
+        self._time.on_click(acts(lambda event: self._on_time()))
+        self._edit.on_click(acts(lambda event: desk.undo() if self._edit.value == "Undo" else desk.redo()))
+        self._pace.on_update(acts(lambda event: desk.pace(PACES[self._pace.value])))
+        self._back.on_update(acts(lambda event: desk.pause(True)))
+        self._from.on_click(acts(lambda event: self._go_on()))
+        self._rearm.on_click(acts(lambda event: desk.rearm()))
+        keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
+            "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
+            "Step": ("S", lambda event: desk.step()),
+            "Reset": ("R", lambda event: desk.reset()),
+            "Undo": ("U", lambda event: desk.undo()),
+            "Redo": ("Y", lambda event: desk.redo()),
+            "Grab or let go": ("G", lambda event: self._toggle()),
+        }
+        for label, (key, does) in keys.items():
+            gui.add_command(label, hotkey=key).on_trigger(acts(does))
+
+    @property
+    def pressed(self) -> bool:
+        """Whether the switch is pressed while the hand has the stylus."""
+        return self._press.value
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the hand holds on when the mouse lets go."""
+        return self._keep.value
+
+    @property
+    def seconds_ago(self) -> float:
+        """How far back one looks [s]."""
+        return self._back.value
+
+    def write(self) -> None:
+        """Show how it is."""
+        desk = self._desk
+        self._from.visible = self._back.value > 0.0
+        self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
+        built = desk.built
+        self._perform.visible = built is not None and built.config.mode.kind == "stretch-then-follow"
+        self._perform.label = "Bend it again" if self._performs else "Perform the bent curve"
+
+    @property
+    def _performs(self) -> bool:
+        return bool(self._desk.now["performs"][0] > 0.0)
+
+    def _toggle(self) -> None:
+        self._press.value = not self._press.value
+        self._desk.press(self._press.value)
+
+    def _on_time(self) -> None:
+        self._back.value = 0.0
+        if self._time.value == "Pause":
+            self._desk.pause(not self._desk.paused)
+        elif self._time.value == "Step":
+            self._desk.step()
+        else:
+            self._desk.reset()
+
+    def _go_on(self) -> None:
+        self._desk.go_back(self._back.value)
+        self._back.value = 0.0
+        self._desk.pause(False)

@@ -1,0 +1,236 @@
+"""A servo in somebody's hand: run block by block, while gains move, curves are bent, and a take may be recorded."""
+
+import time
+from collections import deque
+from dataclasses import replace
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.fields.instructions import TRACE_SIZE
+from controllers.fields.law import Program
+from controllers.fields.stretchy_tubes import StretchyTubes
+from controllers.state import HAND_SWITCH, Array
+from experiments.config.run_config import RunConfig
+from experiments.setups.session import Session
+from experiments.setups.setups import parts_of
+from sim.devices.simulated import SimulatedPhantom
+from sim.loop.bends import redo_bend, undo_bend
+from sim.loop.loop import make_logs
+from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
+from sim.loop.snapshots import KeptState, kept_state, put_back
+from sim.users.dragged import dragged, relaxed, tremor
+
+BLOCK = 8  # ticks between two looks at the hand: 8 ms, in which nobody sees a hand stop
+STRONGEST = 8.0  # [N] about what the motors can give for a moment; a person pulls no harder
+FASTEST = 0.6  # [m/s] of the hand: a quick reach over the Phantom's workspace
+HAND_TIME = 0.03  # [s] in which the hand comes to where the mouse is: two or three pictures of the page
+KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be gone back to, and how many there are
+_UNTIL = 4  # of the parameters of `stretchy_wrench`: when stretching ends
+
+
+class Drag(NamedTuple):
+    """Where a person means to have the stylus, in H [m], and whether its switch is pressed."""
+
+    target: Array
+    pressed: bool = False
+
+
+class Engine:
+    """A session that a person drives.
+
+    Parameters
+    ----------
+    session : Session
+        That has not begun.
+
+    Attributes
+    ----------
+    config : RunConfig
+        With the gains as they are now.
+    tick : int
+        The next one.
+    """
+
+    def __init__(self, session: Session):
+        self.session, self.world = session, session.world
+        self.config = cast(RunConfig, session.config)
+        assert isinstance(session.servo.device, SimulatedPhantom)
+        field = session.servo.field
+        # The parameters of a law are its own; here they move.
+        self._servo = session.servo._replace(field=field._replace(params=field.params.copy()))
+        self._device, self._arm = session.servo.device, session.servo.device.user.arm
+        self._block = self._servo.figure_ticks * max(1, BLOCK // self._servo.figure_ticks)
+        self.logs = make_logs(self._servo, self._block)
+        self._costs: deque[float] = deque(maxlen=1000)
+        self._intended = np.full(3, np.nan)
+        self.drag: Drag | None = None
+        self.tick = 0
+        self._until = self._end_of_stretching()
+        self.perform(False)
+        self._begin = kept_state(self._servo, self.world, 0)
+        self._kept: deque[KeptState] = deque([self._begin], maxlen=KEPT)
+
+    @property
+    def period(self) -> float:
+        """Of the servo [s]."""
+        return self._servo.plant.period
+
+    @property
+    def seconds(self) -> float:
+        """Of a block [s]."""
+        return self._block * self.period
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.tick * self.period
+
+    @property
+    def stylus(self) -> Array:
+        """Measured position of the stylus in H [m], shape (3,)."""
+        return self._device.hand[1:4]
+
+    @property
+    def memory(self) -> Array:
+        """Of the field."""
+        return self._servo.field.memory
+
+    @property
+    def field(self) -> Field:
+        """The compiled field with its parameters as they are now."""
+        return self._servo.field
+
+    @property
+    def tubes(self) -> StretchyTubes | None:
+        """The law in whose memory a curve is bent, if there is one."""
+        law = self.session.field
+        return law if isinstance(law, StretchyTubes) else None
+
+    def advance(self) -> tuple[TickLog, FrameLog]:
+        """Run a block; its logs are used again by the next one."""
+        t, seconds = self.time, self.seconds
+        if self.drag is None or self.tick == 0:  # where the stylus is, nobody knows before it has been sensed
+            arm = relaxed(self._arm)
+            self._intended[:] = np.nan
+        else:
+            start = self.stylus.copy() if np.isnan(self._intended[0]) else self._intended
+            share = 1.0 - np.exp(-seconds / HAND_TIME)
+            wanted = _within_reach(start + share * (self.drag.target - start), start, FASTEST * seconds)
+            end = _within_reach(wanted, self.stylus, STRONGEST / self._arm.stiffness)
+            arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
+            self._intended = end
+        device = self._device._replace(user=self._device.user._replace(arm=arm))
+        begin = time.perf_counter()
+        run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
+        self._costs.append((time.perf_counter() - begin) / self._block)
+        self.tick += self._block
+        if self.time >= self._kept[-1].tick * self.period + KEPT_EVERY:
+            self._kept.append(kept_state(self._servo, self.world, self.tick))
+        return self.logs
+
+    def cost(self) -> tuple[float, float]:
+        """Median and 99th percentile of the time that a tick has taken of late [s], and zeros before the first."""
+        if not self._costs:
+            return 0.0, 0.0
+        middle, most = np.percentile(self._costs, (50.0, 99.0))
+        return float(middle), float(most)
+
+    def set_gains(self, config: RunConfig) -> None:
+        """Take over the numbers of a configuration's mode, while it runs.
+
+        Raises
+        ------
+        ControllerError
+            If a number is out of its interval, or more than numbers would change.
+        """
+        parts = parts_of(config, self.session.parts.maps)
+        new, old, field = parts.program, self.session.parts.program, self._servo.field
+        if not np.array_equal(new.ops, old.ops) or len(new.params) != len(old.params):
+            raise ParameterError("another field than the one that runs; expected other gains of the same mode and map")
+        field.params[:] = new.params
+        state = slice(0, TRACE_SIZE + 14) if self.tubes is not None else slice(0, len(old.memory))
+        before, after = self._initial[state], new.memory[state]
+        changed = (before != after) & ~(np.isnan(before) & np.isnan(after))
+        field.memory[state][changed] = after[changed]
+        self._initial[state] = after
+        field.budget[:] = parts.tank.params()
+        if self.tubes is not None:
+            field.params[self._until] = self._performs_from
+        self.config = cast(RunConfig, parts.config)
+
+    def perform(self, now: bool) -> None:
+        """Let the bent curve be performed from now on, or be bent again; of a mode that has both."""
+        self._performs_from = self.time if now else np.inf
+        if self.tubes is not None:
+            self._servo.field.params[self._until] = self._performs_from
+
+    @property
+    def performs(self) -> bool:
+        """Whether a bent curve is performed."""
+        return bool(np.isfinite(self._performs_from))
+
+    def undo(self) -> bool:
+        """Take the last bend back; False if there is none."""
+        return self._may_edit() and undo_bend(self.memory, self._record)
+
+    def redo(self) -> bool:
+        """Bend again what was taken back; False if there is nothing."""
+        return self._may_edit() and redo_bend(self.memory, self._record)
+
+    def _may_edit(self) -> bool:
+        """Whether there is a curve that nobody has in his hand, also as the field has it."""
+        return self.tubes is not None and self.drag is None and self._device.hand[HAND_SWITCH] == 0.0
+
+    def bends(self) -> int:
+        """How many bends are in force."""
+        return 0 if self.tubes is None else len(self.tubes.edits(self.memory))
+
+    def rearm(self) -> None:
+        """Forget a latched fault of the device: the force is ramped in from zero."""
+        rearm_servo(self._servo)
+
+    def reset(self) -> None:
+        """Go back to the beginning; gains stay as they are."""
+        self._go_to(self._begin)
+
+    def back_to(self, t: float) -> float:
+        """Go back to the last state that was kept at or before a time [s]; returns the time that it is of."""
+        state = next((kept for kept in reversed(self._kept) if kept.tick * self.period <= t), self._kept[0])
+        self._go_to(state)
+        return self.time
+
+    def _go_to(self, state: KeptState) -> None:
+        put_back(self._servo, self.world, state)
+        self.tick = state.tick
+        while len(self._kept) > 1 and self._kept[-1].tick > self.tick:
+            self._kept.pop()
+        if self._kept[0].tick > self.tick:
+            self._kept = deque([state], maxlen=KEPT)
+        self.drag = None
+        self._intended[:] = np.nan
+
+    def _end_of_stretching(self) -> int:
+        """Where in the parameters stands when stretching ends; and keep the memory as it begins."""
+        program: Program = self.session.parts.program
+        self._initial = program.memory.copy()
+        laws = program.ops[program.ops[:, 0] >= 0]
+        for row, law in zip(laws.tolist(), program.laws, strict=True):
+            if law is self.tubes:
+                self._record = row[2] + 14
+                return row[1] + _UNTIL
+        return 0
+
+
+def take_session(session: Session, config: RunConfig, handled: tuple[tuple[float, float], ...]) -> Session:
+    """A session as a take of it is measured: with the gains of its end, and the spans in which a hand had it."""
+    parts = replace(session.parts, config=config, handled=handled)
+    return replace(session, parts=parts)
+
+
+def _within_reach(point: Array, centre: Array, reach: float) -> Array:
+    """A point, or the nearest one of a ball about another."""
+    away = point - centre
+    distance = float(np.linalg.norm(away))
+    return point if distance <= reach else centre + away * (reach / distance)

@@ -1,0 +1,130 @@
+"""Whether the gains of a run are certain to be stable, fast enough to be asked while a slider moves.
+
+The verdict is that of `controllers.certificates.loop.stability.stability` at these gains, reached in the order of what
+is cheap: the loops of all hands do not depend on the gains and are kept, so a verdict takes their eigenvalues at one
+pair of gains; the margin, which takes a search, comes after it.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.passivity import passivity
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.stability import MOST_STIFFNESS, River, critical_stiffness, lap_multipliers
+from controllers.errors import ControllerError
+from experiments.certify.certify import certified_rivers
+from experiments.config.run_config import RunConfig
+from experiments.setups.certified_law import certified_laws
+from sim.errors import SimError
+
+
+class GainVerdict(NamedTuple):
+    """What is certain of the gains of a law.
+
+    Attributes
+    ----------
+    law : str
+        What it is the law of: "field", "held tube", "performance".
+    verdict : {"certified", "refuted", "unknown"}
+        Of its linear stability along the curve.
+    reason : str
+        In one line.
+    margin : float or None
+        (critical k_r)/k_r − 1; None while it is looked for.
+    passive : str
+        Verdict on its passivity, and why.
+    """
+
+    law: str
+    verdict: str
+    reason: str
+    margin: float | None
+    passive: str
+
+
+_NAMES = {"": "field", "_held": "held tube", "_then": "performance"}
+_LEAST = 1e-3  # [N/m] [N s/m] below which a gain is none
+
+
+class GainVerdicts:
+    """Verdicts on the gains of runs; loops and verdicts are kept."""
+
+    def __init__(self) -> None:
+        self._loops: dict[object, tuple[list[SampledLoop], list[SampledLoop]]] = {}
+        self._found: dict[object, GainVerdict] = {}
+        self._critical: dict[object, float] = {}
+
+    def of(self, config: RunConfig) -> Iterator[tuple[GainVerdict, ...]]:
+        """Verdicts on all laws of a run: without margins, as soon as they are there, and then with them."""
+        try:
+            laws, rivers = certified_laws(config), certified_rivers(config)
+        except (ControllerError, SimError) as error:
+            yield (GainVerdict("field", "unknown", str(error), None, ""),)
+            return
+        unknown = [name for name, law in laws.items() if law.law == "leading"]
+        if unknown:
+            said = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
+            yield (GainVerdict("field", "unknown", said, None, ""),)
+            return
+        yield tuple(self._quick(name, river) for name, river in rivers.items())
+        yield tuple(self._whole(name, river) for name, river in rivers.items())
+
+    def _quick(self, name: str, river: River) -> GainVerdict:
+        key = (name, *_key(river), river.k_r, river.b_d)
+        if key not in self._found:
+            self._found[key] = self._judged(name, river)
+        return self._found[key]
+
+    def _judged(self, name: str, river: River) -> GainVerdict:
+        law, (still, moving) = _NAMES.get(name, name.strip("_")), self._of_river(river)
+        said, passive = f"k = {river.k_r:g} N/m, b = {river.b_d:g} N s/m", passivity(river)
+        remark = f"{passive.verdict}: {passive.reason}"
+        radii = np.array([loop.radius(river.k_r, river.b_d) for loop in still])
+        if radii.max() >= 1.0:
+            hand, at = np.unravel_index(int(radii.argmax()), radii.shape)
+            grows = np.log(radii.max()) / river.sampling.period
+            where = f"phase {river.phases()[at]:.2f} s with {HandRange().hands()[hand]}"
+            return GainVerdict(law, "refuted", f"grows by e in {1e3 / grows:.3g} ms at {where}; {said}", None, remark)
+        carried = max((float(np.abs(lap_multipliers(river, loop.linear)[0])) for loop in moving), default=0.0)
+        if carried >= 1.0:
+            reason = f"stable with the phase held, but a multiplier of the lap is {carried:.4g}; {said}"
+            return GainVerdict(law, "unknown", reason, None, remark)
+        bound = (np.maximum(radii[:, 1:], radii[:, :-1]) + np.abs(np.diff(radii, axis=1))).max()
+        if bound >= 1.0:
+            return GainVerdict(
+                law, "unknown", f"near the boundary, between two phases of the grid; {said}", None, remark
+            )
+        return GainVerdict(law, "certified", f"dies away at every phase, with every hand; {said}", None, remark)
+
+    def _whole(self, name: str, river: River) -> GainVerdict:
+        quick = self._quick(name, river)
+        if quick.verdict == "refuted":
+            return quick
+        key = (name, *_key(river), river.k_r, river.b_d)
+        if key not in self._critical:
+            still, least = self._of_river(river)[0], max(river.k_r, _LEAST)
+            self._critical[key] = min(float(critical_stiffness(loop, river.b_d, least).min()) for loop in still)
+        return quick._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _LEAST) - 1.0)
+
+    def _of_river(self, river: River) -> tuple[list[SampledLoop], list[SampledLoop]]:
+        key = _key(river)
+        if key not in self._loops:
+            hands = HandRange().hands()
+            still = [SampledLoop(river.still(hand), river.sampling) for hand in hands]
+            carries = river.curve.periodic and river.law.carries
+            self._loops[key] = still, [SampledLoop(river.moving(hand), river.sampling) for hand in hands if carries]
+        return self._loops[key]
+
+
+def _key(river: River) -> tuple[object, ...]:
+    curve = river.curve
+    return (
+        river.law,
+        river.width,
+        river.sampling,
+        curve.periodic,
+        *(np.asarray(a).tobytes() for a in (curve.positions, curve.times)),
+    )

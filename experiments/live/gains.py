@@ -1,0 +1,57 @@
+"""Numbers of a mode that a slider moves while it runs."""
+
+from dataclasses import fields, replace
+from typing import Any, NamedTuple, cast
+
+from experiments.config.run_config import RunConfig
+from experiments.setups.defaults import resolved
+
+
+class Gain(NamedTuple):
+    """A number of a mode, and between what a slider has it.
+
+    Attributes
+    ----------
+    name, symbol, unit : str
+        Of the mode's field; the paper's symbol; [unit].
+    least, most, step : float
+        Of the slider; what is typed may not be beyond them either.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    least: float
+    most: float
+    step: float
+
+
+GAINS = (
+    Gain("stiffness", "k_r", "N/m", 10.0, 12000.0, 10.0),
+    Gain("damping", "b_d", "N s/m", 0.5, 80.0, 0.5),
+    Gain("seek", "k_f", "N/m", 10.0, 12000.0, 10.0),
+    Gain("rubber", "k_s", "N/m", 10.0, 12000.0, 10.0),
+    Gain("tube_damping", "b", "N s/m", 0.5, 80.0, 0.5),
+    Gain("rubber_tube", "ε", "m", 0.002, 0.02, 0.0005),
+    Gain("bunny_width", "δ", "m", 0.005, 0.1, 0.001),
+    Gain("leash", "k_l", "N/m", 10.0, 1000.0, 10.0),
+)
+"""Wider than what is stable, so that one sees where it ends."""
+
+
+def gains_of(config: RunConfig) -> dict[Gain, float]:
+    """The gains of a run's mode that can be moved, and what they are."""
+    mode = cast(Any, resolved(config).mode)
+    names = {option.name for option in fields(mode)}
+    return {gain: float(getattr(mode, gain.name)) for gain in GAINS if gain.name in names}
+
+
+def with_gain(config: RunConfig, name: str, value: float) -> RunConfig:
+    """A configuration with another number in its mode.
+
+    Raises
+    ------
+    ParameterError
+        If it is out of its interval.
+    """
+    return replace(config, mode=cast(Any, replace)(resolved(config).mode, **{name: value}))

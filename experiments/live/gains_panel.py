@@ -1,0 +1,78 @@
+"""Gains as sliders, and beside them whether they are certain to be stable."""
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from experiments.live.clock_panel import Acts
+from experiments.live.desk import Desk
+from experiments.live.gain_verdict import GainVerdict
+from experiments.live.gains import Gain, gains_of
+
+COLORS = {"certified": "#1d8a3a", "refuted": "#c02020", "unknown": "#a8700a"}
+_WORDS = {"certified": "stable", "refuted": "unstable", "unknown": "unknown"}
+
+
+class GainsPanel:
+    """Sliders of the mode that runs; the arguments are those of `ClockPanel`."""
+
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
+        self._gui, self._desk, self._acts = gui, desk, acts
+        self._verdict = gui.add_html("")
+        self._folder = gui.add_folder("Gains")
+        self._sliders: dict[Gain, viser.GuiSliderHandle[float]] = {}
+
+    def rebuild(self) -> None:
+        """Lay the sliders of the mode that runs now."""
+        for slider in self._sliders.values():
+            slider.remove()
+        self._sliders.clear()
+        if self._desk.config is None:
+            return
+        with self._folder:
+            for gain, value in gains_of(self._desk.config).items():
+                shown = min(max(value, gain.least), gain.most)
+                slider = self._gui.add_slider(
+                    f"{gain.symbol} [{gain.unit}]", gain.least, gain.most, gain.step, shown, hint=gain.name
+                )
+                slider.on_update(self._acts(self._moves(gain, slider)))
+                self._sliders[gain] = slider
+
+    def write(self) -> None:
+        """Show the verdict, and gains that somebody has undone."""
+        desk = self._desk
+        self._verdict.content = verdict_html(desk.verdict, desk.checking)
+        if desk.config is None:
+            return
+        for gain, value in gains_of(desk.config).items():
+            slider = self._sliders.get(gain)
+            if slider is not None and abs(slider.value - value) > 0.5 * gain.step and not self._is_beyond(gain, value):
+                slider.value = value
+
+    def _is_beyond(self, gain: Gain, value: float) -> bool:
+        return not gain.least <= value <= gain.most
+
+    def _moves(self, gain: Gain, slider: Any) -> Callable[[Any], None]:
+        return lambda event: self._desk.set_gain(gain.name, slider.value)
+
+
+def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
+    """The verdicts of a run, a block each: green, red or amber, with margin and reason."""
+    if not verdicts:
+        return '<p style="margin:.5rem .75rem;color:#a8700a"><b>checking…</b></p>'
+    blocks: list[str] = []
+    for found in verdicts:
+        margin = "" if found.margin is None else f"; {found.margin + 1.0:.3g} times k_r would be unstable"
+        more = " · checking…" if checking else ""
+        passive = (
+            f'<br><span style="color:#566072">Passivity {html.escape(found.passive)}.</span>' if found.passive else ""
+        )
+        blocks.append(
+            f'<div class="verdict-{found.verdict}" style="margin:.4rem .75rem;padding:.3rem .6rem;font-size:.8rem;'
+            f'border-left:6px solid {COLORS[found.verdict]}"><b style="color:{COLORS[found.verdict]}">'
+            f"{html.escape(found.law)}: {_WORDS[found.verdict]}</b>{more}<br>"
+            f"{html.escape(found.reason)}{margin}.{passive}</div>"
+        )
+    return "".join(blocks)

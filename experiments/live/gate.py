@@ -1,0 +1,187 @@
+"""The gate before the page: who has no token does not come in, and no other web page uses this one.
+
+viser asks nobody who they are, so it listens on this machine only, on a port of its own, and what comes from outside
+passes here. A connection is judged by its first request and carries no other one, so nothing comes in behind another's
+token: a page's files are one answer each, and its web socket, once let in, is piped both ways.
+"""
+
+import asyncio
+import contextlib
+import secrets
+import threading
+from typing import NamedTuple
+from urllib.parse import parse_qs, urlsplit
+
+from sim.errors import SimError
+
+HERE = ("127.0.0.1", "localhost", "::1")
+_COOKIE = "hvf_token"
+_PATIENCE = 10.0  # [s] for a request
+_MOST = 65536  # bytes of a request's head, and of a piece that is piped
+_DENIED = (
+    "<!doctype html><meta name=viewport content='width=device-width'><p style='font:16px system-ui;margin:2em'>"
+    "This page needs its token: open the address that <code>hvf live</code> has printed, with <code>?token=…</code>."
+)
+
+
+class Request(NamedTuple):
+    """The head of a request.
+
+    Attributes
+    ----------
+    path : str
+        With its query.
+    headers : dict
+        By their names in lower case.
+    """
+
+    path: str
+    headers: dict[str, str]
+
+    @staticmethod
+    def of(head: bytes) -> "Request":
+        """From its bytes.
+
+        Raises
+        ------
+        ValueError
+            If it is no head of a request.
+        """
+        first, *lines = head.decode("latin-1").rstrip("\r\n").split("\r\n")
+        method, path, _ = first.split(" ")
+        if method not in ("GET", "HEAD"):
+            raise ValueError(f"{method} is no way to look at a page")
+        pairs = (line.split(":", 1) for line in lines)
+        return Request(path, {name.strip().lower(): value.strip() for name, value in pairs})
+
+
+def answer(request: Request, token: str | None) -> bytes | None:
+    """What a request is answered by the gate itself; None for one that may pass.
+
+    Parameters
+    ----------
+    request : Request
+        The first of a connection.
+    token : str or None
+        That has to be known; None where only this machine comes here.
+    """
+    host, origin = request.headers.get("host", ""), request.headers.get("origin")
+    if origin is not None and urlsplit(origin).netloc != host:
+        return _response(403, "Forbidden", "This page is not to be used by another one.")
+    if token is None:
+        # A name that has been turned to this machine (DNS rebinding) is none of its own.
+        known = urlsplit(f"//{host}").hostname in HERE
+        return None if known else _response(403, "Forbidden", "Open this page as http://127.0.0.1 or http://localhost.")
+    parts = urlsplit(request.path)
+    given = parse_qs(parts.query).get("token", [""])[0]
+    if given and secrets.compare_digest(given.encode(), token.encode()):
+        cookie = f"Set-Cookie: {_COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict\r\n"
+        return _response(303, "See Other", "", f"Location: {parts.path or '/'}\r\n{cookie}")
+    cookies = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
+    kept = next((value for name, _, value in cookies if name == _COOKIE), "")
+    return None if secrets.compare_digest(kept.encode(), token.encode()) else _response(403, "Forbidden", _DENIED)
+
+
+def _response(code: int, said: str, body: str, more: str = "") -> bytes:
+    content = body.encode()
+    head = f"HTTP/1.1 {code} {said}\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: {len(content)}\r\n"
+    return f"{head}{more}Cache-Control: no-store\r\nConnection: close\r\n\r\n".encode() + content
+
+
+class Gate:
+    """A server before a page on this machine.
+
+    Parameters
+    ----------
+    host : str
+        To listen on.
+    port : int
+        The next free one of twenty is taken if it is in use.
+    behind : int
+        Port of the page on 127.0.0.1.
+    token : str or None
+        See `answer`.
+
+    Raises
+    ------
+    SimError
+        If it cannot listen there.
+    """
+
+    def __init__(self, host: str, port: int, behind: int, token: str | None):
+        self._behind, self._token = behind, token
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="hvf-gate", daemon=True)
+        self._thread.start()
+        try:
+            self._server = asyncio.run_coroutine_threadsafe(self._listen(host, port), self._loop).result()
+        except OSError as error:
+            self._end()
+            raise SimError(
+                f"cannot listen on {host}, port {port}: {error}; expected an address of this machine"
+            ) from None
+        self.port: int = self._server.sockets[0].getsockname()[1]
+
+    def close(self) -> None:
+        """Let nobody in any more, and nobody stay."""
+        self._loop.call_soon_threadsafe(self._server.close)
+        self._end()
+
+    def _end(self) -> None:
+        async def leave() -> None:
+            others = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in others:
+                task.cancel()
+            await asyncio.gather(*others, return_exceptions=True)
+
+        asyncio.run_coroutine_threadsafe(leave(), self._loop).result(5.0)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(5.0)
+        self._loop.close()
+
+    async def _listen(self, host: str, port: int) -> asyncio.Server:
+        last = OSError("no port is free")
+        for candidate in range(port, port + 20) if port else (0,):
+            try:
+                return await asyncio.start_server(self._come, host, candidate, limit=_MOST)
+            except OSError as error:
+                last = error
+        raise last
+
+    async def _come(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
+            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
+            try:
+                request = Request.of(head)
+                said = answer(request, self._token)
+            except ValueError:
+                said = _response(400, "Bad Request", "")
+                request = Request("", {})
+            if said is None:
+                await self._pass(request, head, reader, writer)
+            else:
+                writer.write(said)
+                await writer.drain()
+        writer.close()
+
+    async def _pass(
+        self, request: Request, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._behind)
+        inner_writer.write(head)
+        ways = [asyncio.ensure_future(_pipe(inner_reader, writer))]
+        if request.headers.get("upgrade", "").lower() == "websocket":
+            ways.append(asyncio.ensure_future(_pipe(reader, inner_writer)))
+        try:
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for way in ways:
+                way.cancel()
+            inner_writer.close()
+
+
+async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    with contextlib.suppress(OSError):
+        while piece := await reader.read(_MOST):
+            writer.write(piece)
+            await writer.drain()

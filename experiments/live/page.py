@@ -1,0 +1,259 @@
+"""The live page: a scene in which the stylus is dragged, and panels beside it. See docs/how-to/live.md."""
+
+import contextlib
+import html
+import io
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import viser
+
+from controllers.errors import ControllerError
+from controllers.state import Array
+from experiments.config.run_config import RunConfig
+from experiments.live.clock_panel import ClockPanel
+from experiments.live.desk import Desk
+from experiments.live.driver import Driver
+from experiments.live.gains_panel import GainsPanel
+from experiments.live.messages import COURSE_POINTS, SLICE_SIDE
+from experiments.live.plots import Plots
+from experiments.live.run_panel import RunPanel
+from experiments.live.takes_panel import TakesPanel
+from experiments.live.uploads_panel import UploadsPanel
+from models.errors import ModelError
+from models.scene import P_WH, SceneConfig
+from sim.errors import SimError
+from sim.viewer.courses import courses
+from sim.viewer.hand_ball import HandBall
+from sim.viewer.live_stage import NARROW, VIEWS, LiveStage, set_view
+from sim.viewer.shown import Shown
+from sim.world.world import World
+
+FASTEST = 1.0 / 60.0  # [s] between two pictures
+SHARE = 0.5  # of a core that pictures may take; a slower machine draws fewer
+POLL = 0.2  # [s] between two looks at what is written and plotted
+LINES = 4  # of what was said that are shown
+
+
+class Page:
+    """The page, served to browsers; `serve` draws until it is closed.
+
+    Parameters
+    ----------
+    config : RunConfig
+        What runs first.
+    folder : Path
+        Where takes and clips are kept.
+    port : int
+        On 127.0.0.1; the next free one is taken if it is in use, and any for 0.
+    """
+
+    def __init__(self, config: RunConfig, folder: Path, port: int = 8080):
+        self.desk, self.driver = Desk(folder, self.say), Driver()
+        self._said: list[str] = []
+        self._closed = threading.Event()
+        with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
+            self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
+        self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
+        set_view(self.server.initial_camera, VIEWS["both"])
+        self.stage: LiveStage | None = None
+        self._ball: HandBall | None = None
+        self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
+        self.pictures = 0
+        self._lay_out(config)
+        self.server.on_client_connect(_looks)
+        self.server.on_client_disconnect(self._left)
+        self.desk.build(config)
+
+    @property
+    def port(self) -> int:
+        """That it is served on."""
+        return self.server.get_port()
+
+    def say(self, line: str) -> None:
+        """Show a line to everybody."""
+        self._said = [*self._said, line][-LINES:]
+        if hasattr(self, "_lines"):
+            self._lines.content = "".join(
+                f'<p style="margin:.15rem .75rem;font-size:.8rem">{html.escape(one)}</p>' for one in self._said
+            )
+
+    def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
+        """What a browser's event does: only if it drives, and what is refused is said on the page."""
+
+        def done(event: Any) -> None:
+            if event.client_id is None:
+                return  # the page has set it itself
+            if not self.driver.may(event.client_id):
+                if event.client is not None:
+                    event.client.add_notification(
+                        "Somebody else drives", "You watch. Press “Drive” when they have done nothing for ten seconds.",
+                        auto_close_seconds=4.0,
+                    )  # fmt: skip
+                return
+            try:
+                does(event)
+            except (ControllerError, ModelError, SimError, OSError) as error:
+                self.say(str(error))
+
+        return done
+
+    def _lay_out(self, config: RunConfig) -> None:
+        gui = self.server.gui
+        self._status = gui.add_html("")
+        self._progress = gui.add_progress_bar(0.0, visible=False)
+        self._lines = gui.add_html("")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Play", viser.Icon.HAND_STOP):
+            self._clock = ClockPanel(gui, self.desk, self.acts)
+            self._run = RunPanel(gui, self.desk, self.acts, config)
+            self._seen()
+        with tabs.add_tab("Gains", viser.Icon.ADJUSTMENTS):
+            self._gains = GainsPanel(gui, self.desk, self.acts)
+        with tabs.add_tab("Takes", viser.Icon.PLAYER_RECORD):
+            self._takes = TakesPanel(gui, self.desk, self.acts, self.server.scene)
+        with tabs.add_tab("Clips", viser.Icon.UPLOAD):
+            self._uploads = UploadsPanel(gui, self.desk, self.acts)
+        with gui.add_folder("Curves", expand_by_default=False):
+            self._plots = Plots(gui)
+
+    def _seen(self) -> None:
+        gui = self.server.gui
+        views = gui.add_button_group("Look at", tuple(VIEWS))
+        drive = gui.add_button("Drive", icon=viser.Icon.STEERING_WHEEL, hint="Several may watch, one drives.")
+        self._field = gui.add_checkbox("Field arrows", True, hint="On the horizontal plane through the stylus.")
+        self.desk.look(True)
+
+        @views.on_click
+        def _(event: Any) -> None:
+            if event.client is not None:
+                set_view(event.client.camera, VIEWS[views.value])
+
+        @drive.on_click
+        def _(event: Any) -> None:
+            self.say("Another browser drives now." if self.driver.take_over(event.client_id) else "Somebody drives.")
+
+        self._field.on_update(self.acts(lambda event: self.desk.look(self._field.value)))
+
+    def _left(self, client: viser.ClientHandle) -> None:
+        if self.driver.leave(client.client_id):
+            self.desk.let_go()
+
+    def serve(self) -> None:
+        """Draw until `close` is called, or the servo's process ends."""
+        written = 0.0
+        while not self._closed.is_set():
+            begin = time.perf_counter()
+            self.desk.poll()
+            if self.desk.builds != self._builds:
+                self._set_stage()
+            self._draw()
+            if begin - written > POLL:
+                written = begin
+                self._write()
+            took = time.perf_counter() - begin
+            self._closed.wait(max(FASTEST - took, took * (1.0 / SHARE - 1.0), 1e-3))
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._closed.set()
+        self.desk.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
+
+    def _set_stage(self) -> None:
+        built, self._builds = self.desk.built, self.desk.builds
+        assert built is not None
+        stature, mass, servo_period, physics_step = (float(n) for n in np.asarray(built.drawn["scene"]))
+        world = World(SceneConfig(stature, mass, servo_period, physics_step), built.config.figure.kind)
+        self.server.scene.reset()
+        kinematic = built.config.figure.kind == "kinematic"
+        self.stage = LiveStage(
+            self.server.scene, world.full_model(), courses(built.drawn), float(np.asarray(built.drawn["tube_radius"])),
+            P_WH, "animation h(p)" if kinematic else "physical figure",
+            "animation h(p)" if built.config.map.kind == "rivers" else "default animation",
+        )  # fmt: skip
+        self._ball = HandBall(self.server.scene)
+        self._ball.on_drag(self._dragged)
+        self._takes.stage_set(world.full_model())
+        self._curve, self._moment = -1.0, (-1.0, -1.0)
+        self._run.show(built)
+        self._gains.rebuild()
+
+    def _dragged(self, event: Any, target: Array, shift: bool) -> None:
+        if not self.driver.may(event.client_id):
+            return
+        if event.phase == "end" and not self._clock.keeps:
+            self.desk.let_go()
+        else:
+            self.desk.hold(target, shift or self._clock.pressed)
+
+    def _draw(self) -> None:
+        stage, ball, desk = self.stage, self._ball, self.desk
+        now = desk.at(self._clock.seconds_ago)
+        moment = float(now["t"][0]), float(now["curve"][0])
+        if stage is None or ball is None or (moment == self._moment and not self._takes.compares):
+            return
+        self._moment = moment
+        self.pictures += 1
+        nq = stage.configuration_size
+        with self.server.atomic():
+            stage.show(
+                Shown(
+                    float(now["t"][0]),
+                    now["qpos"][:nq],
+                    now["ghost"],
+                    now["p"],
+                    now["force"],
+                    now["user"],
+                    now["target"],
+                )
+            )
+            if now["curve"][0] != self._curve and desk.built is not None and desk.built.bends:
+                self._curve = now["curve"][0]
+                stage.draw_course(0, now["course"].reshape(COURSE_POINTS, 3))
+            arrows = now["slice"].reshape(SLICE_SIDE**2, 6)
+            stage.draw_slice(arrows[:, :3] if self._field.value else arrows[:0, :3], arrows[:, 3:])
+            if not desk.holds:
+                ball.rest(now["p"])
+            stage.shows_ghost(not self._takes.compares)
+            self._takes.draw()
+
+    def _write(self) -> None:
+        desk = self.desk
+        now, going = desk.now, desk.progress
+        self._progress.visible = going is not None
+        if going is not None:
+            self._progress.value = 100.0 * going.share
+        self._status.content = _status(now, self.driver.client, "" if going is None else going.text, desk)
+        self._clock.write()
+        self._gains.write()
+        self._takes.write()
+        self._uploads.write()
+        self._run.write()
+        self._plots.write(desk.history)
+
+
+def _looks(client: viser.ClientHandle) -> None:
+    """Let a browser that is higher than wide look at the workspace."""
+    if client.camera.aspect < 1.0:
+        set_view(client.camera, NARROW)
+
+
+def _status(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
+    """The line at the top: clock, pace, what a tick takes, who drives; and what is wrong."""
+    middle, most = 1e3 * now["cost"]
+    doing = "paused" if desk.paused else f"{now['pace'][0]:.2f} × real time"
+    who = "nobody drives: drag the orange ball" if driver is None else f"browser {driver} drives"
+    said = [f"<b>{now['t'][0]:.2f} s</b> · {doing} · a tick takes {middle:.2f} ms, 99 % under {most:.2f} ms · {who}"]
+    if desk.records:
+        said.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
+    if now["fault"][0] != 0.0:
+        said.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
+    if going:
+        said.append(html.escape(going))
+    return "".join(f'<p style="margin:.3rem .75rem;font-size:.8rem">{line}</p>' for line in said)

@@ -1,0 +1,155 @@
+"""Takes beside each other: what of them is compared, and one animation mixed of several.
+
+Two performances of a curve are not in step: each has its own pace. So a moment of one is held against the moment of the
+other at which the stylus was at the same phase of the curve.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.errors import ParameterError
+from controllers.state import Array
+from experiments.results.folder import RECORDING
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from sim.errors import SimError
+from sim.recording.recording import Recording
+
+FPS = 50.0  # of what is compared and exported, as that of a run's BVH
+
+
+@dataclass(frozen=True, eq=False)
+class TakeData:
+    """A take in memory, 50 frames a second.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    poses : Array
+        The animation as the hand made it, shape (n, 75).
+    phase : Array
+        Of the curve, going on from lap to lap [s], shape (n,).
+    lap : float
+        Duration of a lap [s]; infinite for an open curve.
+    path : Array
+        Of the stylus, in H [m], shape (n, 3).
+    force, distance : Array
+        Norm of the force on the hand [N], and distance from the curve [m], shape (n,).
+    """
+
+    name: str
+    poses: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    lap: float
+    path: Array = field(repr=False)
+    force: Array = field(repr=False)
+    distance: Array = field(repr=False)
+
+    @property
+    def times(self) -> Array:
+        """Of the frames [s], shape (n,)."""
+        return np.arange(len(self.poses)) / FPS
+
+    @staticmethod
+    def of(folder: Path) -> "TakeData":
+        """From the folder of a take.
+
+        Raises
+        ------
+        SimError
+            If it holds no recording, or one without a figure.
+        """
+        with Recording(folder / RECORDING) as recording:
+            if "reference" not in recording.groups["frames"]:
+                raise SimError(f"{folder}: was recorded without a figure; expected a take with one")
+            stride = max(1, round(recording.rates["frames"] / FPS))
+            poses = recording.channel("frames", "reference")[::stride]
+            every = stride * round(recording.rates["ticks"] / recording.rates["frames"])
+            ticks = {name: recording.channel("ticks", name)[::every] for name in ("phase", "p", "force", "distance")}
+            start, end = recording.array("curve_span")
+            lap = float(end - start) if float(recording.array("curve_closed")) else np.inf
+        phase = ticks["phase"] if np.isinf(lap) else np.unwrap(ticks["phase"], period=lap)
+        force = np.linalg.norm(ticks["force"], axis=1)
+        return TakeData(folder.name, poses, phase, lap, ticks["p"], force, ticks["distance"])
+
+    def frames_at(self, phases: Array) -> Array:
+        """Frames, with their fractions, at which it is at phases [s]; of a closed curve in the lap that fits best.
+
+        Raises
+        ------
+        ParameterError
+            If it never comes there.
+        """
+        onward = np.maximum.accumulate(self.phase)
+        wanted = phases
+        if np.isfinite(self.lap):
+            laps = np.round((np.mean([onward[0], onward[-1]]) - np.mean(phases)) / self.lap)
+            wanted = phases + self.lap * laps
+        slack = 0.05 * (self.lap if np.isfinite(self.lap) else onward[-1] - onward[0])
+        if wanted[0] < onward[0] - slack or wanted[-1] > onward[-1] + slack:
+            raise ParameterError(
+                f"{self.name} goes from phase {onward[0]:.1f} to {onward[-1]:.1f} s of the curve, the region from "
+                f"{wanted[0]:.1f} to {wanted[-1]:.1f} s; expected a region that both takes go through"
+            )
+        return np.interp(wanted, onward, np.arange(len(onward), dtype=np.float64))
+
+
+class Region(NamedTuple):
+    """From when until when [s] of a take another one is taken in its place."""
+
+    start: float
+    end: float
+    take: TakeData
+
+
+def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array:
+    r"""Poses of a take with regions of other ones, shape (n, 75).
+
+    .. math:: q = q_a \exp\bigl(s \log(q_a^{-1} q_b)\bigr), \qquad s = \sigma(x)
+
+    with σ = x³ (10 − 15 x + 6 x²) over `ease` seconds within either end of a region, so velocity and acceleration
+    are continuous. Later regions are laid over earlier ones.
+
+    Raises
+    ------
+    ParameterError
+        If a region is not in the take, too short to ease in and out, or of phases that the other take has not.
+    """
+    poses, times = take.poses.copy(), take.times
+    for start, end, other in regions:
+        if not 0.0 <= start < end <= times[-1] + 1.0 / FPS:
+            raise ParameterError(
+                f"the region is {start:g} to {end:g} s; expected two times from 0 to {times[-1]:.1f} s"
+            )
+        if end - start < 2.0 * ease:
+            raise ParameterError(f"the region lasts {end - start:.2f} s; expected {2.0 * ease:g} s or more")
+        rows = np.flatnonzero((times >= start) & (times <= end))
+        theirs = _at(other.poses, other.frames_at(np.maximum.accumulate(take.phase)[rows]))
+        edge = np.clip(np.minimum(times[rows] - start, end - times[rows]) / ease, 0.0, 1.0)
+        share = edge**3 * (10.0 - 15.0 * edge + 6.0 * edge**2)
+        poses[rows] = between(poses[rows], theirs, share)
+    return poses
+
+
+def mixed_clip(take: TakeData, regions: Sequence[Region], name: str) -> Clip:
+    """What `mixed` gives, as a clip that can be written."""
+    return Clip(mixed(take, regions), FPS, name)
+
+
+def between(start: Array, end: Array, share: Array) -> Array:
+    """Poses (n, 75) at a share (n,) of the way from some to others: straight at the root, by the shortest turns."""
+    shape = (len(start), -1, 4)
+    turned = quaternions.slerped(start[:, 3:].reshape(shape), end[:, 3:].reshape(shape), share[:, None, None])
+    return np.hstack([start[:, :3] + share[:, None] * (end - start)[:, :3], turned.reshape(len(start), -1)])
+
+
+def _at(poses: Array, places: Array) -> Array:
+    """Poses between frames, at places (k,) with fractions."""
+    low = np.clip(np.floor(places).astype(int), 0, len(poses) - 1)
+    high = np.minimum(low + 1, len(poses) - 1)
+    return between(poses[low], poses[high], places - low)

@@ -1,0 +1,21 @@
+"""Undo and redo of a curve that is bent in a field's memory, from Python, between two blocks."""
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.curves.deformation import redo, undo
+from sim.compilation.compiled import entry_point
+
+Array = npt.NDArray[np.float64]
+
+
+@entry_point
+def undo_bend(memory: Array, record: int) -> bool:
+    """Take the last edit of the curve back whose record begins at ``memory[record]``; False if there is none."""
+    return undo(memory, record)
+
+
+@entry_point
+def redo_bend(memory: Array, record: int) -> bool:
+    """Make an edit again that was taken back; False if there is none."""
+    return redo(memory, record)

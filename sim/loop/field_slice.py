@@ -1,0 +1,45 @@
+"""The field at many points at once, for those who look at it: none of them leaves a trace in its memory."""
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.fields.program import evaluate
+from controllers.state import HAND_POSITION, HAND_SWITCH
+from sim.compilation.compiled import entry_point
+from sim.loop.servo import Field
+
+Array = npt.NDArray[np.float64]
+
+
+@njit
+def _wrench_at(field: Field, scratch: Array, hand: Array, wrench: Array) -> None:
+    scratch[:] = field.memory
+    evaluate(field.units, field.ops, field.params, scratch, hand, wrench)
+
+
+@entry_point
+def field_slice(field: Field, hand: Array, points: Array, scratch: Array, forces: Array) -> None:
+    """Force of a field on a hand that is at other points, and lets go of the switch.
+
+    Parameters
+    ----------
+    field : Field
+        Whose memory stays as it is.
+    hand : Array
+        The hand vector (15,), changed.
+    points : Array
+        In H [m], shape (n, 3).
+    scratch : Array
+        Like the field's memory.
+    forces : Array
+        Written [N], shape (n, 3).
+    """
+    wrench = np.zeros(6)
+    hand[HAND_SWITCH] = 0.0
+    for i in range(points.shape[0]):
+        for k in range(3):
+            hand[HAND_POSITION + k] = points[i, k]
+        _wrench_at(field, scratch, hand, wrench)
+        for k in range(3):
+            forces[i, k] = wrench[k]

@@ -1,0 +1,63 @@
+"""A running servo's whole state, kept and put back: from there it goes on bit for bit as it did."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple, cast
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from sim.loop.servo import Servo
+from sim.world.robot_world import RobotWorld
+from sim.world.world import World
+
+Array = npt.NDArray[Any]
+
+_NOT_STATE = {"params", "ops", "units", "maps", "slots", "limits", "budget"}
+"""Fields of a servo's parts that a run does not change by itself."""
+
+
+class KeptState(NamedTuple):
+    """State of a servo and its world between two ticks.
+
+    Attributes
+    ----------
+    tick : int
+        The next one.
+    data : MjData
+        Of the world.
+    arrays : tuple of Array
+        Memory of device, field, reference and figure, in the order of `state_arrays`.
+    """
+
+    tick: int
+    data: mujoco.MjData
+    arrays: tuple[Array, ...]
+
+
+def state_arrays(part: object) -> Iterator[Array]:
+    """All arrays of a servo that a run changes, or of a part of one, in their order."""
+    if not isinstance(part, tuple):
+        return
+    names = getattr(part, "_fields", ("",) * len(cast(tuple[object, ...], part)))
+    for name, value in zip(names, cast(tuple[object, ...], part), strict=True):
+        if name in _NOT_STATE:
+            continue
+        if isinstance(value, np.ndarray):
+            yield cast(Array, value)
+        else:
+            yield from state_arrays(value)
+
+
+def kept_state(servo: Servo, world: World | RobotWorld, tick: int) -> KeptState:
+    """The state before a tick."""
+    data = mujoco.MjData(world.model)
+    mujoco.mj_copyData(data, world.model, world.data)
+    return KeptState(tick, data, tuple(array.copy() for array in state_arrays(servo)))
+
+
+def put_back(servo: Servo, world: World | RobotWorld, state: KeptState) -> None:
+    """Give servo and world a state that was kept of them."""
+    for array, kept in zip(state_arrays(servo), state.arrays, strict=True):
+        array[...] = kept
+    mujoco.mj_copyData(world.data, world.model, state.data)

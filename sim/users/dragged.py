@@ -1,0 +1,60 @@
+r"""A hand that somebody drags: an arm whose intended point is told anew for every block of ticks.
+
+.. math:: F = k\,(p_d - p) + b\,(\dot p_d - v), \qquad p_d(t) = a + (b - a)\,(t - t_0)/T
+
+It is the arm of `sim.users.arm` with other numbers: in a block the intended point goes from a to b at a steady speed,
+as a path of two samples, or with the switch pressed as a grab that carries steadily. So nothing is compiled for it, and
+the force is the same law by which every simulated hand holds the stylus.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.users.arm import CompiledArm
+from sim.users.intent import GRAB_COLUMNS
+
+Array = npt.NDArray[np.float64]
+
+_SPAN = 1e6  # [s] between the two samples of a path, longer than anybody watches
+_FOR_EVER = 1e9  # [s]
+_TREMOR = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # [Hz], [rad] along x, y, z
+_TREMBLES = 1e-4  # [m]
+
+
+def relaxed(arm: CompiledArm) -> CompiledArm:
+    """The arm of a hand that has let go of the stylus, and of its switch."""
+    arm.switch[0] = 0.0
+    return arm._replace(path=np.zeros((0, 3)), grabs=np.zeros((0, GRAB_COLUMNS)), held=np.zeros((0, 3)))
+
+
+def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array, pressed: bool) -> CompiledArm:
+    """The arm of a hand that takes the stylus along from one point to another within a block.
+
+    Parameters
+    ----------
+    arm : CompiledArm
+        Its impedance is kept.
+    t, seconds : float
+        Beginning and length of the block [s].
+    start, end : Array
+        a and b in H [m], shape (3,).
+    pressed : bool
+        Whether it presses the switch.
+    """
+    carry = np.asarray(end, dtype=np.float64) - start
+    if pressed:
+        # A grab at a place that is reached at once, [at, reach, place, carry, seconds, hold, steady].
+        row = np.array([[t, 0.0, *start, *carry, seconds, _FOR_EVER, 1.0]])
+        return arm._replace(path=np.zeros((0, 3)), grabs=row, held=np.full((1, 3), np.nan))
+    speed = carry / seconds
+    first = start - speed * t
+    return relaxed(arm)._replace(path=np.array([first, first + _SPAN * speed]), period=_SPAN)
+
+
+def tremor(t: float) -> Array:
+    """Physiological tremor of an outstretched hand at a time [s], in H [m], shape (3,): 8 to 12 Hz, a tenth of a mm.
+
+    A living hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54); a device takes readings
+    that do not change for broken ones.
+    """
+    return np.array([_TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR])

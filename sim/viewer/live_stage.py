@@ -1,0 +1,207 @@
+"""What is seen of a run while it goes on: the workspace, magnified, and beside it the figure and its ghost.
+
+Drawn as the replay draws it (`sim.viewer.replay_html`): Phantom, curves, tubes and forces are magnified and stand
+beside the figures, their axes are the world's. A figure that travels is followed: the floor moves under it.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from sim.viewer.actor import GHOST, Actor
+from sim.viewer.courses import Course
+from sim.viewer.palette import FIELD, USER, rgb
+from sim.viewer.shapes import body_shapes, coarser, tube
+from sim.viewer.shown import Shown
+
+Array = npt.NDArray[np.float64]
+
+MAGNIFICATION = 6.0
+PHANTOM_AT = np.array([1.6, -0.6, 1.25])  # where the origin of the hand frame is drawn [m]
+GHOST_AT = np.array([-0.95, -0.35, 0.0])  # the ghost's distance from the figure [m]
+METRES_PER_NEWTON = 0.12  # drawn length of a force
+LEAST_ARROW = 0.02  # [m] below which a force is not drawn
+TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
+LONGEST_SLICE = 0.11  # [m] drawn length of the largest force on a slice
+FOLLOWS = 0.5  # [s] by which the view is behind a figure that travels
+TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
+FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
+LEAPS = 3.0  # [m] a figure that is so far from where the view has it was put there
+
+
+class View(NamedTuple):
+    """Where a camera stands, and what it looks at [m]."""
+
+    position: tuple[float, float, float]
+    look_at: tuple[float, float, float]
+
+
+VIEWS = {
+    "both": View((1.65, -5.6, 2.3), (1.05, 0.0, 1.0)),
+    "workspace": View((1.9, -3.3, 2.2), (1.9, -0.4, 1.25)),
+    "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
+}
+"""By what they show; a little to the right of it, for the panel covers a fifth of the page."""
+NARROW = View((1.6, -5.6, 1.6), (1.6, 0.0, 0.35))
+"""Where a phone looks that is held upright: at the workspace, above the panel."""
+FIELD_OF_VIEW = np.deg2rad(34.0)
+
+
+def drawn_at(p_H: Array) -> Array:
+    """Where a point of the hand frame is drawn [m], shapes (..., 3)."""
+    return PHANTOM_AT + MAGNIFICATION * p_H
+
+
+def taken_at(position: Array) -> Array:
+    """Point of the hand frame that is drawn at a place [m], shapes (..., 3)."""
+    return (position - PHANTOM_AT) / MAGNIFICATION
+
+
+class LiveStage:
+    """Everything that is drawn of a run.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+        Of the page; what is in it goes.
+    model : mujoco.MjModel
+        The world with the figure: bodies named ``phantom/…`` and ``figure/…``.
+    drawn : sequence of Course
+        The curves.
+    radius : float
+        Of the tube around each [m], 0 for none.
+    p_WH : array (3,)
+        Origin of the hand frame in the world.
+    figure, ghost : str
+        What the labels call them; without a ghost, nothing.
+    """
+
+    def __init__(
+        self, scene: viser.SceneApi, model: mujoco.MjModel, drawn: Sequence[Course], radius: float, p_WH: Array,
+        figure: str = "physical figure", ghost: str = "default animation",
+    ):  # fmt: skip
+        self._scene, self._model, self._data, self._p_WH = scene, model, mujoco.MjData(model), p_WH
+        shapes = body_shapes(model, "figure/")
+        joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "figure/root")
+        self._root = int(model.jnt_qposadr[joint]) if joint >= 0 else -1
+        self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
+        self._figure = Actor(scene, "figure", coarser(shapes, FIGURE_CELL), 1.0)
+        self._ghost = Actor(scene, "ghost", coarser(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
+        self._followed, self._origin, self._t = np.zeros(2), np.full(2, np.nan), 0.0
+        self._grid = scene.add_grid(
+            "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
+        )
+        self._arrows = {name: self._arrow(name, color) for name, color in (("force", FIELD), ("user", USER))}
+        self._slice = scene.add_arrows(
+            "/slice", np.zeros((1, 2, 3)), (120, 135, 160), shaft_radius=0.004, head_radius=0.010, head_length=0.022
+        )
+        self._lag = scene.add_line_segments(
+            "/lag", np.zeros((1, 2, 3)), rgb(USER), thickness=3.0, thickness_units="screen", visible=False
+        )
+        self._tubes: dict[str, viser.MeshHandle] = {}
+        self._courses = [(course, self._drawn_radius(course, radius)) for course in drawn]
+        for k in range(len(self._courses)):
+            self.draw_course(k, self._courses[k][0].points)
+        self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
+        if self._root >= 0:
+            self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
+        if self._root >= 0 and ghost:
+            self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
+
+    @property
+    def configuration_size(self) -> int:
+        """Numbers in a configuration of the world."""
+        return int(self._model.nq)
+
+    def shows_ghost(self, shows: bool) -> None:
+        """Whether the ghost is seen, or something else stands in its place."""
+        if self._ghost.visible != shows:
+            self._ghost.visible = shows
+
+    def draw_course(self, k: int, points: Array) -> None:
+        """Draw one of the curves where it is now: points in the hand frame [m], shape (m, 3)."""
+        course, radius = self._courses[k]
+        line = drawn_at(points)
+        self._draw_tube(f"/curve/{k}/line", line, 0.006, 8, {"color": rgb(course.line), "cast_shadow": False})
+        if radius > 0.0:
+            looks = {"color": rgb(course.tube), "opacity": 0.14, "side": "double", "receive_shadow": False}
+            self._draw_tube(f"/curve/{k}/tube", line, MAGNIFICATION * radius, 20, looks | {"cast_shadow": False})
+
+    def _draw_tube(self, node: str, line: Array, radius: float, sides: int, looks: dict[str, Any]) -> None:
+        vertices, faces = tube(line, radius, sides)
+        drawn = self._tubes.get(node)
+        if drawn is not None and len(drawn.vertices) == len(vertices):
+            drawn.vertices = vertices.astype(np.float32)
+        else:
+            self._tubes[node] = self._scene.add_mesh_simple(node, vertices, faces, **looks)
+
+    def draw_slice(self, points: Array, forces: Array) -> None:
+        """Draw the field's forces [N] at points of the hand frame [m], shapes (n, 3); none if there are none."""
+        self._slice.visible = len(points) > 0
+        if len(points) == 0:
+            return
+        scale = LONGEST_SLICE / max(float(np.linalg.norm(forces, axis=1).max()), 1e-9)
+        at = drawn_at(points)
+        self._slice.points = np.stack([at, at + scale * forces], axis=1).astype(np.float32)
+
+    def show(self, shown: Shown) -> None:
+        """Draw one moment."""
+        data, shift = self._data, self._follow(shown.t, shown.qpos)
+        data.qpos[:] = shown.qpos
+        mujoco.mj_kinematics(self._model, data)
+        self._phantom.pose(data, self._p_WH, MAGNIFICATION, PHANTOM_AT)
+        self._figure.pose(data, shift, 1.0, np.zeros(3))
+        if len(shown.ghost) and self._root >= 0:
+            data.qpos[self._root : self._root + len(shown.ghost)] = shown.ghost
+            mujoco.mj_kinematics(self._model, data)
+            self._ghost.pose(data, shift, 1.0, GHOST_AT)
+        self._grid.position = -shift % 1.0 * np.array([1.0, 1.0, 0.0])
+        tip = drawn_at(shown.p)
+        for name, force in (("force", shown.force), ("user", shown.user)):
+            handle = self._arrows[name]
+            handle.points = np.array([[tip, tip + METRES_PER_NEWTON * force]], dtype=np.float32)
+            handle.visible = bool(np.linalg.norm(force) * METRES_PER_NEWTON > LEAST_ARROW)
+        held = bool(np.isfinite(shown.target[0]))
+        self._lag.visible = held
+        if held:
+            self._lag.points = np.array([[tip, drawn_at(shown.target)]], dtype=np.float32)
+
+    def _follow(self, t: float, qpos: Array) -> Array:
+        """What is subtracted from places of the figure: nothing, or the way that it has travelled, smoothed."""
+        if self._root < 0:
+            return np.zeros(3)
+        place = qpos[self._root : self._root + 2]
+        if np.isnan(self._origin[0]):
+            self._origin = place.copy()
+        way = place - self._origin
+        if np.linalg.norm(way - self._followed) > LEAPS:
+            self._followed = way if np.linalg.norm(way) > TRAVELS else np.zeros(2)
+        elif np.linalg.norm(way) > TRAVELS or np.any(self._followed != 0.0):
+            share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)
+            self._followed = self._followed + share * (way - self._followed)
+        self._t = t
+        return np.array([*self._followed, 0.0])
+
+    def _arrow(self, name: str, color: str) -> viser.ArrowsHandle:
+        return self._scene.add_arrows(
+            f"/forces/{name}", np.zeros((1, 2, 3)), rgb(color), shaft_radius=0.014, head_radius=0.034,
+            head_length=0.07, visible=False,
+        )  # fmt: skip
+
+    def _label(self, name: str, text: str, position: Array) -> viser.LabelHandle:
+        return self._scene.add_label(
+            f"/labels/{name}", text, position=position, anchor="bottom-center", font_screen_scale=1.1
+        )
+
+    @staticmethod
+    def _drawn_radius(course: Course, radius: float) -> float:
+        return min(radius, TUBE_SHARE * float(np.max(np.ptp(course.points, axis=0))))
+
+
+def set_view(camera: viser.InitialCameraConfig | viser.CameraHandle, view: View) -> None:
+    """Put a camera where a view has it."""
+    camera.position, camera.look_at, camera.fov = view.position, view.look_at, FIELD_OF_VIEW

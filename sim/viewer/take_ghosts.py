@@ -1,0 +1,57 @@
+"""Takes shown over each other: a translucent figure for each, and the way that the stylus went."""
+
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from sim.viewer.actor import Actor
+from sim.viewer.live_stage import GHOST_AT, GHOST_CELL, drawn_at
+from sim.viewer.palette import RIVERS, rgb
+from sim.viewer.shapes import body_shapes, coarser, tube
+
+Array = npt.NDArray[np.float64]
+
+COLORS = RIVERS[1:]
+_LEAST = 1e-4  # [m] from point to point of a path that is drawn
+
+
+class TakeGhosts:
+    """Ghosts of takes.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+        In which they are drawn.
+    model : mujoco.MjModel
+        The world with the figure.
+    paths : Mapping
+        Of the stylus by the takes' names, in H [m], shapes (n, 3).
+    """
+
+    def __init__(self, scene: viser.SceneApi, model: mujoco.MjModel, paths: Mapping[str, Array]):
+        self._model, self._data = model, mujoco.MjData(model)
+        self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
+        shapes = coarser(body_shapes(model, "figure/"), GHOST_CELL)
+        self._ghosts: list[Actor] = []
+        self._paths: list[viser.MeshHandle] = []
+        for k, (path, color) in enumerate(zip(paths.values(), COLORS, strict=False)):
+            self._ghosts.append(Actor(scene, f"take/{k}", shapes, 1.0, color))
+            apart = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _LEAST
+            if np.count_nonzero(apart) > 1:
+                vertices, faces = tube(drawn_at(path[apart]), 0.008, sides=8)
+                self._paths.append(scene.add_mesh_simple(f"/take/path/{k}", vertices, faces, color=rgb(color)))
+
+    def show(self, poses: Sequence[Array]) -> None:
+        """Show a pose (75,) of each take, each where it began."""
+        for ghost, pose in zip(self._ghosts, poses, strict=False):
+            self._data.qpos[self._root : self._root + len(pose)] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            ghost.pose(self._data, np.zeros(3), 1.0, GHOST_AT)
+
+    def remove(self) -> None:
+        """Show them no more."""
+        for drawn in (*self._ghosts, *self._paths):
+            drawn.remove()

@@ -1,0 +1,167 @@
+"""What the live page can do, without a page: processes of its own, and a person's doings in them."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.config.words import run_config
+from experiments.live.desk import MOST_BYTES, Desk
+from models.mocap.library import embedded, load
+from models.mocap.readers.own_bvh import write_bvh
+from sim.errors import SimError
+
+PATIENCE = 300.0  # [s] for what takes a second or two on a machine that does nothing else
+
+pytestmark = pytest.mark.slow
+
+
+class Said(Desk):
+    """A desk that keeps what it says."""
+
+    def __init__(self, folder: Path):
+        self.said: list[str] = []
+        super().__init__(folder, self.said.append)
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, f"not so after {PATIENCE:g} s: {what}; said: {self.said}"
+            self.poll()
+            time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Said]:
+    it = Said(tmp_path_factory.mktemp("live"))
+    it.build(run_config(mode="stretch", figure="kinematic", seconds=3600.0))
+    it.until(lambda: it.built is not None, "the run is put together")
+    yield it
+    it.close()
+    assert not it.engine.alive
+
+
+def time_of(it: Said) -> float:
+    return float(it.now["t"][0])
+
+
+def test_time_goes_stands_and_steps(desk: Said) -> None:
+    desk.until(lambda: time_of(desk) > 0.5, "time goes")
+    desk.pause(True)
+    desk.until(lambda: desk.paused, "it is paused")
+    time.sleep(0.1)
+    desk.poll()
+    stands = time_of(desk)
+    time.sleep(0.2)
+    desk.poll()
+    assert time_of(desk) == stands
+    desk.step()
+    desk.until(lambda: time_of(desk) > stands, "a step passes")
+    time.sleep(0.1)
+    desk.poll()
+    assert time_of(desk) == pytest.approx(stands + 0.008)
+    desk.pause(False)
+
+
+def test_a_curve_is_grabbed_bent_and_undone_with_the_page_s_undo(desk: Said) -> None:
+    desk.until(lambda: len(desk.history) > 5, "something is remembered")
+    place = desk.now["p"].copy()
+    desk.hold(place + np.array([0.0, 0.0, 0.02]), pressed=True)
+    desk.until(lambda: desk.now["p"][2] - place[2] > 0.01, "the stylus comes along")
+    assert np.linalg.norm(desk.now["user"]) > 0.2
+    desk.let_go()
+    desk.until(lambda: desk.now["bends"][0] == 1.0, "the curve is bent")
+    course = desk.now["course"].copy()
+    desk.undo()
+    desk.until(lambda: desk.now["bends"][0] == 0.0, "the bend is undone")
+    desk.until(lambda: not np.array_equal(desk.now["course"], course), "the page is shown the curve")
+    desk.redo()
+    desk.until(lambda: desk.now["bends"][0] == 1.0, "it is made again")
+
+
+def test_gains_move_and_are_undone_and_their_verdict_turns_red_and_green(desk: Said) -> None:
+    desk.until(lambda: bool(desk.verdict) and not desk.checking, "the first verdict")
+    assert {v.verdict for v in desk.verdict} == {"certified"}
+    for seek in (9000.0, 11000.0):
+        desk.set_gain("seek", seek)
+    desk.until(lambda: desk.verdict[0].verdict == "refuted", "the verdict turns red")
+    assert "11000" in desk.verdict[0].reason
+    desk.undo()  # one way of a slider is one thing to undo
+    assert desk.config is not None
+    assert desk.config.mode.seek == 150.0
+    desk.until(lambda: desk.verdict[0].verdict == "certified", "and green again")
+
+
+def test_a_take_is_recorded_and_its_animation_is_read_again(desk: Said) -> None:
+    with pytest.raises(SimError, match="cannot be named"):
+        desk.record("../elsewhere")
+    desk.record("take 1")
+    desk.until(lambda: desk.now["recording"][0] > 0.8, "it is recorded")
+    desk.stop()
+    desk.until(lambda: desk.takes() == ("take 1",), "it is kept")
+    desk.until(lambda: not desk.records, "it has ended")
+    assert load(desk.take("take 1") / "edited.bvh").clip.duration > 0.7
+    with pytest.raises(SimError, match="there is a take"):
+        desk.record("take 1")
+
+
+def test_one_looks_back_and_goes_on_from_there(desk: Said) -> None:
+    desk.until(lambda: len(desk.history) > 60, "two seconds are remembered")
+    back = desk.at(1.0)
+    assert time_of(desk) - float(back["t"][0]) == pytest.approx(1.0, abs=0.2)
+    before = time_of(desk)
+    desk.go_back(1.0)
+    desk.until(lambda: time_of(desk) < before - 0.5, "time is earlier")
+    desk.reset()
+    desk.until(lambda: time_of(desk) < 0.5, "it begins again")
+
+
+def test_motion_files_are_prepared_or_refused_in_one_line(desk: Said, tmp_path: Path) -> None:
+    with pytest.raises(SimError, match="expected 30 MB or less"):
+        desk.upload("large.bvh", bytes(MOST_BYTES + 1))
+    with pytest.raises(SimError, match="no motion file"):
+        desk.upload("picture.png", b"")
+    desk.upload("../../broken.bvh", b"HIERARCHY\nROOT nobody\n{ oh }\n")
+    with pytest.raises(SimError, match="one file after the other"):
+        desk.upload("second.bvh", b"")
+    desk.until(lambda: desk.preparing is None, "the broken one is answered")
+    assert desk.said[-1].startswith("broken.bvh")
+    assert "\n" not in desk.said[-1]
+    assert str(desk.folder) not in desk.said[-1]
+    write_bvh(embedded("cheer"), tmp_path / "own.bvh")
+    desk.upload("own.bvh", (tmp_path / "own.bvh").read_bytes())
+    desk.until(lambda: "own" in desk.clips, "one's own is taken")
+    desk.build(run_config(map="cylindrical", clips=(str(desk.clips["own"]),), figure="kinematic", seconds=3600.0))
+    builds = desk.builds
+    desk.until(lambda: desk.builds > builds, "and driven")
+    assert desk.built is not None
+    assert "own" in str(desk.built.drawn["title"])
+
+
+def test_what_cannot_be_put_together_is_said_and_what_runs_goes_on(desk: Said) -> None:
+    builds = desk.builds
+    desk.build(run_config(map="cylindrical", clips=("nobody.bvh",), figure="kinematic"))
+    desk.until(lambda: "nobody.bvh" in desk.said[-1], "it is said")
+    assert desk.builds == builds
+    before = time_of(desk)
+    desk.until(lambda: time_of(desk) > before, "time goes on")
+
+
+CAPTURE = Path(__file__).resolve().parents[3] / "shared" / "mocap"
+
+
+def test_a_capture_is_prepared_mapped_and_driven(desk: Said) -> None:
+    files = sorted(CAPTURE.rglob("*.bvh"), key=lambda file: file.stat().st_size)
+    if not files:
+        pytest.skip("needs captures in ../shared/mocap")
+    file = next(file for file in files if file.stat().st_size > 100_000)
+    desk.upload(file.name, file.read_bytes())
+    desk.until(lambda: desk.preparing is None, "it is prepared")
+    assert file.stem in desk.clips, desk.said[-1]
+    builds = desk.builds
+    desk.build(run_config(map="cylindrical", clips=(str(desk.clips[file.stem]),), figure="kinematic", seconds=3600.0))
+    desk.until(lambda: desk.builds > builds, "it is driven")
+    before = desk.now["reference"].copy()
+    desk.until(lambda: float(np.abs(desk.now["reference"] - before).max()) > 0.01, "the figure moves")

@@ -1,0 +1,192 @@
+"""A servo in somebody's hand: dragged, bent, tuned, put back, recorded."""
+
+import numpy as np
+import pytest
+
+from controllers.errors import ParameterError
+from experiments.config.words import run_config
+from experiments.live.engine import STRONGEST, Drag, Engine
+from experiments.live.engine_process import slice_points
+from experiments.live.gains import gains_of, with_gain
+from experiments.live.takes import Take
+from experiments.reproduce import reproduce
+from experiments.results.folder import EDITED, RECORDING
+from experiments.setups.wiring import wire
+from models.mocap.library import load
+from sim.errors import SimError
+from sim.loop.field_slice import field_slice
+from sim.recording.recording import Recording
+
+
+def engine(mode: str = "follow", **words: object) -> Engine:
+    return Engine(wire(run_config(mode=mode, figure="kinematic", seconds=3600.0, **words)))
+
+
+def run(it: Engine, seconds: float) -> None:
+    for _ in range(round(seconds / it.seconds)):
+        it.advance()
+
+
+def test_a_hand_that_drags_is_followed_with_a_lag_that_shows_the_force():
+    it = engine()
+    run(it, 0.8)
+    relaxed = it.session.servo.reference.pose.copy()
+    target = it.stylus + np.array([0.0, 0.0, 0.02])
+    it.drag = Drag(target)
+    run(it, 1.0)
+    lag = target - it.stylus
+    user = it.logs[0].user[-1]
+    assert np.linalg.norm(user) > 1.0
+    np.testing.assert_allclose(user, 300.0 * lag, atol=0.15)  # k times the lag, but for tremor and damping
+    assert np.abs(it.session.servo.reference.pose - relaxed).max() > 0.01
+    it.drag = None
+    it.advance()
+    assert np.all(it.logs[0].user[-1] == 0.0)
+
+
+def test_a_hand_that_holds_on_long_is_not_taken_for_a_broken_encoder():
+    it = engine()
+    run(it, 0.4)
+    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]))
+    run(it, 3.0)
+    assert it.session.servo.device.faults[0] == 0.0
+    assert np.linalg.norm(it.logs[0].force[-1]) > 0.5
+
+
+def test_a_hand_is_no_stronger_than_a_person():
+    it = engine()
+    it.drag = Drag(np.array([0.0, 0.0, 0.12]))  # 36 N of the arm's spring away
+    strongest = 0.0
+    for _ in range(60):
+        it.advance()
+        strongest = max(strongest, float(np.linalg.norm(it.logs[0].user, axis=1).max()))
+    # The spring is bounded at every block, and so is the speed at which the damper takes the stylus along.
+    assert STRONGEST / 2.0 < strongest < 1.5 * STRONGEST
+
+
+def test_grab_and_bend_undo_and_redo():
+    it = engine("stretch")
+    run(it, 0.4)
+    before = it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41))
+    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.02]), pressed=True)
+    run(it, 0.6)
+    it.drag = None
+    run(it, 0.1)
+    bent = it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41))
+    assert it.bends() == 1
+    assert np.abs(bent - before)[:, 2].max() > 0.005
+    assert it.undo()
+    np.testing.assert_array_equal(it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41)), before)
+    assert not it.undo()
+    assert it.redo()
+    np.testing.assert_array_equal(it.tubes.edited(it.memory).point(np.linspace(0.0, 4.0, 41)), bent)
+
+
+def test_a_bent_curve_is_performed_when_it_is_asked_for_and_not_before():
+    it = engine("stretch-then-follow")
+    run(it, 0.8)
+    start = it.stylus.copy()
+    run(it, 0.8)
+    assert np.linalg.norm(it.stylus - start) < 2e-3  # it is sought, nothing leads along it
+    it.perform(True)
+    run(it, 2.0)
+    assert it.performs
+    assert np.linalg.norm(it.stylus - start) > 0.02
+    it.perform(False)
+    run(it, 0.5)
+    start = it.stylus.copy()
+    run(it, 0.5)
+    assert np.linalg.norm(it.stylus - start) < 2e-3
+
+
+@pytest.mark.parametrize("mode", ["follow", "bunny", "stretch", "stretch-then-follow", "lead"])
+def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
+    it = engine(mode)
+    for gain, value in gains_of(it.config).items():
+        it.set_gains(with_gain(it.config, gain.name, 1.25 * value))
+    other = engine(mode, **{gain.name: value for gain, value in gains_of(it.config).items()})
+    for _ in range(60):
+        it.advance()
+        other.advance()
+    np.testing.assert_array_equal(it.stylus, other.stylus)
+    np.testing.assert_array_equal(it.logs[0].force, other.logs[0].force)
+
+
+def test_other_parts_are_no_gains():
+    it = engine()
+    with pytest.raises(ParameterError, match="same mode and map"):
+        it.set_gains(run_config(mode="bunny", figure="kinematic"))
+
+
+def test_what_happens_from_a_kept_state_on_happens_again_bit_for_bit():
+    it = Engine(wire(run_config(mode="stretch", seconds=3600.0)))
+    run(it, 2.4)
+    assert it.back_to(1.9) <= 1.9
+    run(it, 0.8)
+    first = it.session.servo.plant.qpos.copy(), it.memory.copy(), it.time
+    it.drag = Drag(it.stylus + 0.01)
+    run(it, 0.4)
+    it.back_to(1.9)
+    run(it, 0.8)
+    np.testing.assert_array_equal(it.session.servo.plant.qpos, first[0])
+    np.testing.assert_array_equal(it.memory, first[1])
+    assert it.time == first[2]
+    it.reset()
+    assert it.time == 0.0
+
+
+def test_looking_at_the_field_changes_nothing():
+    it, same = engine("stretch"), engine("stretch")
+    for _ in range(40):
+        it.advance()
+        same.advance()
+        points = slice_points(0.0)
+        forces, hand = np.full_like(points, np.nan), it.session.servo.device.hand.copy()
+        hand[8:11] = 0.0
+        field_slice(it.field, hand, points, it.memory.copy(), forces)
+        assert np.all(np.isfinite(forces))
+    np.testing.assert_array_equal(it.memory, same.memory)
+    # A hand at rest is drawn to the curve; on the circle's axis, all ways are as far.
+    curve = it.session.curve.point(np.linspace(0.0, 4.0, 200))
+    nearest = curve[np.argmin(np.linalg.norm(points[:, None] - curve[None], axis=2), axis=1)]
+    off = np.linalg.norm(points[:, :2], axis=1) > 1e-3
+    assert np.all(np.sum((nearest - points) * forces, axis=1)[off] > 0.0)
+
+
+def test_a_take_is_a_run_whose_animation_is_read_again(tmp_path):
+    it = engine("stretch")
+    run(it, 0.4)
+    take = Take(tmp_path / "take", it)
+    it.drag = Drag(it.stylus + np.array([0.0, 0.0, 0.015]), pressed=True)
+    for _ in range(100):
+        take.add(it.advance(), it)
+    it.drag = None
+    lines = take.end(it)
+    assert any("bent once" in line for line in lines) or it.bends() == 0
+    with Recording(tmp_path / "take" / RECORDING) as recording:
+        assert recording.complete
+        t = recording.channel("ticks", "t")[:]
+        np.testing.assert_allclose(t, 1e-3 * np.arange(800), atol=1e-12)
+        assert np.linalg.norm(recording.channel("ticks", "user")[-1]) > 0.5
+    clip = load(tmp_path / "take" / EDITED).clip
+    assert clip.duration == pytest.approx(0.8, abs=0.05)
+    with pytest.raises(SimError, match="dragged by hand"):
+        reproduce(tmp_path / "take")
+    with pytest.raises(SimError, match="holds a run"):
+        Take(tmp_path / "take", it)
+
+
+def test_a_slip_of_the_mouse_is_no_take(tmp_path):
+    it = engine()
+    take = Take(tmp_path / "take", it)
+    take.add(it.advance(), it)
+    with pytest.raises(SimError, match=r"0\.01 s is not measured"):
+        take.end(it)
+
+
+def test_sliders_hold_what_gains_are():
+    for mode in ("follow", "bunny", "stretch", "stretch-then-follow", "lead"):
+        config = run_config(mode=mode)
+        for gain, value in gains_of(config).items():
+            assert gain.least <= value <= gain.most
+            assert getattr(with_gain(config, gain.name, gain.most).mode, gain.name) == gain.most

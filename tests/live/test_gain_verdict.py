@@ -1,0 +1,40 @@
+"""The verdict beside a slider is the certificate's."""
+
+import pytest
+
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.stability import stability
+from experiments.certify.certify import certified_rivers
+from experiments.config.words import run_config
+from experiments.live.gain_verdict import GainVerdicts
+from experiments.live.gains_panel import verdict_html
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [{}, {"stiffness": 9000.0}, {"mode": "bunny", "stiffness": 6000.0}])
+def test_it_is_what_the_certificate_says(words):
+    config = run_config(**words)
+    (river,) = certified_rivers(config).values()
+    whole = stability(river, HandRange().hands())
+    *_, (found,) = GainVerdicts().of(config)
+    assert found.verdict == whole.verdict
+    if whole.verdict == "certified":
+        assert found.margin == pytest.approx(whole.margin, rel=1e-6)
+
+
+def test_what_is_unstable_is_red_at_once_and_says_why():
+    (found,) = next(GainVerdicts().of(run_config(stiffness=11000.0)))
+    assert found.verdict == "refuted"
+    assert "k = 11000 N/m" in found.reason
+    shown = verdict_html((found,), False)
+    assert "unstable" in shown
+    assert "#c02020" in shown
+
+
+def test_what_there_is_no_certificate_for_is_unknown_and_says_why():
+    for mode, said in (("lead", "led"), ("rivers", "--governor")):
+        words = {"mode": mode} | ({"map": "rivers", "governor": True} if mode == "rivers" else {})
+        (found,) = next(GainVerdicts().of(run_config(**words)))
+        assert found.verdict == "unknown"
+        assert said in found.reason
+    assert "checking" in verdict_html((), True)
