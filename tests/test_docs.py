@@ -117,7 +117,7 @@ def test_files_and_functions_that_pages_name_are_there() -> None:
             assert (ROOT / path).exists(), f"{name(page)}: {path}"
             if defined:
                 source = (ROOT / path).read_text(encoding="utf-8")
-                assert re.search(rf"^(?:def|class) {defined}\b", source, re.MULTILINE), (
+                assert re.search(rf"^(?:(?:def|class) )?{defined}\b", source, re.MULTILINE), (
                     f"{name(page)}: {path}:{defined}"
                 )
 

@@ -18,6 +18,7 @@ from sim.hardware.shared import SharedNumbers
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
+from sim.viewer.shown import Shown
 from sim.world.shown_phantom import show_angles, shown_phantom
 
 _PAUSE = 1.0 / 60.0  # [s] between two looks: half a picture's time
@@ -35,14 +36,16 @@ def show_status(config: RunConfig, status: SharedNumbers) -> None:
     )
     world = session.world
     static = session.static()
-    page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH)
+    page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH, world.kind)
     linkage, row, parent = shown_phantom(world.model, world.data), np.zeros(ROW_SIZE), os.getppid()
     while os.getppid() == parent:
         if status.read(row):
             tick = {name: channel[0] for name, channel in columns(row[None]).items()}
             show_angles(linkage, tuple(tick["theta"]), tuple(tick["gimbal"]))
             pose = np.zeros(0) if led else _pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
-            page.show(np.concatenate([world.data.qpos, pose]), tick["p"], tick["force"])
+            qpos = np.concatenate([world.data.qpos, pose])
+            none = np.zeros(3)  # who holds the stylus is not known
+            page.show(Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], none, np.full(3, np.nan)))
         time.sleep(_PAUSE)
 
 

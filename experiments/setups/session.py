@@ -63,7 +63,11 @@ class Session:
         own = user.own if isinstance(user, Participant) else None
         if own is None or own.compiled or not isinstance(device, SimulatedPhantom):
             return {}
-        return {"ask": lambda t: own.ask(device.user.person, t), "ask_seconds": own.every}
+
+        def ask(t: float) -> None:
+            own.ask(device.user.person, t)
+
+        return {"ask": ask, "ask_seconds": own.every}
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """What the recording keeps beside the channels."""

@@ -41,5 +41,9 @@ def natural_times(points: Array, seconds: float) -> Array:
         return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
 
     first = jerk(np.zeros(2 * _WAVES))
-    found = minimize(lambda c: jerk(c) / first, np.zeros(2 * _WAVES), method="L-BFGS-B")
+
+    def share(c: Array) -> float:
+        return jerk(c) / first
+
+    found = minimize(share, np.zeros(2 * _WAVES), method="L-BFGS-B")
     return seconds * times(found.x)

@@ -69,7 +69,7 @@ class Participant:
         return PersonState(
             units=np.array([0, address], dtype=np.int64), numbers=self._numbers(period, reflex, seen),
             memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
-            inertia=inertia, mobility=np.linalg.inv(inertia), stiffness=stiffness, damping=damping,
+            inertia=inertia, mobility=np.linalg.inv(inertia).astype(np.float64), stiffness=stiffness, damping=damping,
             wishes=self.wishes.rows.copy(), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
             plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
             eye=no_eye(),

@@ -70,5 +70,5 @@ def trial(
     rows, plant = np.zeros((n, 10)), make_plant(world)
     given = np.zeros((n, 3)) if pushes is None else pushes
     run_bare(device, plant, given, np.zeros((plant.substeps, device.user_torques)), rows)
-    t = PERIOD * np.arange(1, n + 1)
+    t: Array = PERIOD * np.arange(1, n + 1, dtype=np.float64)
     return Trace(t, rows[:, 0:3], rows[:, 3:6], rows[:, 6:9], t[rows[:, 9] > 0.0])

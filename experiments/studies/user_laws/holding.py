@@ -62,7 +62,7 @@ def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, flo
         (1.0 if k % 2 else -1.0) * (trace.p[k * period : k * period + window, 0] - trace.p[k * period - 1, 0])
         for k in range(1, REPEATS)
     ]
-    answer, t = np.mean(answers, axis=0), PERIOD * np.arange(1, window + 1)
+    answer, t = np.mean(answers, axis=0), PERIOD * np.arange(1, window + 1, dtype=np.float64)
     # Integrated twice, F = m a + b v + k x needs no derivative of what is measured.
     once, twice = np.cumsum(answer) * PERIOD, np.cumsum(np.cumsum(answer)) * PERIOD**2
     columns = np.stack([answer, once, twice], axis=1)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import butter, filtfilt
+from scipy.signal import butter, sosfiltfilt
 
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
@@ -82,8 +82,8 @@ def _wishes(points: Array, lap: float) -> Wishes:
 
 def _curvature(trace: Trace, lap: float) -> tuple[Array, Array]:
     """Curvature [1/m] and speed [m/s] without the first lap and the ends, of the filtered drawing."""
-    b, a = butter(2, 2.0 * PERIOD * _CUTOFF)
-    p = filtfilt(b, a, trace.p[:, :2], axis=0)
+    sections = butter(2, 2.0 * PERIOD * _CUTOFF, output="sos")
+    p = np.asarray(sosfiltfilt(sections, trace.p[:, :2], axis=0))
     v = np.gradient(p, PERIOD, axis=0)
     acceleration = np.gradient(v, PERIOD, axis=0)
     speed = np.linalg.norm(v, axis=1)
