@@ -109,7 +109,7 @@ def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> Non
 
 
 def test_the_diagram_of_the_documents_is_the_table() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "hardware-safety.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "hardware-safety.md").read_text(encoding="utf-8")
     shown = {line.strip() for line in page.split("```mermaid")[1].split("```")[0].splitlines() if "-->" in line}
     assert shown == {line.strip() for line in mermaid().splitlines() if "-->" in line}
     assert len(shown) == len(TRANSITIONS) + 1

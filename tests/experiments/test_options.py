@@ -27,6 +27,7 @@ from experiments.config.run_config import ArmConfig, Clock, Figure, Phantom, Run
 from experiments.config.words import ADDED, VOCABULARY, RunOptions, changed, config_of_options, run_config, words_of
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
+from sim.users.person import Person
 
 PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Clock, RunConfig, ArmConfig)
 NEEDED: dict[type, dict[str, object]] = {MapFile: {"file": "map.npz"}}
@@ -94,7 +95,7 @@ def test_all_that_a_run_is_made_of_is_looked_at() -> None:
                 inner.extend(get_args(one))
                 if isinstance(one, type) and is_dataclass(one) and one not in found:
                     waiting.append(one)
-    assert found == {*PARTS, Push, Turn, Grab}
+    assert found == {*PARTS, Push, Turn, Grab, Person}
 
 
 @pytest.mark.parametrize(("cls", "name"), NUMBERS, ids=lambda value: getattr(value, "__name__", value))

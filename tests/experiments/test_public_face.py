@@ -9,7 +9,7 @@ import pytest
 
 import hvf
 from experiments.cli import main
-from experiments.sweep import _with
+from experiments.sweep import with_values
 
 CURVE = hvf.circle(lap=2.0)
 
@@ -42,7 +42,7 @@ def test_importing_the_face_starts_no_viewer_and_no_plots() -> None:
 
 def test_a_number_of_one_law_of_a_composed_field_is_set_and_the_composition_stays() -> None:
     sim = simulation((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0))
-    other = _with(sim, {"field.k_r": 100.0, "seed": 3, "clock.physics_step": 5e-4})
+    other = with_values(sim, {"field.k_r": 100.0, "seed": 3, "clock.physics_step": 5e-4})
     assert (other.seed, other.clock.physics_step) == (3, 5e-4)
     hand = hvf.HandState.at([0.04, 0.0, -0.01])
     by_hand = (hvf.Follow(CURVE, k_r=100, b_d=8) + level).limited(8.0)
@@ -60,7 +60,7 @@ def test_a_number_of_one_law_of_a_composed_field_is_set_and_the_composition_stay
 )
 def test_a_number_that_is_not_there_is_named(path: str, said: str) -> None:
     with pytest.raises(hvf.ParameterError, match="^" + path) as error:
-        _with(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + level), {path: 1.0})
+        with_values(simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + level), {path: 1.0})
     assert said in str(error.value)
 
 

@@ -102,7 +102,7 @@ def test_recordings_are_kept_where_they_are_asked_for(tmp_path: Path) -> None:
     row = perform(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
     with Recording(tmp_path / "kept" / f"{trial.key}.h5") as recording:
         assert recording.complete
-        assert len(recording.channel("ticks", "t")) == 496  # whole updates of the figure
+        assert len(recording.channel("ticks", "t")) == 500
     assert row.measures == perform(Task(trial.key, to_json(trial.config))).measures
 
 
