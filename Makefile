@@ -22,7 +22,7 @@ test: $(READY)
 test-all: $(READY)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not commands'
 
-# Every hvf command of README and docs, run in a fresh folder from top to bottom (a quarter of an hour).
+# Every hvf command of README and docs, run in a fresh folder from top to bottom (half an hour).
 test-commands: $(READY)
 	$(BIN)/python -m pytest -m commands
 
