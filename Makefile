@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all test-commands lint format docs bench gate fuzz hil-vm clean
+.PHONY: setup demo test test-all test-commands test-processes lint format docs bench gate fuzz hil-vm clean
 
 setup: $(READY)
 
@@ -25,6 +25,10 @@ test-all: $(READY)
 # Every hvf command of README and docs, run in a fresh folder from top to bottom (half an hour).
 test-commands: $(READY)
 	$(BIN)/python -m pytest -m commands
+
+# Processes against the clock, browsers, device nodes (Debian: chromium, umockdev, python3-gi, gir1.2-umockdev-1.0).
+test-processes: $(READY)
+	$(BIN)/python -m pytest -m processes
 
 lint: $(READY)
 	$(BIN)/ruff check .

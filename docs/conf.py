@@ -21,7 +21,10 @@ myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 default_role = "py:obj"
-suppress_warnings = ["ref.python"]  # `River` in a docstring may be one of three
+suppress_warnings = [
+    "ref.python",  # `River` in a docstring may be one of three
+    "misc.highlighting_failure",  # a diagram in mermaid stands as its text
+]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

@@ -26,11 +26,11 @@ def inside(*arguments: str, seconds: float = 240.0) -> str:
     return told.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_the_contract_of_a_device_holds_for_hid_and_spacemouse_through_their_nodes() -> None:
     assert "18 passed" in inside("tests/contract/test_device_contract.py", "-k", "node")
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_the_driver_the_list_and_the_doctor_see_a_real_node() -> None:
     assert "13 passed" in inside("tests/devices/inside_umockdev.py")

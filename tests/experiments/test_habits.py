@@ -43,11 +43,18 @@ def test_what_took_long_is_kept_and_a_broken_file_is_no_hindrance(tmp_path: Path
     assert "waiting" in file.read_text()
 
 
+def _hear() -> None:
+    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.slow
 def test_ctrl_c_leaves_a_valid_recording_and_says_how_to_go_on(tmp_path: Path) -> None:
     out = tmp_path / "run"
     command = [sys.executable, "-m", "experiments.cli", "run", "--figure", "none", "--seconds", "2000", "--out"]
-    process = subprocess.Popen([*command, str(out)], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        [*command, str(out)], stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear
+    )
     deadline = time.monotonic() + 120.0
     while not (out / "run.h5").exists() and time.monotonic() < deadline:
         time.sleep(0.1)

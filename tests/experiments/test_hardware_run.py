@@ -115,7 +115,7 @@ def test_the_diagram_of_the_documents_is_the_table() -> None:
     assert len(shown) == len(TRANSITIONS) + 1
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",

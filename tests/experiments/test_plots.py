@@ -42,7 +42,7 @@ def test_the_numbers_are_the_recording_s_and_a_jolt_of_one_tick_is_among_them(tm
     assert "from </script>" not in made
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_in_a_browser_the_wheel_zooms_and_the_line_is_where_the_replay_is(tmp_path: Path) -> None:
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = Path("/usr/bin/chromium")

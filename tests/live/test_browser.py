@@ -12,7 +12,7 @@ from experiments.live.gate import Gate
 from models.mocap.library import load
 from tests.live.browser import ARGUMENTS, CHROMIUM, PATIENCE, Served, needs_chromium, on_screen
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.processes
 
 WIDTH, HEIGHT = 900, 520
 TOKEN = "0123456789abcdef"

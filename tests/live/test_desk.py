@@ -15,7 +15,7 @@ from sim.errors import SimError
 
 PATIENCE = 300.0  # [s] for what takes a second or two on a machine that does nothing else
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.processes
 
 
 class Said(Desk):

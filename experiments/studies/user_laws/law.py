@@ -37,7 +37,7 @@ class Law:
     @property
     def holds(self) -> bool:
         """Whether the value lies within the published interval."""
-        return math.isfinite(self.value) and self.least <= self.value <= self.most
+        return bool(math.isfinite(self.value) and self.least <= self.value <= self.most)
 
 
 @dataclass(frozen=True)

@@ -198,12 +198,17 @@ def test_a_film_that_is_stopped_leaves_no_half_film_and_the_old_one(tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
 
 
+def _hear() -> None:
+    """A command that is begun in the background of a shell would not hear Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.slow
 def test_ctrl_c_on_the_command_leaves_nothing(tmp_path: Path, backend: str) -> None:
     pytest.importorskip("imageio_ffmpeg")
     run, film = write_run(tmp_path / "run", Told()), tmp_path / "films" / "film.mp4"
     command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear)
     deadline = time.monotonic() + 60.0
     while not list(film.parent.glob(".*.mp4")) and time.monotonic() < deadline:
         time.sleep(0.1)

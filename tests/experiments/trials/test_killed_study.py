@@ -13,7 +13,7 @@ pytest.importorskip("distributed")
 pytest.importorskip("statsmodels")
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_a_study_whose_driver_and_workers_are_killed_ends_as_the_undisturbed_one_on_one_thread(tmp_path: Path) -> None:
     study = written(tmp_path, repetitions=8)
     killed = killed_at_random(study, tmp_path / "killed", kills=3, seed=int(time.time()))
@@ -24,7 +24,7 @@ def test_a_study_whose_driver_and_workers_are_killed_ends_as_the_undisturbed_one
     assert tables[0].count(b"\n") == 1 + 4 * 4 * 8
 
 
-@pytest.mark.slow
+@pytest.mark.processes
 def test_a_lost_scheduler_is_one_line_and_the_study_goes_on_without_it(tmp_path: Path) -> None:
     study = written(tmp_path, repetitions=30)
     with socket.socket() as free:

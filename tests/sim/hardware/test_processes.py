@@ -27,7 +27,7 @@ from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
 from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.processes
 CLOCK = ServoClock(late=0.2, heartbeat=0.6)
 
 
