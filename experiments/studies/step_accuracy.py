@@ -34,7 +34,7 @@ MODES = {
     "lead": RunConfig(mode=Lead(), map=Led(), user=User(does="lead")),
 }
 HEAD = (
-    "| mode | step ms | stylus apart µm RMS | force apart N RMS | figures apart ° RMS | figure off its reference ° "
+    "| mode | step ms | stylus apart µm RMS | force apart % | figures apart ° RMS | figure off its reference ° "
     "| root off at most cm |\n|---|---|---|---|---|---|---|"
 )
 
@@ -77,10 +77,10 @@ def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     (joints, root), (finer_joints, finer_root) = (pose_errors(c.poses, c.reference) for c in (coarse, fine))
     turns = pose_difference(coarse.poses, fine.poses)[:, 6:]
     return (
-        f"| {name} | {1e3 * step:g} | {1e6 * _rms(coarse.p - fine.p):.1f} | {_rms(coarse.force - fine.force):.3f} of "
-        f"{_rms(fine.force):.3f} | {np.rad2deg(_rms(turns) / np.sqrt(turns.shape[1] / 3)):.2f} | "
+        f"| {name} | {1e3 * step:g} | {1e6 * _rms(coarse.p - fine.p):.1f} | "
+        f"{100.0 * _rms(coarse.force - fine.force) / _rms(fine.force):.0f} | {np.rad2deg(_rms(turns) / np.sqrt(turns.shape[1] / 3)):.2f} | "
         f"{np.rad2deg(_rms(joints[:, None])):.2f}, {np.rad2deg(_rms(finer_joints[:, None])):.2f} | "
-        f"{100 * root.max():.1f}, {100 * finer_root.max():.1f} |"
+        f"{100 * root.max():.0f}, {100 * finer_root.max():.0f} |"
     )
 
 
