@@ -76,10 +76,11 @@ def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     """A line of the table."""
     (joints, root), (finer_joints, finer_root) = (pose_errors(c.poses, c.reference) for c in (coarse, fine))
     turns = pose_difference(coarse.poses, fine.poses)[:, 6:]
+    apart, force = 1e6 * _rms(coarse.p - fine.p), 100.0 * _rms(coarse.force - fine.force) / _rms(fine.force)
+    figures = np.rad2deg(_rms(turns) / np.sqrt(turns.shape[1] / 3))
+    off = [f"{np.rad2deg(_rms(one[:, None])):.2f}" for one in (joints, finer_joints)]
     return (
-        f"| {name} | {1e3 * step:g} | {1e6 * _rms(coarse.p - fine.p):.1f} | "
-        f"{100.0 * _rms(coarse.force - fine.force) / _rms(fine.force):.0f} | {np.rad2deg(_rms(turns) / np.sqrt(turns.shape[1] / 3)):.2f} | "
-        f"{np.rad2deg(_rms(joints[:, None])):.2f}, {np.rad2deg(_rms(finer_joints[:, None])):.2f} | "
+        f"| {name} | {1e3 * step:g} | {apart:.1f} | {force:.0f} | {figures:.2f} | {off[0]}, {off[1]} | "
         f"{100 * root.max():.0f}, {100 * finer_root.max():.0f} |"
     )
 
