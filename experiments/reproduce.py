@@ -15,7 +15,7 @@ from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from sim.errors import SimError
-from sim.loop.loop import Loop, frame_channels, tick_channels
+from sim.loop.loop import Loop, groups, shown_channels, tick_channels
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recording import Recording
 
@@ -24,7 +24,8 @@ class _Comparison:
     """Compares the blocks of a run with a recording as they come; keeps the first difference of each group."""
 
     def __init__(self, recording: Recording, session: Session):
-        self._recording, self._root = recording, session.figure_root
+        self._recording, self._root = recording, session.world.pose_at
+        self._shown = groups(session.servo)["frames"].channels
         self._every = session.servo.figure_ticks
         self._rows = {"ticks": 0, "frames": 0}
         self.differences: dict[str, str] = {}
@@ -32,7 +33,7 @@ class _Comparison:
     def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
         m = -(-n // self._every)
         self._compare("ticks", tick_channels(ticks, n), n)
-        self._compare("frames", frame_channels(frames, m, self._root), m)
+        self._compare("frames", shown_channels(frames, m, self._shown, self._root), m)
 
     def _compare(self, group: str, blocks: Mapping[str, Array], n: int) -> None:
         first = self._rows[group]

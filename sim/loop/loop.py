@@ -1,7 +1,7 @@
 """A run: the servo's compiled blocks one after the other, streamed to a recorder, in memory that does not grow."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -247,11 +247,7 @@ def record_into(recorder: Recorder, servo: Servo, world: World) -> Observer:
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         recorder.append("ticks", tick_channels(ticks, n))
-        m = -(-n // servo.figure_ticks)
-        channels = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
-        if "joint_error" in names:
-            channels = frame_channels(frames, m, world.pose_at)
-        recorder.append("frames", {name: channels[name] for name in names})
+        recorder.append("frames", shown_channels(frames, -(-n // servo.figure_ticks), names, world.pose_at))
 
     return observe
 
@@ -269,6 +265,14 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
         "ctrl": ticks.ctrl[:n], "applied": ticks.applied[:n], "residual": ticks.residual[:n],
         "fault": ticks.fault[:n, 0], "fault_value": ticks.fault[:n, 1], "gaps": ticks.fault[:n, 2],
     }  # fmt: skip
+
+
+def shown_channels(frames: FrameLog, m: int, names: Collection[str], root: int) -> dict[str, Array]:
+    """Those of the first m figure updates' channels that are recorded: all only of a figure in the physics."""
+    channels = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
+    if "joint_error" in names:
+        channels = frame_channels(frames, m, root)
+    return {name: channels[name] for name in names}
 
 
 def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:

@@ -319,3 +319,8 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
     text = f'{{"mode": {{"kind": "{mode}"}}, "map": {{"kind": "{map}"}}, "user": {{"does": "{does}"}}}}'
     with pytest.raises(ParameterError, match="a hand leads in the mode lead only"):
         from_json(RunConfig, text, "f.json")
+
+
+def test_a_figure_that_is_not_there_is_not_led() -> None:
+    with pytest.raises(ParameterError, match="^the mode lead with the figure none: nobody to lead"):
+        run_config(mode="lead", figure="none")

@@ -86,6 +86,13 @@ def test_a_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys:
     assert "changed: clips;" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("figure", ["kinematic", "none"])
+def test_a_run_without_a_figure_in_the_physics_is_reproduced(figure: str, tmp_path: Path) -> None:
+    out = str(tmp_path / "run")
+    assert main(["run", "--figure", figure, "--seconds", "1", "--out", out]) == 0
+    assert main(["reproduce", out]) == 0
+
+
 def test_a_run_is_reproduced_bit_for_bit_from_its_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reproduce", str(folder)]) == 0
     assert "bit for bit, over 9000 ticks" in capsys.readouterr().out

@@ -71,23 +71,23 @@ def test_disarming_lets_go_in_its_tick() -> None:
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_reading_that_is_no_number(place: int, bad: float) -> None:
-    _lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
+    assert_lets_go("spoil", nan_in(place, bad), Fault.READING_NOT_FINITE)
 
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_joint_that_jumps(axis: int) -> None:
-    _lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
+    assert_lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
 
 
 @pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
 @pytest.mark.parametrize("where", ["read_fault", "write_fault"])
 def test_a_fault_that_the_driver_tells(fault: Fault, value: float, where: str) -> None:
-    _lets_go(where, (fault, value), fault)
+    assert_lets_go(where, (fault, value), fault)
 
 
 @pytest.mark.parametrize("stalled", [5, 50, 500])
 def test_a_device_that_stalls_for_five_periods_or_more(stalled: int) -> None:
-    _lets_go("silent", stalled, Fault.READING_STALE, within=8)
+    assert_lets_go("silent", stalled, Fault.READING_STALE, within=8)
 
 
 @pytest.mark.parametrize("stalled", [1, 3, 4])
@@ -112,7 +112,7 @@ def test_a_memory_or_a_field_that_is_no_number(part: str, bad: float) -> None:
     _check(ticker, first, faults[part])
 
 
-def _lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
+def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
     """Order a fault of the driver: the motors go off within so many ticks, and the fault stays until it is cleared."""
     driver = gated_servo(**AT_ONCE).driver
     assert isinstance(driver, EmulatedPhantom)
