@@ -322,5 +322,5 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
 
 
 def test_a_figure_that_is_not_there_is_not_led() -> None:
-    with pytest.raises(ParameterError, match="^the mode lead with the figure none: nobody to lead"):
+    with pytest.raises(ParameterError, match=r"^the mode lead with the figure none: nobody to lead"):
         run_config(mode="lead", figure="none")
