@@ -116,6 +116,8 @@ class Track:
     """Names of embedded clips, or files; all embedded clips by default."""
     seconds: Annotated[float, above(0.0, unit="s")] = 10.0
     """Simulated time for each [s]."""
+    raw: bool = False
+    """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     json: bool = False
     """Print the reports as JSON."""
 
@@ -123,7 +125,7 @@ class Track:
         """Track."""
         from experiments.track import track_clips
 
-        track_clips(self.clips, self.seconds, self.json)
+        track_clips(self.clips, self.seconds, self.raw, self.json)
         return 0
 
 
@@ -202,7 +204,7 @@ class Certify:
         if self.clip is not None:
             from experiments.setups.clips import load_clips
 
-            inputs = clip_inputs(load_clips([self.clip])[0][0], self._judging())
+            inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
         else:
             config, clips = self._what()
             inputs = certificate_inputs(config, self.delay, self._hands(), self.hand_push, clips, self._judging())
@@ -266,6 +268,8 @@ class Lift:
     """Clips that have to close; by default all those are closed curves that do."""
     seed: Annotated[int, whole(0)] = 1
     """Of the places from which the arrangement begins."""
+    raw: bool = False
+    """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     overwrite: bool = False
     """Replace the file if it exists."""
     json: bool = False
@@ -276,7 +280,7 @@ class Lift:
         from experiments.lifting.lift import lift_into
 
         with working("lifting", len(self.clips)):
-            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
+            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite, self.raw)
         print(json_text(report.to_json()) if self.json else "\n".join(report.lines()))
         return 0
 

@@ -13,7 +13,7 @@ from sim.body.tracking import TrackingReport, track
 from sim.compilation.units import Unit
 
 
-def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
+def track_clips(names: tuple[str, ...], seconds: float, raw: bool, as_json: bool) -> None:
     """Track clips and print a report of each.
 
     Parameters
@@ -22,6 +22,8 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
         Embedded clips or files; all embedded clips if there is none.
     seconds : float
         Simulated time for each [s].
+    raw : bool
+        Take motion files as captured, not prepared.
     as_json : bool
         Print one JSON object, clip by clip, instead of a line each.
 
@@ -32,7 +34,7 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
     """
     console = Console(stderr=True)
     names = names or embedded_names()
-    clips, remarks = load_clips(names)
+    clips, remarks = load_clips(names, raw)
     for remark in remarks:
         console.print(remark, highlight=False)
 

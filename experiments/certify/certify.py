@@ -133,7 +133,7 @@ def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certi
     ModelError
         If there is no such clip, or the file cannot be read.
     """
-    (clip,), remarks = load_clips([name])
+    (clip,), remarks = load_clips([name], raw=True)
     held = _held(out, clip_inputs(clip, judging))
     if held is not None:
         return held

@@ -34,7 +34,7 @@ from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
 from models.humanoid.skeleton import BODIES
 from models.mocap.clip import Clip
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -193,5 +193,6 @@ def _cylinder(
 
     # Where the clips blend is not among what they depend on.
     made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
-    corrections = kept_array(CACHE_FOLDER, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    folder = kept_folder(CylindricalMap.__module__)
+    corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
     return CylindricalMap(clips, radii, heights, legs, corrections)
