@@ -189,7 +189,8 @@ def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledRef
 
 
 def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
+    period = parts.config.clock.servo_period * parts.config.figure.figure_ticks
+    figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains, period)
     return figure.state, _reference(parts, world, compiled)
 
 

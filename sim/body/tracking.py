@@ -15,7 +15,9 @@ from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model
 from models.mocap.clip import Clip, pose_difference
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
+from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
+from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, REPORT_SIZE
 from sim.compilation.compiled import entry_point
 from sim.compilation.native import mj_step
 from sim.compilation.units import Unit
@@ -71,9 +73,7 @@ class TrackedMotion(NamedTuple):
     poses : Array
         What the figure did, shape (n, 75).
     reports : Array
-        Support, saturated motors, residual wrench (see `FigureState.report`), shape (n, 8).
-    flying : Array
-        1 while all contact points of the reference are above the height of flight, shape (n,).
+        See `sim.body.figure_state.REPORT_SUPPORT` and what follows it, shape (n, 10).
     contacts : Array
         Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
     ground : Array
@@ -87,7 +87,6 @@ class TrackedMotion(NamedTuple):
     reference: ClipMotion
     poses: Array
     reports: Array
-    flying: Array
     contacts: Array
     ground: Array
     weight: float
@@ -151,17 +150,14 @@ class TrackingReport:
 @entry_point
 def _simulate(
     drive: int, s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
-    poses: Array, reports: Array, flying: Array, contacts: Array, ground: Array, contact_force: Array,
+    poses: Array, reports: Array, contacts: Array, ground: Array, contact_force: Array,
 ) -> None:  # fmt: skip
     for k in range(q.shape[0]):
         poses[k] = s.qpos
         call_as_given(drive, (s, q[k], v[k], a[k]))
-        lowest = np.inf
         for c in range(s.points.shape[0]):
-            lowest = min(lowest, s.twin_contact_pos[s.twin_contact[c], 2] - s.radius)
             contacts[k, c] = s.contact_pos[s.contact[c]]
             contacts[k, c, 2] -= s.radius
-        flying[k] = 1.0 if lowest > s.gains.flight_height else 0.0
         reports[k] = s.report
         for _ in range(control_steps):
             mj_step(s.model, s.data)
@@ -193,26 +189,25 @@ def tracked_motion(
     if not 0.0 < seconds <= 3600.0:
         raise SimError(f"{seconds} s of tracking; expected more than 0 and at most an hour")
     model = floor_world(config)
-    data = mujoco.MjData(model)
-    figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains)
-    period = config.physics_step * config.control_steps
+    data, period = mujoco.MjData(model), config.physics_step * config.control_steps
+    figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains, period)
     n = max(1, round(seconds / period))
     reference = clip_motion(clip, period * np.arange(n, dtype=np.float64))
     data.qpos[:], data.qvel[:] = reference.poses[0], reference.velocities[0]
     mujoco.mj_forward(model, data)
-    poses, reports, flying = np.empty((n, model.nq)), np.empty((n, 8)), np.empty(n)
+    poses, reports = np.empty((n, model.nq)), np.empty((n, REPORT_SIZE))
     contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
     # Rows of what is not contiguous are of another type, and nothing checks that.
     motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
     numbers: tuple[Any, ...] = (
-        figure.state, config.control_steps, *motion, poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
+        figure.state, config.control_steps, *motion, poses, reports, contacts, ground, data.qfrc_constraint[:3],
     )  # fmt: skip
     drive = drive_unit(figure.state)
     ready((drive, Unit.of(_simulate, types.int64, *(typeof(number) for number in numbers))))
     _simulate(drive.address(), *numbers)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
-        reference, poses, reports, flying, contacts, ground, figure.state.weight, config.stature, warnings
+        reference, poses, reports, contacts, ground, figure.state.weight, config.stature, warnings
     )
 
 
