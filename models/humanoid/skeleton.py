@@ -208,6 +208,16 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
     return spec
 
 
+def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> float:
+    """Height of the centre of mass of the figure in its rest pose over the floor [m]."""
+    model = figure_model(stature, mass)
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest_pose(stature)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return float(data.subtree_com[0, 2])
+
+
 def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
     """Stop a ball joint at the largest angle that its limits admit, where that is less than half a turn.
 

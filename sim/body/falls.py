@@ -145,7 +145,7 @@ def fall_state(
     model: mujoco.MjModel, data: mujoco.MjData, twin: mujoco.MjModel, twin_data: mujoco.MjData, prefix: str,
     period: float, stature: float,
 ) -> FallState:  # fmt: skip
-    """The state of a figure that stands; arguments as of `sim.body.figure.Figure`, whose geoms are those of its twin."""
+    """The state of a figure that stands; arguments as of `sim.body.figure.Figure`, whose geoms the twin has too."""
     own = [
         geom
         for geom in range(twin.ngeom)
