@@ -203,12 +203,13 @@ class AnimationMeasure:
 
     def __init__(self, recording: Recording, since: float = 0.0) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
-        self._stride = max(1, round(recording.rates["frames"] / SOLES_RATE))
+        self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
         self._pushed, self._unpushed = 0.0, 0.0
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
         """Take a block of frames, their poses at the curve, and at which the hand pushes."""
-        self._soles.add(frames["reference"][:: self._stride])
+        self._soles.add(frames["reference"][self._next :: self._stride])
+        self._next = (self._next - len(default)) % self._stride
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING
