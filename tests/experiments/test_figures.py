@@ -28,7 +28,7 @@ from sim.recording.recording import Recording
 ANGLE = np.linspace(0, 2 * np.pi, 61)
 CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
 TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torque": (3,), "river": ()}
-FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": ()}
+FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "down": ()}
 
 
 def record(path, n=2000, pushing=True, texts=None, summary=None):
@@ -69,6 +69,7 @@ def record(path, n=2000, pushing=True, texts=None, summary=None):
                 "residual": standing * np.array([42.0, 0.0, 56.0, 9.0, 9.0, 9.0]),
                 "ground": standing * np.array([0.0, 0.0, 700.0]),
                 "flight": flight,
+                "down": ((rows >= 1.495) & (rows < 1.695)).astype(float),
             },
         )
         recorder.close(summary or {})
