@@ -71,7 +71,7 @@ class RunSummary:
             *self._of_the_hand(),
             *([went] if (went := self.path.line()) else []),
             *([] if self.animation is None else [self.animation.soles()]),
-            *([] if figure is None else [figure.line()]),
+            *([] if figure is None else figure.lines()),
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
             f"MuJoCo's warnings: {warned}.",
         ]

@@ -204,18 +204,17 @@ class FigureSummary:
             f"{self.seconds:.1f} s in which it was up."
         )
 
-    def line(self) -> str:
-        """How it followed, in a few sentences."""
-        lost = self.without_ground_force
-        return (
+    def lines(self) -> list[str]:
+        """How it followed, a sentence or two."""
+        stance, lost = self.stance, self.without_ground_force
+        airborne = f"In {lost.seconds:.2f} s without ground force the residual is {lost.brief()}."
+        return [
             f"The physical figure followed within {self.joint_error_rms_deg:.2f}° RMS at the joints and "
             f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
-            f"of body weight RMS in stance and {100 * self.stance.force_max:.0f} % at most, moment "
-            f"{100 * self.stance.moment_rms:.1f} % of weight × height of the centre of mass and "
-            f"{100 * self.stance.moment_max:.0f} % ({self.stance.verdict()}); feet on the ground "
-            f"{100 * self.grounded:.0f} % of stance."
-            + (f" In {lost.seconds:.2f} s without ground force: {lost.line()}." if lost.seconds > 0.0 else "")
-        )
+            f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance.",
+            f"Residual in stance, RMS and peak: {stance.brief()} ({stance.verdict()})."
+            + (f" {airborne}" if lost.seconds > 0.0 else ""),
+        ]
 
 
 @dataclass(frozen=True)

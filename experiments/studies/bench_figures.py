@@ -39,9 +39,8 @@ class Figure:
     def line(self) -> str:
         """As ``pass  a tick of follow: 1.42 mj_steps (≤ 1.5)``."""
         said = {True: "pass", False: "FAIL", None: "    "}[self.passes]
-        bounds = [f"≤ {self.at_most:g}"] * (self.at_most is not None) + [f"≥ {self.at_least:g}"] * (
-            self.at_least is not None
-        )
+        limits = (("≤", self.at_most), ("≥", self.at_least))
+        bounds = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None]
         told = f" ({', '.join(bounds)})" if bounds else ""
         return f"{said}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{told}"
 

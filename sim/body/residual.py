@@ -34,11 +34,11 @@ class Residual:
     moment_rms: float
     moment_max: float
 
-    def line(self) -> str:
-        """The figures, in percent."""
+    def brief(self) -> str:
+        """The figures in percent, RMS and peak."""
         return (
-            f"force {100 * self.force_rms:.1f} % RMS and {100 * self.force_max:.0f} % at most, "
-            f"moment {100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} %"
+            f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.0f} % of weight, moment "
+            f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} % of weight × height of the centre of mass"
         )
 
     def missed(self) -> tuple[str, ...]:

@@ -148,14 +148,13 @@ class TrackingReport:
     def __str__(self) -> str:
         """One line for people."""
         fell = ", ".join(f"{at:.1f}" for at in self.falls)
+        stance, lost = self.stance, self.without_ground_force
         return (
             (f"fell at {fell} s; of {self.up_seconds:.1f} of {self.seconds:.1f} s: " if self.falls else "")
             + f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
-            f"(largest {100 * self.root_error_max:.1f}), residual {100 * self.residual_force:.1f} % of body weight RMS "
-            f"in stance (largest {100 * self.residual_force_max:.0f} %), moment {100 * self.stance.moment_rms:.1f} % "
-            f"(largest {100 * self.stance.moment_max:.0f} %; {self.stance.verdict()}), {self.flight_seconds:.2f} s of "
-            f"flight, feet on the ground {100 * self.grounded:.0f} % of stance; without ground force "
-            f"{self.without_ground_force.seconds:.2f} s, residual there {self.without_ground_force.line()}"
+            f"(largest {100 * self.root_error_max:.1f}), {self.flight_seconds:.2f} s of flight, feet on the ground "
+            f"{100 * self.grounded:.0f} % of stance; residual in stance, RMS and peak: {stance.brief()} "
+            f"({stance.verdict()}); without ground force, {lost.seconds:.2f} s: {lost.brief()}"
         )
 
 

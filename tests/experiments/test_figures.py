@@ -226,7 +226,10 @@ def test_torques_stand_against_the_limits_of_their_motor(recording, tmp_path):
 def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(recording):
     axes = tracking_figure(recording).axes
     assert [ax.lines[0].get_ydata()[0] for ax in axes] == pytest.approx([1.0, 2.0, 10.0, 100.0])
-    assert all(spans(ax) == [(pytest.approx(1.0), pytest.approx(1.19))] for ax in axes)
+    flight, fallen = (1.0, 1.19), (1.5, 1.69)
+    assert all(spans(ax) == [pytest.approx(flight), pytest.approx(fallen)] for ax in axes)
+    t, shown = axes[0].lines[0].get_data()
+    assert np.all(np.isnan(shown) == ((t > 1.495) & (t < 1.695)))
     assert axes[2].lines[0].get_ydata()[110] == 0.0
 
 

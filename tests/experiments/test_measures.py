@@ -105,7 +105,7 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
-    assert len(summary.lines()) == 8
+    assert len(summary.lines()) == 9
     assert summary.path.pace == pytest.approx(1.2 / 1.5)
     assert summary.path.stopped_at is None
     assert "held the field back at 100 ticks" in summary.lines()[0]
