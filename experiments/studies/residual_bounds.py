@@ -16,7 +16,7 @@ from models.mocap.library import embedded_names
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, track
 
-BOUNDS = ((1.0, 0.2), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01), (0.02, 0.004), (0.0, 0.0))
+BOUNDS = ((1.0, 0.2), (0.5, 0.1), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01))
 """Force as a share of body weight, moment as one of body weight × stature."""
 
 SECONDS, NUDGES = 8.0, (0.0, 1e-6, -1e-6)

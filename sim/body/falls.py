@@ -2,9 +2,11 @@ r"""A figure that falls lies where it fell for a second, and is then set back on
 
 It has fallen when trunk, head or legs meet the floor where the reference has them well above it, or when it touches
 the floor half a metre from the reference. From then on its motors are off: it is caught by its body. When it has lain
-for `LIES`, what it follows for `RISES` goes from the pose q₀ in which it lay to the reference q_r on the shortest way,
+for `LIES`, what it follows for `RISES` goes over from the pose (p₀, R₀) in which it lay to the reference (p, R): its
+root goes from one place to the other, and each rotation is the reference's, from which it still differs less and less,
 
-.. math:: q(u) = q_0 \oplus S(u)\,(q_r \ominus q_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad 0 \le u \le 1 ,
+.. math:: p(u) = p_0 + S(u)\,(p - p_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad
+          R(u) = R\,\exp((1 - S(u))\,\log(R^T R_0)|_{u=0}) , \qquad 0 \le u \le 1 ,
 
 with the smooth step S and the height h by which its feet clear the floor meanwhile. What carries it then is a wrench
 at the root without bounds, recorded as the residual, and no measure of the figure is taken of it.
@@ -52,8 +54,10 @@ class FallState(NamedTuple):
         Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the figure alone.
     state : Array
         `UP`, `DOWN` or `SET_BACK`; how long it has lain or been set back [s]; number of falls; shape (3,).
-    lying, target, before, way, velocity, still : Array
-        q₀, the pose that is followed and the one a period ago (75); q_r ⊖ q₀, velocity, and no acceleration (57).
+    lying, way : Array
+        p₀ (3,), and the pose in which it lay less the reference's then, in tangent coordinates (57).
+    target, before, velocity, still : Array
+        The pose that is followed and the one a period ago (75), its velocity, and no acceleration (57).
     """
 
     period: float
@@ -68,9 +72,9 @@ class FallState(NamedTuple):
     twin_mat: Array
     state: Array
     lying: Array
+    way: Array
     target: Array
     before: Array
-    way: Array
     velocity: Array
     still: Array
 
@@ -86,11 +90,13 @@ def _lowest(kind: int, size: Array, pos: Array, mat: Array) -> float:
 
 
 @njit
-def update_fall(fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
+def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
     """Whether the figure is up, lies or is being set back in this period.
 
     Parameters
     ----------
+    model : int
+        Address of the figure alone.
     fall : FallState
         Updated; the figure alone is in the reference pose.
     pose, q_r : Array
@@ -121,8 +127,9 @@ def update_fall(fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
         state[_SINCE] += fall.period
     if state[_SINCE] > LIES:
         state[_MODE], state[_SINCE] = SET_BACK, 0.0
-        fall.lying[:] = pose
+        fall.lying[:] = pose[:3]
         fall.before[:] = pose
+        mj_differentiate_pos(model, fall.way.ctypes, 1.0, q_r.ctypes, pose.ctypes)
     return state[_MODE]
 
 
@@ -133,9 +140,11 @@ def follow_back(model: int, fall: FallState, q_r: Array) -> None:
     `model` is the address of the figure alone.
     """
     u = fall.state[_SINCE] / RISES
-    mj_differentiate_pos(model, fall.way.ctypes, 1.0, fall.lying.ctypes, q_r.ctypes)
-    fall.target[:] = fall.lying
-    mj_integrate_pos(model, fall.target.ctypes, fall.way.ctypes, smooth_step(u))
+    share = smooth_step(u)
+    fall.target[:] = q_r
+    mj_integrate_pos(model, fall.target.ctypes, fall.way.ctypes, 1.0 - share)
+    for i in range(3):
+        fall.target[i] = fall.lying[i] + share * (q_r[i] - fall.lying[i])
     fall.target[2] += 16.0 * (u * (1.0 - u)) ** 2 * fall.clearance
     mj_differentiate_pos(model, fall.velocity.ctypes, fall.period, fall.before.ctypes, fall.target.ctypes)
     fall.before[:] = fall.target
@@ -159,6 +168,6 @@ def fall_state(
         period=period, clearance=_CLEARANCE * stature / DEFAULT_STATURE, geoms=geoms + first, twin_geoms=geoms,
         kinds=twin.geom_type[geoms].astype(np.int64), sizes=twin.geom_size[geoms].copy(), pos=data.geom_xpos,
         mat=data.geom_xmat, twin_pos=twin_data.geom_xpos, twin_mat=twin_data.geom_xmat, state=np.zeros(3),
-        lying=np.zeros(N_POSE), target=np.zeros(N_POSE), before=np.zeros(N_POSE), way=np.zeros(N_TANGENT),
+        lying=np.zeros(3), way=np.zeros(N_TANGENT), target=np.zeros(N_POSE), before=np.zeros(N_POSE),
         velocity=np.zeros(N_TANGENT), still=np.zeros(N_TANGENT),
     )  # fmt: skip

@@ -21,6 +21,7 @@ from sim.compilation.native import mj_full_m, mj_integrate_pos, mj_kinematics
 _LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a residual force
 _FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
 _PLANS = 4  # plans at most in a tick, each with the joints that saturated in the one before giving way
+_SET_BACK_SPEED = 20.0  # [m/s], [rad/s] at most, of what a figure follows that is set back
 _N_FOOT = 4  # contact points of a foot
 
 
@@ -38,7 +39,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
-    mode = update_fall(s.fall, s.qpos, q_r, s.points[:, 2].min())
+    mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
     s.report[REPORT_DOWN] = mode
     if mode == UP:
         _stand(s, support)
@@ -57,10 +58,14 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
 def _set_back(s: FigureState, q_r: Array) -> None:
     """Torques and a wrench at the root, without bounds, that carry a figure from where it lay to the reference."""
     follow_back(s.twin_model, s.fall, q_r)
+    for k in range(0, s.fall.velocity.shape[0], 3):
+        shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # where the reference jumps
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
     mj_full_m(s.model, s.data, s.world_M.ctypes)
-    s.given[:] = 0.0
-    _plan_torques(s)
+    s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
+    for plan in range(_PLANS):
+        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
+            break
     for i in range(6):
         s.wrench[i] = s.bias[i] - s.passive[i]
         for k in range(s.acceleration.shape[0]):
