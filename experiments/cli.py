@@ -335,15 +335,19 @@ class Reproduce:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure speed, as ratios within one run."""
+    """Measure speed, as ratios within one run, each with what it has to keep to."""
+
+    json: bool = False
+    """Print the figures as JSON."""
+    check: bool = False
+    """Exit with 1 if a figure fails."""
 
     def __call__(self) -> int:
         """Measure."""
         from experiments.studies.benchmarks import bench
 
         with working("measuring speed"):
-            bench()
-        return 0
+            return bench(self.json, self.check)
 
 
 @part

@@ -9,6 +9,7 @@ from experiments.config.modes import Follow, Mode
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
+from sim.body.figure_state import FigureGains
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
@@ -80,6 +81,10 @@ class Figure:
         Servo ticks between two updates of the figure, between which a foot may land.
     blend : float
         Time in which one clip goes over into another [s].
+    residual_force : float
+        Largest force at the root beside ground and joints, as a share of body weight; 0: none.
+    residual_moment : float
+        Largest such moment, as a share of body weight × stature.
     """
 
     kind: FigureKind = "physical"
@@ -88,6 +93,8 @@ class Figure:
     smoothing: float = above(0.0, default=6.0, unit="Hz")
     figure_ticks: int = whole(1, default=2)
     blend: float = at_least(0.0, default=0.4, unit="s")
+    residual_force: float = at_least(0.0, default=FigureGains().force_bound)
+    residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
 
 
 @part

@@ -5,8 +5,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from sim.body.falls import FallState
+
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+REPORT_SUPPORT, REPORT_SATURATED, REPORT_RESIDUAL, REPORT_FLIES, REPORT_DOWN, REPORT_SIZE = 0, 1, 2, 8, 9, 10
+"""Places in a figure's report: support (0 while the reference flies or nothing touches), number of saturated motors,
+residual (6), 1 while the reference flies, and 1 while the figure lies where it fell, 2 while it is set back."""
 
 
 class FigureGains(NamedTuple):
@@ -94,7 +101,9 @@ class FigureState(NamedTuple):
     lost, yielding : Array
         Torque beyond each motor's limit [N m] and whether its joint gives way, shape (51,).
     report : Array
-        Support (0 while the reference flies or nothing touches), number of saturated motors, residual (6).
+        See `REPORT_SUPPORT` and what follows it, shape (10,).
+    fall : FallState
+        Whether it has fallen, and how it is set back.
     """
 
     model: int
@@ -148,3 +157,4 @@ class FigureState(NamedTuple):
     block: Array
     correction: Array
     report: Array
+    fall: FallState
