@@ -60,6 +60,12 @@ def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
     return ends[np.maximum(first - 1, 0)], ends[first]
 
 
+def neighbours(values: Array, periodic: bool) -> tuple[Array, Array]:
+    """Values at phases, along the last axis, and at the next phase; of a closed curve the first follows the last."""
+    after = np.roll(values, -1, axis=-1)
+    return (values, after) if periodic else (values[..., :-1], after[..., :-1])
+
+
 def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
     """Smallest k_r [N/m] from `least` on at which the loop is unstable with the phase held, at every phase, shape (n,).
 
@@ -128,13 +134,15 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
             worst = (float(onset.min()), hand, int(onset.argmin()))
         critical.append(onset)
         radii = loop.radius(river.k_r, river.b_d)
-        bounds.append(float((np.maximum(radii[1:], radii[:-1]) + np.abs(np.diff(radii))).max()))
+        here, following = neighbours(radii, river.curve.periodic)
+        bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
         if river.curve.periodic and river.law.carries:
             multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
     bare = SampledLoop(river.still(), river.sampling)
     onsets = np.array(critical)
     capped = np.minimum(onsets, MOST_STIFFNESS)
-    change = float(np.abs(np.diff(capped, axis=1)).max())
+    here, following = neighbours(capped, river.curve.periodic)
+    change = float(np.abs(following - here).max())
     least, hand, at = worst
     margin = min(least, MOST_STIFFNESS) / max(river.k_r, 1e-3) - 1.0
     radius = bare.radius(river.k_r, river.b_d)
