@@ -21,6 +21,7 @@ MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] no device gives more, 
 GRID = 40  # gains tried before bisection
 PHASES = 48
 LAP_PHASES = 400  # for the multipliers of a lap
+CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # shares to which the limiter may cut a force
 LATEST = 16  # periods of delay at which the search for the delay margin ends
 
 
@@ -47,8 +48,12 @@ class River(NamedTuple):
 
     def still(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
         """The loop linearised at `phases` of a curve as slow as if it stood still."""
+        return self.still_at(self.phases(), hand)
+
+    def still_at(self, phases: Array, hand: HandImpedance = NO_HAND) -> LinearLoop:
+        """Likewise at other phases [s]."""
         slow, curve = 1e6, self.curve
-        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * self.phases()
+        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * phases
         standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
         return linearise(self.device, self.law, standing, places, hand, self.width)
 
@@ -123,9 +128,9 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     Certified: at every phase on a grid and with every hand, k_r stays below what is critical there by more than the
     critical value changes to the neighbouring phase, or, where that jumps, the spectral radius below 1 by more than it
     changes; and where the hand is carried round a closed curve, the Floquet multipliers of the lap lie inside the unit
-    circle. The margin is (critical k_r)/k_r − 1.
+    circle; and with all gains lowered alike, as by the limiter, it is stable too. The margin is (critical k_r)/k_r − 1.
     """
-    critical, multipliers, bounds = [], [], []
+    critical, multipliers, bounds, cut = [], [], [], 0.0
     worst = (np.inf, NO_HAND, 0)
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
@@ -133,6 +138,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         if onset.min() < worst[0]:
             worst = (float(onset.min()), hand, int(onset.argmin()))
         critical.append(onset)
+        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
         radii = loop.radius(river.k_r, river.b_d)
         here, following = neighbours(radii, river.curve.periodic)
         bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
@@ -155,9 +161,11 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
         "delay_margin": delay_margin(bare, river.k_r, river.b_d),
         "multiplier": max(multipliers, default=None),
+        "radius_cut": cut,
     }
     assumptions = (
-        "linear: small deviations, forces below the limiter's and the motors' bounds, no Coulomb friction, no rounding",
+        "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
+        f"lower gains, down to {CUTS[0]:.0%} of them, and its slew is not reached",
         f"phases: {onsets.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
@@ -169,6 +177,9 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
     if multipliers and max(multipliers) >= 1.0:
         reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"
+        return Verdict("unknown", reason, margin, assumptions, {}, figures)
+    if cut >= 1.0:
+        reason = f"stable, but not where the limiter cuts the force: a factor of {cut:.4g} a period; {said}"
         return Verdict("unknown", reason, margin, assumptions, {}, figures)
     if least - change <= river.k_r and max(bounds) >= 1.0:
         reason = f"the critical k_r changes by {change:.4g} N/m from phase to phase, too coarse a grid; {said}"
