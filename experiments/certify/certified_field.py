@@ -15,7 +15,8 @@ from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
-from experiments.setups.certified_law import certified_laws, leading_drag
+from experiments.setups.certified_law import certified_laws, governor_drag, leading_drag, left_out
+from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
@@ -94,7 +95,9 @@ def certificate_inputs(
     """
     sampling, mode = certified_sampling(config, delay), config.mode
     return {
-        "gains": certified_laws(config),
+        # Every parameter of every law, those that no certificate covers too.
+        "gains": (certified_laws(config), resolved(config).mode),
+        "added": config.map if left_out(config) or governor_drag(config) else None,
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
         "curve": certified_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],

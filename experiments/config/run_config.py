@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Map
-from experiments.config.modes import Follow, Mode
+from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
@@ -209,8 +209,8 @@ class ArmConfig:
     user: Literal["relaxed", "push"] = "push"
     seconds: Annotated[float, at_least(1.5, unit="s")] = 12.0
     seed: Annotated[int, whole(0)] = 1
-    stiffness: Annotated[float, at_least(0.0, unit="N/m")] = 300.0
-    damping: Annotated[float, at_least(0.0, unit="N s/m")] = 8.0
+    stiffness: Annotated[float, at_least(0.0, unit="N/m", most=STIFFEST)] = 300.0
+    damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPED)] = 8.0
     tube: Annotated[float, at_least(1e-4, unit="m", infinite=True)] = 0.25
     lap: Annotated[float, above(0.0, unit="s")] = 4.0
     radius: Annotated[float, above(0.0, unit="m")] = 0.05
