@@ -37,8 +37,8 @@ def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
     return HidPhantom(handle, "in memory", clock)
 
 
-def test_a_device_says_who_it_is(driver: HidPhantom) -> None:
-    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True)
+def test_a_device_says_who_it_is(driver: HidPhantom, firmware: Firmware) -> None:
+    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot)
 
 
 def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
@@ -139,6 +139,25 @@ def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_readi
         handle.tick()
         assert again.read(reading, 0.0)
     np.testing.assert_allclose(firmware.joint_torque, torque, atol=13.3e-6)
+
+
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_a_device_that_began_again_goes_on_only_if_it_still_knows_its_zero(
+    driver, handle, firmware, calibrated
+) -> None:
+    reading = np.zeros(9)
+    handle.tick()
+    assert driver.read(reading, 0.0)
+    firmware.power_up(calibrated)
+    for _ in range(3):
+        handle.tick()
+        if handle.firmware.boot == driver.identity.power_up and calibrated:
+            assert driver.read(reading, 0.0)
+        else:
+            with pytest.raises(DriverFault) as refused:
+                driver.read(reading, 0.0)
+            assert refused.value.fault is Fault.DEVICE_RESET
+    assert driver.identity.calibrated == calibrated
 
 
 def test_a_calibration_without_a_reading_is_refused(driver) -> None:
