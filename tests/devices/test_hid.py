@@ -11,8 +11,8 @@ from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, T
 from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle
-from tests.devices.follow import device_follow, rms, simulated_follow
-from tests.devices.rig import FirmwareBehind, Linkage, Rig
+from tests.devices.follow import device_follow, gated_follow, rms, simulated_follow
+from tests.devices.rig import FirmwareBehind, Linkage, LockStep, Rig
 
 POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
 
@@ -210,3 +210,9 @@ def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre
     )
     assert rig.fault == Fault.NONE
     assert rms(places, simulated_follow()) < 1e-3
+
+
+@pytest.mark.slow
+def test_follow_through_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+    assert rms(gated_follow(driver)["p"], simulated_follow()) < 1e-3
