@@ -51,14 +51,16 @@ class LockStep:
     """A driver whose device goes on by a period with each command, for a servo without a clock."""
 
     def __init__(self, driver: Driver, behind: Behind):
-        self.driver, self.behind, self.telemetry = driver, behind, driver.telemetry
-        behind.tell()
+        self.driver, self.behind, self.telemetry, self._told = driver, behind, driver.telemetry, False
 
     @property
     def identity(self) -> DeviceIdentity:
         return self.driver.identity
 
     def read(self, reading: np.ndarray, timeout: float) -> bool:
+        if not self._told:
+            self.behind.tell()
+            self._told = True
         return self.driver.read(reading, timeout)
 
     def write(self, torque: np.ndarray, enable: bool) -> None:
@@ -66,7 +68,7 @@ class LockStep:
             self.driver.write(torque, enable)
         finally:
             self.behind.move()
-            self.behind.tell()
+            self._told = False
 
     def let_go(self) -> None:
         self.driver.let_go()
