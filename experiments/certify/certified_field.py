@@ -3,8 +3,10 @@
 Nothing here needs CasADi, so a stored certificate is checked without starting it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import cast
 
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.loop.hand import HandRange
@@ -12,6 +14,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverClips
 from experiments.config.modes import Lead, Rivers
+from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
@@ -68,6 +71,31 @@ def certified_sampling(config: RunConfig, delay: float) -> Sampling:
     return Sampling(config.clock.servo_period, delay, config.device.cutoff)
 
 
+def certified_options(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
+    """The numbers that a certificate is of as a person gives them, by option: to say which of them differs.
+
+    Parameters
+    ----------
+    config, delay, hands, push
+        Of `certificate_inputs`.
+    """
+    found = linkage_of(config.device)
+    told: dict[str, object] = {"coulomb": found.coulomb, "viscous": found.viscous, "inertia": found.inertia}
+    for part in (config.mode, config.map, config.device, config.clock):
+        told |= _leaves(to_dict(part))
+    for unused in ("kind", "device_file", "physics_step"):
+        del told[unused]
+    chosen = {"mode": config.mode.kind, "map": config.map.kind, "delay": delay, "hand_push": push}
+    return told | chosen | {f"hand_{name}": value for name, value in asdict(hands).items()}
+
+
+def _leaves(values: Mapping[str, object]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for name, value in values.items():
+        found |= _leaves(cast(Mapping[str, object], value)) if isinstance(value, Mapping) else {name: value}
+    return found
+
+
 def certificate_inputs(
     config: RunConfig,
     delay: float,
@@ -106,7 +134,8 @@ def certificate_inputs(
         "period": sampling.period,
         "delay": sampling.delay,
         "filter": sampling.cutoff,
-        "device": (PREMIUM_1_5, linkage_of(config.device)) if config.device.device_file else PREMIUM_1_5,
+        # Where the encoders' zero is changes with every calibration, and no verdict.
+        "device": (PREMIUM_1_5, replace(linkage_of(config.device), offset=(0.0, 0.0, 0.0))),
         "hand": hands,
         "push": push,
         "code": code_inputs(),

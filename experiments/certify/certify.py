@@ -21,14 +21,20 @@ from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
 from experiments.certify.certified_clips import certify_clips
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.certified_field import certificate_inputs, certified_curves, certified_sampling
+from experiments.certify.certified_field import (
+    certificate_inputs,
+    certified_curves,
+    certified_options,
+    certified_sampling,
+)
 from experiments.certify.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certify.certified_rivers import certify_rivers
 from experiments.certify.executed_field import walled
 from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
-from experiments.files.certificate_files import clip_inputs, read_certificate
+from experiments.files.certificate_files import OPTIONS, clip_inputs, read_certificate
 from experiments.files.device_files import linkage_of
+from experiments.files.json_text import json_text
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, left_out
 from experiments.setups.clips import load_clips
@@ -94,7 +100,8 @@ def certify_into(
     config : RunConfig
         Of the run.
     out : Path
-        Folder; written are ``certificate.json``, ``certificate.html``, ``stability.png``, ``region.png``.
+        Folder; written are ``certificate.json``, ``certificate.html``, ``certified.json`` (the options),
+        ``stability.png``, ``region.png``.
     delay : float
         Of the torques [s].
     hands : HandRange, optional
@@ -124,6 +131,7 @@ def certify_into(
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
         plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
     _write(certificate, plots, out)
+    (out / OPTIONS).write_text(json_text(certified_options(config, delay, hands, push)) + "\n", encoding="utf-8")
     return certificate
 
 
