@@ -42,7 +42,10 @@ def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
 
 
 def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile) -> dict[str, Trajectory]:
-    return {"": Trajectory.circle(part.around.radius, part.around.lap)}
+    from experiments.setups.pace import course_of
+
+    circle = Trajectory.circle(part.around.radius, part.around.lap)
+    return {"": circle if isinstance(config.mode, Rivers) else course_of(circle, leading_drag(config))}
 
 
 def _curves_of_file(config: RunConfig, part: MapFile) -> dict[str, Trajectory]:
