@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
+from experiments.results.oscillation import oscillation_summary
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import (
     AnimationSummary,
@@ -60,8 +61,9 @@ def summarise(
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
-        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording)
-    )
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
+        oscillation=oscillation_summary(recording),
+    )  # fmt: skip
 
 
 def measured(
