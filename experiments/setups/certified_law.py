@@ -6,6 +6,7 @@ Light to import, as what certificates are checked by is.
 from collections.abc import Callable
 from typing import NamedTuple
 
+from controllers.fields.bunny import felt_bunny
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved, river_gains, tube_gains
@@ -72,8 +73,8 @@ def _follow(mode: Follow | StretchThenFollow) -> Laws:
 def _bunny(mode: Bunny) -> Laws:
     """Near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
     along = mode.bunny_attraction == "along"
-    width = _ANY if along else mode.bunny_width
-    return {"": CertifiedLaw("follow" if along else "bunny", mode.stiffness, mode.damping, width)}
+    k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
+    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _ANY if along else width)}
 
 
 def _rivers(mode: Rivers) -> Laws:
