@@ -25,8 +25,8 @@ def done(intent: PersonIntent, seconds: float, river: tuple[float, float] = LIGH
         haptic_map=hvf.Cylindrical(hvf.clips("squat_dance"), around=CURVE),
         user=hvf.User(person=hvf.persona("median"), intent=intent), figure=hvf.Figure(kind="none"), seed=3,
     )  # fmt: skip
-    ticks = sim.run(seconds).ticks
-    return {name: ticks[name] for name in ("t", "p", "v", "user", "force", "distance")}
+    run = sim.run(seconds)
+    return {name: run.ticks[name] for name in ("t", "p", "v", "user", "force", "distance")}
 
 
 def within(found: dict[str, np.ndarray], name: str, start: float, end: float) -> np.ndarray:

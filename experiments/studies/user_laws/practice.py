@@ -75,7 +75,7 @@ def endurance(people: Sequence[Person], seed: int) -> Study:
         "endurance", "Endurance: time that a force is held, over its share of the strength",
         (
             Law("Endurance: time at half the strength", half, 50.0, 150.0, "s",
-                "Frey Law & Avin 2010: a power of the load, by joint; grip some 100 s (m)", True),
+                "Frey Law & Avin 2010: a power of the load, by joint; grip: some 100 s (m)", True),
             Law("Endurance: exponent", -float(slope), 1.5, 2.4, "",
                 "Frey Law & Avin 2010: 1.6 grip, 2.2 elbow (m)", True),
         ),
