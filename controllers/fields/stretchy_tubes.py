@@ -285,6 +285,11 @@ class StretchyTubes(Law):
         """Compiled form of the field; the curve lies in its memory, where it is bent."""
         return self._program
 
+    @staticmethod
+    def record_at(slot: int = TRACE_SIZE) -> int:
+        """Where in the memory of a run the record of the curve begins; before it lies the state of the law."""
+        return slot + _RECORD
+
     def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:
         """The curve as it is bent in the memory of a run.
 
