@@ -24,9 +24,9 @@ def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool
     return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
-def whole(least: int, *, default: Any = ...) -> Any:
-    """Whole number of a part from `least` on, within what a file's 64 bits hold."""
-    return Field(default=default, ge=least, lt=2**63)
+def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
+    """Whole number of a part from `least` on, by default within what a file's 64 bits hold."""
+    return Field(default=default, ge=least, lt=below)
 
 
 def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
