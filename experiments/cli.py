@@ -110,8 +110,8 @@ def _refuse_empty(words: Sequence[str]) -> None:
 
 def _one_line(said: str, words: Sequence[str]) -> str:
     """What is in tyro's first box: option, value, what would be right; and where more is to be read."""
-    lines = [line.strip("│ ") for line in said.splitlines() if line.startswith("│")]
-    first = " ".join(itertools.takewhile(lambda line: set(line) != {"─"}, lines)) or " ".join(said.split())
+    lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in said.splitlines()][1:])  # without the title
+    first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(said.split())
     first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ")
     for pattern, expected in _MISTAKES:
         found = re.search(pattern, first)
@@ -123,6 +123,10 @@ def _one_line(said: str, words: Sequence[str]) -> str:
             break
     named = words[0] if words and words[0] in COMMANDS else "COMMAND"
     return f"{first[0].lower()}{first[1:]}; hvf {named} --help lists what there is"
+
+
+def _is_rule(line: str) -> bool:
+    return bool(line) and set(line) <= set("─-")
 
 
 _MISTAKES = (

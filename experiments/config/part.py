@@ -13,6 +13,8 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from controllers.errors import ParameterError
 
 _Part = TypeVar("_Part")
+MOST = 1e15
+"""No number of a part is as large, in SI units: its square, and that of a difference, is still a number."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
 
 
@@ -21,7 +23,8 @@ def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool
 
     Without a default it stands in the annotation, where the command line is to find the default itself.
     """
-    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
+    most = {} if infinite else {"lt": MOST}
+    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit}, **most)
 
 
 def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
@@ -31,7 +34,7 @@ def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
 
 def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
     """Number of a part that is greater than `least`, and finite."""
-    return Field(default=default, gt=least, allow_inf_nan=False, json_schema_extra={"unit": unit})
+    return Field(default=default, gt=least, lt=MOST, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
@@ -104,7 +107,8 @@ def one_line(error: ValidationError, cls: type) -> str:
         known = ", ".join(field.name for field in fields(cast(Any, within)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
     if kind == "less_than":
-        return f"{option} is {first['input']}; expected less than {context['lt']}"
+        most = context["lt"]
+        return f"{option} is {first['input']}; expected less than {most if isinstance(most, int) else f'{most:g}'}{unit}"
     if kind == "literal_error":
         return f"{option} is {first['input']!r}; expected {context['expected']}"
     if kind == "union_tag_invalid":
