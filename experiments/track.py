@@ -11,7 +11,7 @@ from sim.body.tracking import TrackingReport, track
 from sim.compilation.units import Unit
 
 
-def track_clips(names: tuple[str, ...], seconds: float) -> dict[str, TrackingReport]:
+def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> dict[str, TrackingReport]:
     """Track clips, and report on each by name.
 
     Parameters
@@ -20,6 +20,8 @@ def track_clips(names: tuple[str, ...], seconds: float) -> dict[str, TrackingRep
         Embedded clips or files; all embedded clips if there is none.
     seconds : float
         Simulated time for each [s].
+    raw : bool
+        Take motion files as captured, not prepared.
 
     Raises
     ------
@@ -28,7 +30,7 @@ def track_clips(names: tuple[str, ...], seconds: float) -> dict[str, TrackingRep
     """
     console = Console(stderr=True)
     names = names or embedded_names()
-    clips, remarks = load_clips(names)
+    clips, remarks = load_clips(names, raw)
     for remark in remarks:
         console.print(remark, highlight=False)
 

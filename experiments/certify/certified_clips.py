@@ -31,7 +31,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
             return config_of(recording), clips_of(recording)
     if isinstance(config.map, MapFile):
         return config, load_figure_map(Path(config.map.file))[1]
-    return config, load_clips(config.map.clips)[0]
+    return config, load_clips(config.map.clips, config.map.raw)[0]
 
 
 def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:

@@ -80,8 +80,12 @@ class Command:
 
     def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
         """The field, and the clips that are certified with it; gains alone have none."""
+        from experiments.setups.certified_law import governor_drag, left_out
+
         config = config_of_options(self.options)
-        if self.run is None and config.map.kind not in ("led", "file"):
+        # A governor and walls are made of the clips.
+        of_clips = config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
+        if self.run is None and not of_clips:
             return config, ()
         from experiments.certify.certified_clips import run_and_clips
 
@@ -128,7 +132,7 @@ class Command:
         if self.clip is not None:
             from experiments.setups.clips import load_clips
 
-            inputs = clip_inputs(load_clips([self.clip])[0][0], self._judging())
+            inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
         else:
             config, clips = self._what()
             inputs = certificate_inputs(config, self.delay, self._hands(), self.hand_push, clips, self._judging())

@@ -26,6 +26,8 @@ class Command:
     """Clips that have to close; by default all those are closed curves that do."""
     seed: Annotated[int, whole(0)] = 1
     """Of the places from which the arrangement begins."""
+    raw: bool = False
+    """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     overwrite: bool = False
     """Replace the file if it exists."""
     json: Json = False
@@ -35,6 +37,6 @@ class Command:
         from experiments.lifting.lift import lift_into
 
         with working("lifting", len(self.clips)):
-            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite)
+            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite, self.raw)
         say(report.to_json(), self.json, report.lines())
         return 0

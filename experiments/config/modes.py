@@ -6,6 +6,8 @@ from pydantic import Field
 
 from experiments.config.part import above, at_least, part
 
+STIFFEST, MOST_DAMPED = 1e6, 1e4  # [N/m], [N s/m] no device gives more, and certificates search no further
+
 
 @part
 class OrientationMoment:
@@ -33,7 +35,7 @@ class SpeedGovernor:
         Of the hand's speed beyond what is admissible [N s/m].
     """
 
-    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m")
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
 
 
 @part
@@ -72,8 +74,8 @@ class Follow:
     """
 
     kind: Literal["follow"] = "follow"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
@@ -101,8 +103,8 @@ class Bunny:
     """
 
     kind: Literal["bunny"] = "bunny"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     bunny_width: float = at_least(1e-4, default=0.05, unit="m")
     bunny_attraction: Literal["point", "along"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
@@ -131,8 +133,8 @@ class Rivers:
     """
 
     kind: Literal["rivers"] = "rivers"
-    stiffness: float | None = above(0.0, default=None, unit="N/m")
-    damping: float | None = above(0.0, default=None, unit="N s/m")
+    stiffness: float | None = above(0.0, default=None, unit="N/m", most=STIFFEST)
+    damping: float | None = above(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
     river_tube: float = at_least(1e-4, default=0.015, unit="m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     orientation: OrientationMoment | None = None
@@ -161,9 +163,9 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, default=None, unit="N/m")
-    rubber: float = at_least(0.0, default=150.0, unit="N/m")
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
     walls: JointWalls | None = None
@@ -184,13 +186,13 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, default=None, unit="N/m")
-    rubber: float = at_least(0.0, default=150.0, unit="N/m")
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     walls: JointWalls | None = None
 
@@ -210,8 +212,8 @@ class Lead:
     """
 
     kind: Literal["lead"] = "lead"
-    leash: float = at_least(0.0, default=120.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    leash: float = at_least(0.0, default=120.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     floor_scale: float | None = at_least(1e-3, default=None)
 
 

@@ -14,17 +14,17 @@ from controllers.errors import ParameterError
 
 _Part = TypeVar("_Part")
 MOST = 1e15
-"""No number of a part is as large, in SI units: its square, and that of a difference, is still a number."""
+"""No number of a part is larger, in SI units: its square, and that of a difference, is still a number."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
 
 
-def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False) -> Any:
-    """Number of a part that is `least` or more, by default finite; `unit` is for messages.
+def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
+    """Number of a part that is `least` or more, at most `most`, by default finite; `unit` is for messages.
 
     Without a default it stands in the annotation, where the command line is to find the default itself.
     """
-    most = {} if infinite else {"lt": MOST}
-    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit}, **most)
+    limit = {} if infinite else {"le": most}
+    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit}, **limit)
 
 
 def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
@@ -32,9 +32,9 @@ def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
     return Field(default=default, ge=least, lt=below)
 
 
-def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
-    """Number of a part that is greater than `least`, and finite."""
-    return Field(default=default, gt=least, lt=MOST, allow_inf_nan=False, json_schema_extra={"unit": unit})
+def above(least: float, *, default: Any = ..., unit: str = "", most: float = MOST) -> Any:
+    """Number of a part that is greater than `least`, at most `most`, and finite."""
+    return Field(default=default, gt=least, le=most, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
@@ -106,9 +106,10 @@ def one_line(error: ValidationError, cls: type) -> str:
         within = _within(cls, place[:-1])
         known = ", ".join(field.name for field in fields(cast(Any, within)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
+    if kind == "less_than_equal":
+        return f"{option} is {float(first['input']):g}; expected at most {context['le']:g}{unit}"
     if kind == "less_than":
-        most = context["lt"]
-        return f"{option} is {first['input']}; expected less than {most if isinstance(most, int) else f'{most:g}'}{unit}"
+        return f"{option} is {first['input']}; expected less than {context['lt']}"
     if kind == "literal_error":
         return f"{option} is {first['input']!r}; expected {context['expected']}"
     if kind == "union_tag_invalid":

@@ -22,7 +22,7 @@ from sim.recording.recording import Recording
 from sim.world.world import FigureKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
-EDITED, DEFAULT, FIGURES = "edited.bvh", "default.bvh", "figures"
+EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
@@ -68,7 +68,7 @@ def claimed(out: Path) -> Generator[None]:
 def clear_folder(out: Path) -> None:
     """Make the folder, and remove what an earlier run left in it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE):
+    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE):
         (out / name).unlink(missing_ok=True)
     shutil.rmtree(out / FIGURES, ignore_errors=True)
 

@@ -64,16 +64,14 @@ class RunSummary:
         held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
         return [
             *self.faults,
-            *(
-                []
-                if figure is None or figure.fell_at is None
-                else [f"The physical figure fell at {figure.fell_at:.1f} s."]
-            ),
+            *([fell] if figure is not None and (fell := figure.fall_line()) else []),
             *bent,
             *changed,
             *([held] if self.tank.scaled_ticks else []),
             *self._of_the_hand(),
-            *([] if figure is None else [figure.line()]),
+            *([went] if (went := self.path.line()) else []),
+            *([] if self.animation is None else [self.animation.soles()]),
+            *([] if figure is None else figure.lines()),
             f"It ran at {self.speed.real_time_factor:.2f} × real time with {self.speed.peak_memory_mb:.0f} MB; "
             f"MuJoCo's warnings: {warned}.",
         ]

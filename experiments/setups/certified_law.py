@@ -6,7 +6,6 @@ Light to import, as what certificates are checked by is.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from controllers.errors import ParameterError
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved, river_gains, tube_gains
@@ -37,13 +36,7 @@ _ANY = float("inf")
 
 
 def certified_laws(config: RunConfig) -> Laws:
-    """The laws that a run uses.
-
-    Raises
-    ------
-    ParameterError
-        If there is no certificate for them.
-    """
+    """The laws that a run uses."""
     return _LAWS[config.mode.kind](resolved(config).mode)
 
 
@@ -53,6 +46,23 @@ def leading_drag(config: RunConfig) -> float:
     if isinstance(mode, Rivers):
         return river_gains(mode)[1]
     return mode.damping if isinstance(mode, Follow | StretchThenFollow) else 0.0
+
+
+def governor_drag(config: RunConfig) -> float:
+    """Drag [N s/m] of the governor that a run's law is added to; 0 without one, and where rivers are gated instead."""
+    governor = getattr(config.mode, "governor", None)
+    return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
+
+
+def left_out(config: RunConfig) -> tuple[str, ...]:
+    """What a run executes besides its certified laws, and no certificate covers; in words."""
+    mode = config.mode
+    names: list[str] = []
+    if getattr(mode, "walls", None) is not None:
+        names.append("the soft walls (--walls)")
+    if isinstance(mode, Rivers) and mode.governor is not None:
+        names.append("the gates of the rivers (--governor)")
+    return tuple(names)
 
 
 def _follow(mode: Follow | StretchThenFollow) -> Laws:
@@ -67,8 +77,6 @@ def _bunny(mode: Bunny) -> Laws:
 
 
 def _rivers(mode: Rivers) -> Laws:
-    if mode.governor is not None:
-        raise ParameterError("rivers are certified without --governor")
     return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
 
 

@@ -34,7 +34,7 @@ from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
 from models.humanoid.skeleton import BODIES
 from models.mocap.clip import Clip
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -109,7 +109,7 @@ def _river_clips_parts(
     curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
     made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure))
     parts = _about_circle(place, made, clips)
-    return replace(parts, moves=True, plays_rivers=True, refined=lambda: with_rests(made, figure))
+    return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -141,8 +141,9 @@ def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipM
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
-        river_pushes=lambda mode, seconds: river_pushes(curve, seconds), course=lambda damping: curve,
-        expressive=place.expressive, held_seconds=made.lap_seconds,
+        river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
+        course=lambda damping: course_of(curve, damping), moves=True, expressive=place.expressive,
+        held_seconds=made.lap_seconds,
     )  # fmt: skip
 
 
@@ -193,5 +194,6 @@ def _cylinder(
 
     # Where the clips blend is not among what they depend on.
     made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
-    corrections = kept_array(CACHE_FOLDER, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    folder = kept_folder(CylindricalMap.__module__)
+    corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
     return CylindricalMap(clips, radii, heights, legs, corrections)

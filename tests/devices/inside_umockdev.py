@@ -10,8 +10,9 @@ from experiments.cli import main
 from sim.devices.driver import READ, ROUND_TRIP, DriverFault
 from sim.devices.hardware_list import found_devices, hid_backend, open_device
 from sim.errors import SimError
-from tests.devices.follow import LAP, device_follow, rms, simulated_follow
+from tests.devices.follow import LAP, device_follow, gated_follow, rms, simulated_follow
 from tests.devices.hidraw_node import SPACEMOUSE_DESCRIPTOR, HidrawNode, NodeFirmware, NodeRig
+from tests.devices.rig import LockStep
 
 MOUSE = bytes.fromhex("05010902a1010901a10005091901290315002501950375018102c0c0")
 
@@ -88,6 +89,15 @@ def test_follow_through_hidapi_and_the_firmware_is_the_simulation_s_run_within_a
     assert rig.driver.telemetry[READ] == LAP * 1e3
     assert np.isfinite(rig.driver.telemetry[ROUND_TRIP])
     rig.driver.close()
+    assert rms(places, simulated_follow()) < 1e-3
+
+
+def test_follow_through_hidapi_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(phantom) -> None:
+    driver = LockStep(open_device("hid"), phantom)
+    places = gated_follow(driver)["p"]
+    assert driver.telemetry[READ] == LAP * 1e3
+    driver.close()
+    print("apart:", rms(places, simulated_follow()))
     assert rms(places, simulated_follow()) < 1e-3
 
 

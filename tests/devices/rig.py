@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from controllers.safety.faults import FAULT_CODE, latch
-from sim.devices.driver import Driver, DriverFault
+from sim.devices.driver import DeviceIdentity, Driver, DriverFault
 from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange
 from sim.users.arm import Arm
 from sim.world.plant import make_plant
@@ -45,6 +45,36 @@ class Behind(Protocol):
     def move(self) -> None:
         """The period passes under whatever was commanded."""
         ...
+
+
+class LockStep:
+    """A driver whose device goes on by a period with each command, for a servo without a clock."""
+
+    def __init__(self, driver: Driver, behind: Behind):
+        self.driver, self.behind, self.telemetry, self._told = driver, behind, driver.telemetry, False
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        return self.driver.identity
+
+    def read(self, reading: np.ndarray, timeout: float) -> bool:
+        if not self._told:
+            self.behind.tell()
+            self._told = True
+        return self.driver.read(reading, timeout)
+
+    def write(self, torque: np.ndarray, enable: bool) -> None:
+        try:
+            self.driver.write(torque, enable)
+        finally:
+            self.behind.move()
+            self._told = False
+
+    def let_go(self) -> None:
+        self.driver.let_go()
+
+    def close(self) -> None:
+        self.driver.close()
 
 
 class FirmwareBehind:

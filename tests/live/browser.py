@@ -30,7 +30,7 @@ class Served:
     """A page that is served in a thread of this process."""
 
     def __init__(self, config: RunConfig, folder: Path):
-        self.page = Page(config, folder, port=0)
+        self.page = Page(config, folder, port=0, shadows=False)
         self.thread = threading.Thread(target=self.page.serve, daemon=True)
         self.thread.start()
         self.until(lambda: self.page.stage is not None, "the run is put together")
