@@ -1,20 +1,18 @@
 """The physical figure on its own, following clips: how well, and with how much help."""
 
 import time
-from dataclasses import asdict
 
 from rich.console import Console
 
 from experiments.compiling import compile_once
-from experiments.files.json_text import json_text
 from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.body.tracking import TrackingReport, track
 from sim.compilation.units import Unit
 
 
-def track_clips(names: tuple[str, ...], seconds: float, raw: bool, as_json: bool) -> None:
-    """Track clips and print a report of each.
+def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> dict[str, TrackingReport]:
+    """Track clips, and report on each by name.
 
     Parameters
     ----------
@@ -24,8 +22,6 @@ def track_clips(names: tuple[str, ...], seconds: float, raw: bool, as_json: bool
         Simulated time for each [s].
     raw : bool
         Take motion files as captured, not prepared.
-    as_json : bool
-        Print one JSON object, clip by clip, instead of a line each.
 
     Raises
     ------
@@ -48,8 +44,4 @@ def track_clips(names: tuple[str, ...], seconds: float, raw: bool, as_json: bool
         rest = (len(names) - k - 1) * (time.perf_counter() - began) / (k + 1)
         if rest > 0.0:
             console.print(f"{k + 1} of {len(names)} clips tracked, about {rest:.0f} s left", highlight=False)
-    if as_json:
-        print(json_text({name: asdict(report) for name, report in reports.items()}))
-        return
-    for name, report in reports.items():
-        print(f"{name}: {report}")
+    return reports

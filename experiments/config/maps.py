@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.config.part import above, part
+from experiments.config.part import above, at_least, part
 
 
 @part
@@ -14,12 +14,12 @@ class Circle:
     Parameters
     ----------
     lap : float
-        Time of a lap [s].
+        Time of a lap [s]; in less than a tenth of a second no hand goes round.
     radius : float
-        [m]
+        Of the circle [m].
     """
 
-    lap: float = above(0.0, default=4.0, unit="s")
+    lap: float = at_least(0.1, default=4.0, unit="s")
     radius: float = above(0.0, default=0.0477, unit="m")
 
 

@@ -16,9 +16,9 @@ class OrientationMoment:
     Parameters
     ----------
     orientation_stiffness : float
-        [N m/rad]
+        Of the moment towards the curve's orientation [N m/rad].
     orientation_damping : float
-        [N m s/rad]
+        Of the stylus's turning with respect to the curve's [N m s/rad].
     """
 
     orientation_stiffness: float = at_least(0.0, default=0.0, unit="N m/rad")
@@ -213,7 +213,7 @@ class Lead:
     damping : float
         Of the hand [N s/m].
     floor_scale : float, optional
-        Metres of floor for one of the stylus; by default such that the figure goes along the default S in 5 s.
+        Metres of floor for one of the stylus [1]; by default such that the figure goes along the default S in 5 s.
     """
 
     kind: Literal["lead"] = "lead"

@@ -72,9 +72,9 @@ class Figure:
         In the physics, with torques and contacts; the animation itself, evaluated and recorded, which is faster; or the
         device alone, for tuning.
     stature : float
-        [m]
+        Height of the figure [m].
     mass : float
-        [kg]
+        Of the figure [kg].
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
     figure_ticks : int

@@ -6,7 +6,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import above, at_least, part
-from experiments.config.words import RunOptions
+from experiments.config.words import Options
 
 EMULATED = "emulated"
 
@@ -15,7 +15,7 @@ EMULATED = "emulated"
 class RunHardware:
     """How a field is run on a real device."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
+    options: Options
     """The field, as in `hvf run`."""
     name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
     """A device as `hvf hardware list` names it, or "emulated": the MuJoCo linkage in a process of its own."""

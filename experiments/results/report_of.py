@@ -19,7 +19,7 @@ def write_report_of(folder: Path) -> None:
     with Recording(folder / RECORDING) as recording:
         if "frames" not in recording.groups:  # of a device: no figure was in the loop
             told = folder / SUMMARY
-            lines = json.loads(told.read_text(encoding="utf-8"))["lines"] if told.exists() else _lines(recording)
+            lines = json.loads(told.read_text(encoding="utf-8"))["lines"] if told.exists() else lines_of(recording, folder)
             write_hardware_report(folder, recording, lines)
             return
         figures = draw_figures(recording, folder / FIGURES)
@@ -29,13 +29,17 @@ def write_report_of(folder: Path) -> None:
         if recording.texts["hand_does"] == "leads":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        write_report(
-            folder / REPORT, recording, world_of(recording), recording.texts["title"], _lines(recording), figures
-        )
+        title, said = recording.texts["title"], lines_of(recording, folder)
+        write_report(folder / REPORT, recording, world_of(recording), title, said, figures)
 
 
-def _lines(recording: Recording) -> list[str]:
-    if recording.summary is None:
-        t = recording.channel("ticks", "t")
-        return [f"The run was cut short: {t[-1]:.1f} s of it are recorded, and there is no summary."]
-    return [str(line) for line in cast(list[object], recording.summary.get("lines", []))]
+def lines_of(recording: Recording, folder: Path) -> list[str]:
+    """What happened in a run, in words: as its recording has it, or as was found of one that was stopped."""
+    if recording.summary is not None:
+        return [str(line) for line in cast(list[object], recording.summary["lines"])]
+    stopped = f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."
+    try:
+        found = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["lines"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return [stopped]
+    return [stopped, *map(str, found)]

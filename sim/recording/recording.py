@@ -164,15 +164,18 @@ class Recording:
             else:
                 self.arrays[name] = np.asarray(value, dtype=np.float64)
         self.groups: dict[str, dict[str, Channel]] = {}
-        self.rates: dict[str, float] = {}
-        for name in _names(file):
-            node = file[name]
-            if isinstance(node, h5py.Group) and "rate" in node:
-                rows = int(dataset_of(node, "rows")[0])
-                self.rates[name] = float(dataset_of(node, "rate")[()])
-                self.groups[name] = {
-                    key: Channel(dataset_of(node, key), rows, self._path) for key in _names(node) if key not in RESERVED
-                }
+        nodes = {name: node for name in _names(file) if isinstance(node := file[name], h5py.Group) and "rate" in node}
+        self.rates = {name: float(dataset_of(node, "rate")[()]) for name, node in nodes.items()}
+        rows = {name: int(dataset_of(node, "rows")[0]) for name, node in nodes.items()}
+        if summary:
+            last = np.inf
+        else:  # what was stopped between the writing of two groups ends with the shorter
+            last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
+        for name, node in nodes.items():
+            n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
+            self.groups[name] = {
+                key: Channel(dataset_of(node, key), n, self._path) for key in _names(node) if key not in RESERVED
+            }
 
     def channel(self, group: str, name: str) -> Channel:
         """A channel that has rows.

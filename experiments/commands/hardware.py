@@ -128,7 +128,7 @@ Which = (
 
 
 @dataclass(frozen=True)
-class Hardware:
+class Command:
     """Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
 
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
