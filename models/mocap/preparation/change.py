@@ -1,7 +1,8 @@
 r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
 
-A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). Each instant depends on six control
-points, so the normal equations are banded; those of a closed motion have a border of the last five control points.
+A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). An open motion rests at both ends,
+and so does its change: the outer three control points are one, so that δ̇ = δ̈ = 0 there. Each instant depends on six
+control points, so the normal equations are banded; those of a closed motion have a border of the last five of them.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STEP = 1e-3  # of the differences that give velocities [s]
+_HELD = 2  # control points beyond an open motion's first and last one that are the same as it
 _MARGIN = 12  # frames beyond the ends of a closed clip that shape its spline
 
 
@@ -59,7 +61,7 @@ class Change:
         each = max(2, round(seconds / self.intervals / step))
         count = self.intervals * each
         self.times = np.arange(count + (not self.closed)) * seconds / count
-        self.n_points = self.intervals if self.closed else self.intervals + DEGREE
+        self.n_points = self.intervals if self.closed else self.intervals + DEGREE - 2 * _HELD
         spacing = seconds / self.intervals
         knots = (np.arange(self.intervals + 2 * DEGREE + 1) - DEGREE) * spacing
         self._spline = BSpline(knots, np.eye(self.intervals + DEGREE), DEGREE)
@@ -86,21 +88,21 @@ class Change:
         return poses
 
     def points(self, x: Array) -> Array:
-        """All control points, those that wrap included, shape (intervals + 5, 57)."""
+        """All control points, those that wrap or are held included, shape (intervals + 5, 57)."""
         if not self.closed:
-            return x
+            return np.pad(x, ((_HELD, _HELD), (0, 0)), mode="edge")
         return np.vstack((x, x[:DEGREE] @ self.wrap.T))
 
-    def states(self, x: Array) -> State:
-        """The changed motion at the sampled instants."""
-        points = self.points(x)
-        which = self.first[:, None] + np.arange(DEGREE + 1)
-        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order], points[which]) for order in range(3))
+    def states(self, x: Array, instants: npt.NDArray[np.intp] | slice = slice(None)) -> State:
+        """The changed motion at the sampled instants, or at some of them."""
+        points, times = self.points(x), self.times[instants]
+        which = self.first[instants, None] + np.arange(DEGREE + 1)
+        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[which]) for order in range(3))
         moments = [
-            plus(self._reference_at(self.times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
+            plus(self._reference_at(times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
             for o in (-1.0, 0.0, 1.0)
         ]
-        m = len(self.times)
+        m = len(times)
         turns = [pose[:, 3:].reshape(m, 18, 4) for pose in moments]
 
         def between(a: Array, b: Array) -> Array:
@@ -112,8 +114,8 @@ class Change:
         v[:, 3:] = between(turns[0], turns[2]) / (2 * _STEP)
         a[:, 3:] = (between(turns[1], turns[2]) - between(turns[0], turns[1])) / _STEP**2
         if not self.closed:
-            # Before and after the clip its ends are held: differences over them tell nothing.
-            v[0], a[0], v[-1], a[-1] = v[1], a[1], v[-2], a[-2]
+            rests = (times <= 0.0) | (times >= self._end - 1e-9)
+            v[rests] = a[rests] = 0.0
         return State(moments[1], v, a)
 
     def changed(self, x: Array, fps: float) -> Clip:
@@ -160,6 +162,14 @@ class Normal:
     def add(self, interval: int, block: Array) -> None:
         """Add a block (342, 342) that couples the six control points of a knot interval."""
         n, change = N_TANGENT, self._change
+        if not change.closed:
+            points = np.clip(np.arange(interval, interval + DEGREE + 1) - _HELD, 0, change.n_points - 1)
+            if points[0] == points[1] or points[-2] == points[-1]:
+                interval = min(int(points[0]), change.n_points - DEGREE - 1)
+                fold = np.kron(np.eye(DEGREE + 1)[points - interval], np.eye(n))
+                block = fold.T @ block @ fold
+            else:
+                interval = int(points[0])
         if not change.closed or interval + DEGREE < change.n_points - DEGREE:
             self.band[self._rows - self._columns, interval * n + self._columns] += block[self._rows, self._columns]
             return
@@ -193,6 +203,10 @@ class Normal:
         if change.closed:
             total[:DEGREE] += total[change.intervals :] @ change.wrap
             total = total[: change.intervals]
+        else:
+            total[_HELD] += total[:_HELD].sum(axis=0)
+            total[-_HELD - 1] += total[-_HELD:].sum(axis=0)
+            total = total[_HELD:-_HELD]
         return total.ravel()
 
     def times(self, x: Array) -> Array:
