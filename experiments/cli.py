@@ -116,6 +116,10 @@ class Track:
     """Names of embedded clips, or files; all embedded clips by default."""
     seconds: Annotated[float, above(0.0, unit="s")] = 10.0
     """Simulated time for each [s]."""
+    residual_force: Annotated[float, at_least(0.0)] = 0.1
+    """Largest force at the root beside ground and joints, as a share of body weight."""
+    residual_moment: Annotated[float, at_least(0.0)] = 0.02
+    """Largest such moment, as a share of body weight × stature."""
     json: bool = False
     """Print the reports as JSON."""
 
@@ -123,7 +127,7 @@ class Track:
         """Track."""
         from experiments.track import track_clips
 
-        track_clips(self.clips, self.seconds, self.json)
+        track_clips(self.clips, self.seconds, self.json, (self.residual_force, self.residual_moment))
         return 0
 
 

@@ -14,7 +14,9 @@ FIGURES = (
 )
 
 
-def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_does_not(capsys) -> None:
+def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_fails(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert [figure.passes for figure in FIGURES] == [True, False, None]
     assert tell(FIGURES, False, True) == 1
     lines = capsys.readouterr().out.splitlines()
@@ -31,7 +33,7 @@ def test_what_is_not_a_number_passes_nothing() -> None:
     assert Figure("nothing", float("nan"), at_least=1.0).passes is False
 
 
-def test_json_has_values_bounds_and_verdicts(capsys) -> None:
+def test_json_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:
     assert tell(FIGURES, True, True) == 1
     told = json.loads(capsys.readouterr().out)
     assert [one["passes"] for one in told] == [True, False, None]
