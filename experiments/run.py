@@ -70,8 +70,6 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     ModelError, ControllerError, SimError
         If something about the configuration or a file is wrong; the folder is then as it was.
     """
-    from experiments.results.report_of import write_report_of  # matplotlib takes long to import
-
     console = Console(stderr=True)
     check_folder(out, overwrite)
     session = wire(config, ready=lambda units: compile_once(console, units))
@@ -83,6 +81,8 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
     write_animations(out, session)
     (out / SUMMARY).write_text(json_text(asdict(summary) | {"lines": summary.lines()}) + "\n", encoding="utf-8")
+    from experiments.results.report_of import write_report_of  # matplotlib and viser take long: after the first tick
+
     write_report_of(out)
     for line in summary.lines():
         print(line)

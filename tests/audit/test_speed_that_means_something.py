@@ -1,6 +1,8 @@
 """An audit of figures of speed: each keeps to a ratio, says so, and counts."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -48,3 +50,13 @@ def test_every_mode_that_is_benched_steps_once_a_tick_and_has_its_figure_at_500_
     assert config.scene.substeps() == 1
     assert config.figure.figure_ticks * config.clock.servo_period == pytest.approx(2e-3)
     assert config.figure.kind == "physical"
+
+
+def test_what_draws_is_not_imported_before_the_first_tick() -> None:
+    late = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
+    code = (
+        "import sys, experiments.cli, experiments.run, experiments.setups.wiring; "
+        f"print([name for name in {late} if name in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert told.strip() == "[]"
