@@ -1,5 +1,7 @@
 """An audit of measures of the physical figure: each test would have caught what was wrong."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -59,7 +61,7 @@ def test_a_figure_that_lost_the_floor_is_not_in_flight_unless_its_reference_is()
 
 
 @pytest.mark.slow
-def test_grounded_of_a_run_is_what_an_independent_count_of_stance_and_contact_gives(tmp_path) -> None:
+def test_grounded_of_a_run_is_what_an_independent_count_of_stance_and_contact_gives(tmp_path: Path) -> None:
     summary = run(run_config(clips=("run",), lap=2.2, seconds=4.0), tmp_path / "run", False, 0.0)
     with Recording(tmp_path / "run" / "run.h5") as recording:
         reference, ground = recording.channel("frames", "reference")[:], recording.channel("frames", "ground")[:]
@@ -104,12 +106,12 @@ def test_a_figure_that_falls_is_caught_by_its_body_and_is_back_on_the_animation_
 @pytest.mark.parametrize(("name", "seed"), [("run", 0), ("backflip", 1), ("walk", 3), ("run", 4)])
 def test_a_figure_thrown_anyhow_is_back_on_a_moving_animation_and_nothing_blows_up(name: str, seed: int) -> None:
     rng, start = np.random.default_rng(seed), standing()
-    start[2], start[3:7] = 1.0, Rotation.random(random_state=rng).as_quat(scalar_first=True)
+    start[2], start[3:7] = 1.0, Rotation.random(None, rng).as_quat(scalar_first=True)
     model, data, figure = world(start)
     data.qvel[:] = rng.normal(scale=2.0, size=57)
-    motion = clip_motion(embedded(name), figure.period * np.arange(1300))
+    motion = clip_motion(embedded(name), figure.period * np.arange(1300, dtype=np.float64))
     rows = [np.ascontiguousarray(r) for r in (motion.poses, motion.velocities, motion.accelerations)]
-    modes = []
+    modes, pose = list[float](), start
     for pose, velocity, acceleration in zip(*rows, strict=True):
         figure.update(pose, velocity, acceleration)
         modes.append(figure.state.report[REPORT_DOWN])
