@@ -117,8 +117,10 @@ def test_what_no_certificate_covers_is_unknown_and_named():
 
 
 def test_a_program_is_looked_at_as_it_runs():
-    stable = looked_at(Follow(CIRCLE, 300.0, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], 4)
-    shaking = looked_at(Follow(CIRCLE, 2e4, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], 4)
+    stable = looked_at(
+        Follow(CIRCLE, 300.0, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4
+    )
+    shaking = looked_at(Follow(CIRCLE, 2e4, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4)
     assert stable.radius < 1.0 < shaking.radius
     # The differences are the derivatives: on the curve the radius is the symbolic one.
     exact = SampledLoop(river(k_r=2e4).still_at(river().phases(4)), Sampling(1e-3)).radius(2e4, 8.0).max()
