@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import mujoco
@@ -22,6 +23,7 @@ from controllers.fields.bunny import Bunny
 from controllers.fields.compiled_law import CompiledLaw
 from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
+from controllers.fields.law import Law
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.certify.certificate_page import certificate_page
 from experiments.certify.certified_clips import PLAYED, certify_clips, played
@@ -137,10 +139,11 @@ def test_the_command_refutes_the_run_that_shakes(tmp_path):
     assert '"since": null' not in (tmp_path / "run" / "summary.json").read_text()
 
 
+@dataclass(frozen=True)
 class LawTrial(Trial):
     """A trial with a law of its own."""
 
-    law = None
+    law: Law
 
     def program(self, k_r):
         return self.law.program()
@@ -200,8 +203,8 @@ def test_what_is_certified_never_shakes_and_what_is_refuted_does(name):
     verdict = certify().verdict
     rng, shook = np.random.default_rng(20), 0
     for _ in range(20):
-        trial = LawTrial(STILL, rng.uniform(0.0, LAP), 8.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
-        object.__setattr__(trial, "law", law)
+        phase, across = rng.uniform(0.0, LAP), np.array([0.0, 0.0, 1.0])
+        trial = LawTrial(STILL, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
         loop = trial.loop()
         inverse, state = np.linalg.inv(loop.linear.jacobian[0]), np.zeros(12)
         state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.05, size=3)
