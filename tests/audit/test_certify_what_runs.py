@@ -96,6 +96,7 @@ def simulation(field):
     return hvf.Simulation(field=field, haptic_map=hvf.Cylindrical(clips, around=CIRCLE), figure=hvf.Figure(kind="none"))
 
 
+@pytest.mark.slow
 def test_a_simulation_is_certified_with_its_governor_and_refuted_with_one_that_shakes():
     speeds = np.tile([0.1, 0.2], (8, 1))
     field = Follow(CIRCLE, 300.0, 8.0, 0.25)
@@ -107,6 +108,7 @@ def test_a_simulation_is_certified_with_its_governor_and_refuted_with_one_that_s
     assert len({plain.inputs_hash, soft.inputs_hash, hard.inputs_hash}) == 3
 
 
+@pytest.mark.slow
 def test_what_no_certificate_covers_is_unknown_and_named():
     tubes = StretchyTubes(CIRCLE, 150.0, 150.0, 14.0)
     found = hvf.certify(simulation(tubes), NO_HANDS).stability
@@ -234,6 +236,7 @@ def test_gains_beyond_any_device_are_refused_in_one_line(option, tmp_path, capsy
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.slow
 def test_the_page_has_words_and_units_and_no_arrays(tmp_path):
     certificate = certify_into(run_config(), tmp_path, hands=NO_HANDS)
     page = (tmp_path / "certificate.html").read_text()
