@@ -133,7 +133,7 @@ def _told(value: object) -> str:
     if isinstance(value, float | np.floating):
         return f"{float(value):.4g}" if np.isfinite(value) else "without bound"
     if isinstance(value, HandImpedance):
-        return f"{value.mass:g} kg, {value.damping:g} N s/m, {value.stiffness:g} N/m"
+        return str(value)
     if isinstance(value, Mapping):
         entries = cast(Mapping[str, object], value)
         return ", ".join(f"{name}: {_told(item)}" for name, item in entries.items())

@@ -68,7 +68,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "phase": ("phase of the curve", "s"),
     "p": ("place of the stylus", "m"),
     "v": ("velocity of the stylus", "m/s"),
-    "hand": ("hand: mass, damping, stiffness", ""),
+    "hand": ("hand on the stylus", ""),
     "state": ("state θ, θ̇, last θ, filtered θ̇", "rad, rad/s"),
     "growth_rate": ("growth of the mode", "1/s"),
     "time": ("time at which it happens", "s"),

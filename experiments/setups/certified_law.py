@@ -55,6 +55,11 @@ def governor_drag(config: RunConfig) -> float:
     return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
 
 
+def of_clips(config: RunConfig) -> bool:
+    """Whether the certificate of a field is of clips, too: a figure that is led, a map's file, a governor or walls."""
+    return config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
+
+
 def left_out(config: RunConfig) -> tuple[str, ...]:
     """What a run executes besides its certified laws, and no certificate covers; in words."""
     mode = config.mode

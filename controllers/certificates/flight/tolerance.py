@@ -56,7 +56,7 @@ class BallisticTolerance:
 class ContactTolerance:
     """What passes for contact between flights.
 
-    Chosen on 30 captures as they are retargeted: of the six whose jumps fly, soles stand within 5 mm of the floor and
+    Chosen on 22 captures as they are retargeted: of the six whose jumps fly, soles stand within 5 mm of the floor and
     stay within 17 mm of where they stand, a foot slides by up to 9 cm and nothing is at rest for up to 0.12 s.
 
     Parameters
