@@ -41,7 +41,7 @@ def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
 
 
 def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile) -> dict[str, Trajectory]:
-    return {"": Trajectory.circle(part.around.radius, part.around.lap)}
+    return {"": Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)}
 
 
 def _curves_of_file(config: RunConfig, part: MapFile) -> dict[str, Trajectory]:

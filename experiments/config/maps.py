@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.config.part import above, part
+from experiments.config.part import above, at_least, part
 
 
 @part
@@ -17,10 +17,13 @@ class Circle:
         Time of a lap [s].
     radius : float
         [m]
+    wave : float
+        How far it goes up and down, three times a lap, so that every joint of the device turns [m].
     """
 
     lap: float = above(0.0, default=4.0, unit="s")
     radius: float = above(0.0, default=0.0477, unit="m")
+    wave: float = at_least(0.0, default=0.0, unit="m")
 
 
 @part

@@ -23,6 +23,7 @@ from sim.hardware.recorder_process import (
     TOLD_DROPPED,
     TOLD_ERROR,
     TOLD_FORCE,
+    TOLD_READY,
     TOLD_ROWS,
     TOLD_SIZE,
     RecordingJob,
@@ -158,15 +159,23 @@ class HardwareRun:
         SimError
             If the servo could not begin; the message says why.
         """
-        self.servo.start()
-        self._their_end.close()
         if self.recorder is not None:
             self.recorder.start()
+            self._wait_for(self.recorder)
+        self.servo.start()
+        self._their_end.close()
         said = self._hear(_START)
         if isinstance(said, Ready):
             self.poll()
             return said
         raise SimError(said.why if isinstance(said, Refused) else "the servo's process ended before it began")
+
+    def _wait_for(self, recorder: BaseProcess) -> None:
+        """Wait until the recorder is ready, or could not begin, which a look at it tells."""
+        told, end = np.zeros(TOLD_SIZE), time.monotonic() + _START
+        while recorder.is_alive() and told[TOLD_READY] == 0.0 and time.monotonic() < end:
+            time.sleep(0.01)
+            self._told.read(told)
 
     def _hear(self, timeout: float) -> Ready | Refused | Ended | None:
         try:
