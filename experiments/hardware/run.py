@@ -21,7 +21,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.outcome import Outcome, outcome_of
-from experiments.hardware.page import show_status
+from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
@@ -68,6 +68,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     _permit(config, options, console)
     serving = served(config)
     session = session_of(serving, ready=lambda units: compile_once(console, units))
+    if options.view:
+        page_session(config, ready=lambda units: compile_once(console, units))  # before anybody waits for the page
     for remark in session.remarks:
         console.print(remark, highlight=False)
     period = config.clock.servo_period
@@ -144,7 +146,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 @contextlib.contextmanager
 def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
-    page = context.Process(target=show_status, args=(config, run.status), name="page", daemon=True)
+    page = context.Process(target=show_status, args=(config, run.status, run.told), name="page", daemon=True)
     page.start()
     try:
         yield

@@ -169,7 +169,7 @@ def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array,
 
 def _place(part: AnyMap) -> Place:
     around = part.around
-    curve = reached(Trajectory.circle(around.radius, around.lap))
+    curve = reached(Trajectory.circle(around.radius, around.lap, wave=around.wave))
     return Place(curve, around.radius, part.reach, part.expressive)
 
 
