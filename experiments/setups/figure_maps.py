@@ -32,7 +32,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
-from models.humanoid.skeleton import BODIES
+from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
 from models.mocap.clip import Clip
 from sim.compilation.compiled import CACHE_FOLDER
 from sim.world.world import phantom_angles
@@ -75,7 +75,12 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
     radii, legs = (place.radius - reach, place.radius + reach), figure_legs(figure)
     made = _cylinder(motions, radii, (-reach, reach), legs, place.curve.duration)
-    return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
+
+    def refined() -> CylindricalMap:
+        lap = place.curve.duration
+        return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
+
+    return replace(_about_circle(place, made, clips), refined=refined)
 
 
 def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
@@ -88,9 +93,13 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     """
     lower, red, blue = _motions(clips, 3, "composite")
     legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
-    upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    made = CompositeMap(lower, red, blue, sorted(upper), radii, legs, place.curve.duration)
-    return _about_circle(place, made, clips)
+    lap = place.curve.duration
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap)
+
+    def refined() -> CompositeMap:
+        return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+
+    return replace(_about_circle(place, made, clips), refined=refined)
 
 
 def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
