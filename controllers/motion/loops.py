@@ -196,9 +196,9 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
 def there_and_back(poses: Array, fps: float) -> Array:
     r"""A clip that is open and (nearly) rests at both ends, followed by itself backwards; any other one as it is.
 
-    q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with the same
-    torques and contact forces it is as feasible, its flights as ballistic, and its feet stand where they stood. What still
-    moves at an end is brought to rest there: the last 0.15 s are played at a pace that falls to 0.
+    q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with
+    the same torques and contact forces it is as feasible, its flights as ballistic, and its feet stand where they
+    stood. What still moves at an end is brought to rest there: the last 0.15 s are played at a pace that falls to 0.
     """
     first, last = poses[0], poses[-1]
     signs = np.sign(np.einsum("jx,jx->j", first[3:].reshape(-1, 4), last[3:].reshape(-1, 4)))
@@ -226,9 +226,9 @@ def there_and_back(poses: Array, fps: float) -> Array:
 def closed_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip of poses (n, nq) that passed `checked_clip`, moved to the origin and facing +x on average.
 
-    An open clip that about rests at both ends is played there and back (`there_and_back`). Another one that does not close
-    by itself is made to: over the first and last fifth of the lap its ends are led half way to each other by quintics, so
-    that value, slope and second derivative meet.
+    An open clip that about rests at both ends is played there and back (`there_and_back`). Another one that does not
+    close by itself is made to: over the first and last fifth of the lap its ends are led half way to each other by
+    quintics, so that value, slope and second derivative meet.
     """
     poses = there_and_back(poses, fps)
     s = np.linspace(0.0, 1.0, len(poses))

@@ -1,8 +1,9 @@
-"""Whether clips move alike, so that a mean of them is a motion: otherwise a blend has the legs and trunk of one of them.
+"""Whether clips move alike, so that a mean of them is a motion: if not, a blend has the legs and trunk of one.
 
-A mean of a walk, a kick and a dance plants a foot where one of them stands while another one steps: corrected feet skate,
-and no floor gives the forces that the mean asks for. So the middle of a map is held against its clips, as it would be
-played: what floor contact lacks of its forces by inverse dynamics, and how far points of its soles move in a stance.
+A mean of a walk, a kick and a dance plants a foot where one of them stands while another one steps: corrected feet
+skate, and no floor gives the forces that the mean asks for. So the middle of a map is held against its clips, as it
+would be played: what floor contact lacks of its forces by inverse dynamics, and how far points of its soles move in a
+stance.
 """
 
 from collections.abc import Sequence
@@ -73,7 +74,7 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:
-    """Whether the middle of a map lacks little more than half of its clips do, in laps of so long [s]; needs compiled code.
+    """Whether the middle of a map lacks little more than its clips do at the median; needs compiled code.
 
     What was found once is kept beside the compiled code.
     """

@@ -1,8 +1,8 @@
-"""Blends of captures drawn by lot: do feet, joints and the physical figure hold while a hand pushes?
+"""Blends of captures drawn by lot: how feet, joints and the physical figure hold while a hand pushes.
 
-``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares the
-files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and prints the
-table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
+``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares
+the files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and
+prints the table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
 """
 
 import argparse
@@ -46,7 +46,7 @@ JUDGING = (
     "deepmimic/humanoid3d_kick.txt", "deepmimic/humanoid3d_spin.txt", "snu/cart.bvh", "snu/pirouette.bvh",
     "xia/dme_example.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/scaled_131_03.bvh",
 )  # fmt: skip
-"""Halves of the captures, as in `docs/validation/prepared-captures.md`; one file that is another one's copy is left out."""
+"""Halves of the captures, as in `docs/validation/prepared-captures.md`, without one that is a copy."""
 
 SECONDS = 20.0
 MOST_ALONE = 0.15  # [body weights] RMS: what is followed worse alone is no well-formed clip
@@ -124,7 +124,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
 
 
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
-    """Of the animation: lowest sole, way of a point in a stance (95th percentile, largest) [cm], joints beyond limits [°]."""
+    """Of the animation: lowest sole, way of a point in a stance (95 %, largest) [cm], joints beyond limits [°]."""
     motion = motion_of(poses, fps, dynamics=False)
     vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
     limits = joint_range()
@@ -145,9 +145,10 @@ def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
 def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Lines of the table, a map each."""
     lines = [
-        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm | skate cm (95 % of stances; "
-        "worst) | joints beyond ° |", "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm "
+        "| skate cm (95 % of stances; worst) | joints beyond ° |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
         stood = [row for row in of if row["fell"] is None]
