@@ -48,6 +48,11 @@ class HapticMap(ABC):
     def nv(self) -> int:
         """Numbers of a tangent."""
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is to be said of it before a run."""
+        return ()
+
     @abstractmethod
     def compiled(self) -> CompiledMap:
         """The map as its kernel takes it, with the memory of a new run."""

@@ -1,9 +1,9 @@
 r"""How often a lap plays each clip: travelling clips in step with each other, all near their own pace.
 
-A walk of two strides and a run of three have no phase in common but at the lap's ends, and a jog of 0.8 s beside a dance
-of 4 s would be played five times too slowly: its flights would ask for a 25th of gravity. A loop can be played round any
-number of times: it stays closed, and its drift and time are in proportion. So with d_i the time of a clip, s_i its strides
-and T the time of the lap, clip i is played k_i / s_i times,
+A walk of two strides and a run of three have no phase in common but at the lap's ends, and a jog of 0.8 s beside a
+dance of 4 s would be played five times too slowly: its flights would ask for a 25th of gravity. A loop can be played
+round any number of times: it stays closed, and its drift and time are in proportion. So with d_i the time of a clip,
+s_i its strides and T the time of the lap, clip i is played k_i / s_i times,
 
 .. math:: k = \arg\min_k \max_i \left|\log \frac{k\,d_i}{s_i\,T}\right|
 
@@ -80,9 +80,13 @@ def _times(durations: Array, lap: float) -> int:
 def natural_lap(loops: Sequence[Loop], shortest: float = 3.0, longest: float = 6.0) -> float:
     """Time of a lap [s] in which loops that are played `in_step` are all as near to their own pace as can be.
 
-    Tried are times from the shortest to the longest, 2 % apart; of those within 2 % of the best the shortest is taken. A
-    lap of several short cycles leaves a hand the time of all of them to change the blend.
+    Tried are times from the shortest to the longest, or that of the longest loop, 2 % apart; of those within 2 % of
+    the best the shortest is taken. A lap of several short cycles leaves a hand the time of all of them to change the
+    blend. The first loop, whose legs may be those of the whole blend, counts thrice.
     """
+    longest = max(longest, *(loop.duration for loop in loops))
     laps = shortest * 1.02 ** np.arange(int(np.log(longest / shortest) / np.log(1.02)) + 1)
-    worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in in_step(loops, float(lap))) for lap in laps])
+    counts = np.append(3.0, np.ones(len(loops) - 1))
+    paces = np.array([[loop.duration / lap for loop in in_step(loops, float(lap))] for lap in laps])
+    worst = (counts * np.abs(np.log(paces))).max(axis=1)
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

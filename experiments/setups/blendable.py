@@ -1,17 +1,20 @@
-"""What clips cannot be blended with each other, and why: a mean of a motion that flies or turns over and of one that stands."""
+"""What clips cannot be blended with others, and why: a mean of who flies or turns over and of who stands."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from controllers.motion.loops import Loop
+from controllers.motion.loops import Loop, checked_clip, closed_loop
+from controllers.motion.strides import natural_lap
+from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.preparation.poses import sole_points
-from models.humanoid.skeleton import CONTACT_RADIUS
 
 FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
-UPRIGHT = 0.5  # least vertical component of the pelvis axis of who stands, walks, bends or kicks
+UPRIGHT = (
+    0.0  # least vertical component of the pelvis axis: who kicks high leans back by 61°, who turns over passes 90°
+)
 SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
 
 
@@ -43,10 +46,11 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
 
 
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
-    """Which clips a lap of so long [s] plays much faster or slower than they are, a line each."""
-    found: dict[str, str] = {}
-    for clip, loop in zip(clips, loops, strict=True):
-        pace = loop.duration / lap
-        if not SLOWEST <= pace <= FASTEST:
-            found[clip.name] = f"{clip.name} is played at {pace:.2f} times its pace in a lap of {lap:.1f} s"
-    return tuple(found.values())
+    """Which clips a lap [s] plays much faster or slower than they are, as loops that are played `in_step`."""
+    paces = {clip.name: loop.duration / lap for clip, loop in zip(clips, loops, strict=True)}
+    off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
+    if not off:
+        return ()
+    closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    best = natural_lap(closed)
+    return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; --lap {best:.1f} suits them best",)

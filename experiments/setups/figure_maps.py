@@ -24,7 +24,9 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
+from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
 from experiments.setups.balance import balanced
+from experiments.setups.blendable import not_blendable, off_pace
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -32,7 +34,6 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
-from models.humanoid.skeleton import BODIES
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
@@ -73,9 +74,13 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         If there are none, or more than four, or they do not fit together.
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
-    radii, legs = (place.radius - reach, place.radius + reach), figure_legs(figure)
-    made = _cylinder(motions, radii, (-reach, reach), legs, place.curve.duration)
-    return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
+    radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
+    made = _cylinder(motions, radii, (-reach, reach), legs, lap)
+
+    def refined() -> CylindricalMap:
+        return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
+
+    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
 
 
 def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
@@ -88,9 +93,19 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     """
     lower, red, blue = _motions(clips, 3, "composite")
     legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
-    upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    made = CompositeMap(lower, red, blue, sorted(upper), radii, legs, place.curve.duration)
-    return _about_circle(place, made, clips)
+    lap = place.curve.duration
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap)
+
+    def refined() -> CompositeMap:
+        return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+
+    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
+
+
+def _warnings(clips: tuple[Clip, ...], made: CylindricalMap | CompositeMap, lap: float) -> tuple[str, ...]:
+    """What of different clips will not go well, and why, a line each."""
+    played = [clips[i % len(clips)] for i in range(len(made.loops))]
+    return (*not_blendable(clips), *off_pace(played, made.loops, lap))
 
 
 def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

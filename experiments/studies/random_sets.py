@@ -1,8 +1,8 @@
-"""Blends of captures drawn by lot: do feet, joints and the physical figure hold while a hand pushes?
+"""Blends of captures drawn by lot: how feet, joints and the physical figure hold while a hand pushes.
 
-``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares the
-files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and prints the
-table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
+``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares
+the files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and
+prints the table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
 """
 
 import argparse
@@ -22,15 +22,15 @@ from controllers.motion.strides import in_step, natural_lap
 from experiments.config.words import run_config
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.results.measures import FALLEN
+from experiments.setups.alike import motion_of
 from experiments.setups.blendable import not_blendable, off_pace
 from experiments.setups.wiring import wire
 from experiments.studies.prepared_captures import followed
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError
-from models.humanoid.skeleton import CONTACT_RADIUS, joint_range
+from models.humanoid.skeleton import joint_range
 from models.mocap import quaternions
 from models.mocap.clip import Clip
-from models.mocap.preparation.poses import sole_points
 from sim.loop.loop import Loop
 
 Array = npt.NDArray[np.float64]
@@ -46,11 +46,10 @@ JUDGING = (
     "deepmimic/humanoid3d_kick.txt", "deepmimic/humanoid3d_spin.txt", "snu/cart.bvh", "snu/pirouette.bvh",
     "xia/dme_example.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/scaled_131_03.bvh",
 )  # fmt: skip
-"""Halves of the captures, as in `docs/validation/prepared-captures.md`; one file that is another one's copy is left out."""
+"""Halves of the captures, as in `docs/validation/prepared-captures.md`, without one that is a copy."""
 
 SECONDS = 20.0
 MOST_ALONE = 0.15  # [body weights] RMS: what is followed worse alone is no well-formed clip
-_TOUCHES = 0.003  # [m] over the floor, below which a point of a sole that moves skates
 _WITHIN = np.deg2rad(1.0)  # beyond a joint's range: what an Euler angle and a rotation vector differ by near limits
 _EVERY = 5  # frames of the animation that are not looked at between two that are: 100 a second
 
@@ -84,7 +83,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
     residual, fell = followed(clip)
     reason = "; ".join(not_blendable((clip, _other(clip))))
     if not reason and (fell is not None or residual > MOST_ALONE):
-        reason = f"{name} alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
+        reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
     return Captured(name, reason, residual, fell), clip
 
 
@@ -116,7 +115,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
         "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "pace": [round(p, 2) for p in pace],
-        "off_pace": off_pace(clips, in_step(loops, lap), lap), "fell": fell,
+        "remarks": session.remarks, "off_pace": off_pace(clips, in_step(loops, lap), lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
@@ -125,21 +124,14 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
 
 
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
-    """Of the animation: lowest sole, 95th percentile and worst way of a point that touches [cm], joints beyond limits [°]."""
-    points = sole_points(poses)
-    heights = points[:, :, 2] - CONTACT_RADIUS
-    ways: list[float] = []
-    for sphere in range(points.shape[1]):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], (heights[:, sphere] < _TOUCHES).astype(int), [0]))))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
-            stand = points[start:end, sphere, :2]
-            ways.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
+    """Of the animation: lowest sole, way of a point in a stance (95 %, largest) [cm], joints beyond limits [°]."""
+    motion = motion_of(poses, fps, dynamics=False)
     vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
     limits = joint_range()
     excess = np.maximum(limits[:, :, 0] - vectors, vectors - limits[:, :, 1]).max() - _WITHIN
     return {
-        "lowest": float(100 * heights.min()), "skate": float(100 * np.quantile(ways, 0.95)) if ways else 0.0,
-        "slid": float(100 * max(ways, default=0.0)), "beyond": float(np.rad2deg(max(excess, 0.0))),
+        "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,
+        "beyond": float(np.rad2deg(max(excess, 0.0))),
     }  # fmt: skip
 
 
@@ -153,9 +145,10 @@ def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
 def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Lines of the table, a map each."""
     lines = [
-        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm | skate cm (95 % of stances; "
-        "worst) | joints beyond ° |", "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm "
+        "| skate cm (95 % of stances; worst) | joints beyond ° |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
         stood = [row for row in of if row["fell"] is None]
@@ -194,7 +187,9 @@ def main() -> None:
         rows: list[dict[str, Any]] = []
         tasks = [
             pool.submit(run_set, k, kind, chosen, given.seed + k, given.user)
-            for k, sets in enumerate(islice(zip(*(drawn(clips, SIZES[m], given.seed) for m in given.maps)), given.sets))
+            for k, sets in enumerate(
+                islice(zip(*(drawn(clips, SIZES[m], given.seed) for m in given.maps), strict=True), given.sets)
+            )
             for kind, chosen in zip(given.maps, sets, strict=True)
         ]
         for task in as_completed(tasks):
