@@ -140,7 +140,7 @@ def _page() -> str:
     parts = [
         f'<figure id="figure-{d.number}"><a href="figure-{d.number}.pdf"><img alt="{html.escape(d.title)}" '
         f'src="figure-{d.number}.png"></a><figcaption><b>Figure {d.number}. {html.escape(d.title)}.</b> '
-        f"{html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
+        f"<br><i>Here:</i> {html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
         for d in DRAWINGS
     ]
     return _FRAME.format(figures="\n".join(parts))
@@ -164,8 +164,9 @@ figcaption b {{ color: #222a38; }}
 </head>
 <body>
 <h1>Figures 1 to 8 of the paper, from runs of this program</h1>
-<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. What each of its figures is
-of, drawn from recordings; a click gives the PDF.</p>
+<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. In bold, in our words, what the
+paper's figure of that number shows (its captions are not repeated); then what is drawn here, from recordings. A click
+gives the PDF.</p>
 {figures}
 </body>
 </html>
