@@ -1,56 +1,31 @@
 """report.html of a tuning: what was chosen, what it gains, in one file that opens from disk."""
 
-import base64
 import html
-import io
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from experiments.files.html_page import html_page, inline_figure
 from experiments.tuning.contenders import Contender
 from experiments.tuning.tune_config import TuneConfig, label_of
 
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1000px; padding: 1.5rem; }}
-h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
-h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
-.found {{ border-left: 4px solid #1f5fbf; padding-left: 1rem; }}
-.found p {{ margin: .4rem 0; }}
-p.note {{ font-size: .9rem; color: #566072; }}
-table {{ border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; }}
-th:first-child, td:first-child, td.l {{ text-align: left; }}
-img {{ max-width: 100%; }}
-pre {{ background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-<div class="found">{sentences}</div>
+_STYLE = """th, td { text-align: right; }
+th:first-child, td:first-child, td.l { text-align: left; }"""
+_BODY = """<div class="found">{sentences}</div>
 <h2>Candidates</h2>
 {plots}
 <h2>On {users} users who took no part in the tuning</h2>
-<table>{contenders}</table>
+<div class="wide"><table>{contenders}</table></div>
 <p class="note">Gain: by how much the tuned one is better, with its 95 % BCa bootstrap interval over users. The search
 with the same budget simulates as many candidates, under the same certificate. Half the critical gain: the proportional
 rule of Ziegler and Nichols, at the default damping.</p>
 {importances}
 <h2>The certificate of what was chosen</h2>
-<table>{verdicts}</table>
+<div class="wide"><table>{verdicts}</table></div>
 <h2>The tuning</h2>
-<pre>{text}</pre>
-</body>
-</html>
-"""
+<pre>{text}</pre>"""
 
 
 def tuning_page(
@@ -58,10 +33,9 @@ def tuning_page(
     importances: Mapping[str, Mapping[str, float]], plots: Sequence[Figure | None], verdicts: Mapping[str, str],
 ) -> str:  # fmt: skip
     """The page; comparisons are of `experiments.tuning.tuning.Comparison`, verdicts are reasons by name."""
-    return _PAGE.format(
-        title=html.escape(config.name),
+    body = _BODY.format(
         sentences="".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences),
-        plots="".join(_image(plot) for plot in plots if plot is not None),
+        plots="".join(inline_figure(plot) for plot in plots if plot is not None),
         users=config.held_back.number,
         contenders=_contenders(config, judged, comparisons),
         importances=_importances(importances),
@@ -70,12 +44,7 @@ def tuning_page(
         ),
         text=html.escape(text),
     )
-
-
-def _image(figure: Figure) -> str:
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    return f'<img alt="plot" src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
+    return html_page(config.name, body, _STYLE, 1000)
 
 
 def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Sequence[Any]) -> str:
