@@ -294,6 +294,7 @@ class Report:
 
         with working("drawing the report"):
             write_report_of(self.folder)
+        print(f"Written: {self.folder / 'report.html'}; open it in a browser.")
         return 0
 
 

@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,19 +22,30 @@ REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more tha
 LIMIT = 1.10
 
 
-def watched(served: Served, seconds: float, doing: Callable[[], None]) -> tuple[float, float, float]:
-    """99th percentile and median of the cost of a tick [s], and the pace, over a stretch in which something is done."""
-    begin, t = time.monotonic(), float(served.desk.now["t"][0])
+class Stretch(NamedTuple):
+    """99th percentile and median of the processor time of a tick [s], share of real time, pictures drawn [1/s]."""
+
+    most: float
+    middle: float
+    pace: float
+    pictures: float
+
+
+def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretch:
+    """What a stretch of time cost in which something is done."""
+    begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
     costs: list[np.ndarray] = []
     while (passed := time.monotonic() - begin) < seconds:
         doing()
         if passed > REMEMBERED:
             costs.append(served.desk.now["cost"].copy())
     middle, most = np.median(costs, axis=0)
-    return float(most), float(middle), (float(served.desk.now["t"][0]) - t) / (time.monotonic() - begin)
+    passed = time.monotonic() - begin
+    pace = (float(served.desk.now["t"][0]) - t) / passed
+    return Stretch(float(most), float(middle), pace, (served.page.pictures - pictures) / passed)
 
 
-def used(served: Served, browser: Any) -> tuple[float, float, float]:
+def used(served: Served, browser: Any) -> Stretch:
     """The same with a page that is dragged, and loaded anew."""
     tab = new_tab(browser, served.address)
 
@@ -56,8 +67,8 @@ def main() -> int:
     from playwright.sync_api import sync_playwright
 
     served = Served(run_config(mode="follow", seconds=86400.0), Path(tempfile.mkdtemp()))
-    alone: list[tuple[float, float, float]] = []
-    with_page: list[tuple[float, float, float]] = []
+    alone: list[Stretch] = []
+    with_page: list[Stretch] = []
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
