@@ -1,4 +1,4 @@
-"""Does a page that is open, dragged and reloaded cost the servo anything? ``make live-load``: two minutes of either.
+"""Does a page that is open, dragged and reloaded cost the servo anything? ``make live-load``: two minutes with it.
 
 Stretches with and without a browser take turns, so that what else goes on on the machine falls on both. Of each the
 99th percentile of the processor time of a tick is taken (of blocks of 8), and how much of real time the engine kept;
@@ -10,31 +10,42 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from experiments.config.words import run_config
 from tests.live.browser import ARGUMENTS, CHROMIUM, Served, drag, new_tab, on_screen
 
-STRETCH, STRETCHES = 24.0, 5  # [s] of each, and how many of either kind
+WITH, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
 REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more than 1000 blocks of 8 ms
 LIMIT = 1.10
 
 
-def watched(served: Served, doing: Callable[[], None]) -> tuple[float, float, float]:
-    """99th percentile and median of the cost of a tick [s], and the pace, over a stretch in which something is done."""
-    begin, t = time.monotonic(), float(served.desk.now["t"][0])
+class Stretch(NamedTuple):
+    """99th percentile and median of the processor time of a tick [s], share of real time, pictures drawn [1/s]."""
+
+    most: float
+    middle: float
+    pace: float
+    pictures: float
+
+
+def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretch:
+    """What a stretch of time cost in which something is done."""
+    begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
     costs: list[np.ndarray] = []
-    while (passed := time.monotonic() - begin) < STRETCH:
+    while (passed := time.monotonic() - begin) < seconds:
         doing()
         if passed > REMEMBERED:
             costs.append(served.desk.now["cost"].copy())
     middle, most = np.median(costs, axis=0)
-    return float(most), float(middle), (float(served.desk.now["t"][0]) - t) / (time.monotonic() - begin)
+    passed = time.monotonic() - begin
+    pace = (float(served.desk.now["t"][0]) - t) / passed
+    return Stretch(float(most), float(middle), pace, (served.page.pictures - pictures) / passed)
 
 
-def used(served: Served, browser: Any) -> tuple[float, float, float]:
+def used(served: Served, browser: Any) -> Stretch:
     """The same with a page that is dragged, and loaded anew."""
     tab = new_tab(browser, served.address)
 
@@ -46,7 +57,7 @@ def used(served: Served, browser: Any) -> tuple[float, float, float]:
         tab.get_by_role("button", name="Pause").wait_for()
 
     try:
-        return watched(served, doing)
+        return watched(served, WITH, doing)
     finally:
         tab.close()
 
@@ -56,13 +67,13 @@ def main() -> int:
     from playwright.sync_api import sync_playwright
 
     served = Served(run_config(mode="follow", seconds=86400.0), Path(tempfile.mkdtemp()))
-    alone: list[tuple[float, float, float]] = []
-    with_page: list[tuple[float, float, float]] = []
+    alone: list[Stretch] = []
+    with_page: list[Stretch] = []
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
             for _ in range(STRETCHES):
-                alone.append(watched(served, lambda: time.sleep(0.25)))
+                alone.append(watched(served, ALONE, lambda: time.sleep(0.25)))
                 with_page.append(used(served, browser))
                 for name, (most, middle, pace) in (("alone", alone[-1]), ("with the page", with_page[-1])):
                     print(
