@@ -35,6 +35,7 @@ from experiments.sweep import Swept, sweep
 from experiments.trials.study import Study
 from experiments.tuning.tune import Search, tune
 from models.errors import ModelError
+from models.humanoid.skeleton import rest_pose
 from models.mocap.clip import Clip
 from sim.errors import SimError
 from sim.users import intents
@@ -86,6 +87,7 @@ __all__ = [
     "load",
     "persona",
     "population",
+    "rest_pose",
     "sweep",
     "tune",
 ]

@@ -73,6 +73,7 @@ class Run:
             check_folder(folder, overwrite)
             clear_folder(folder)
         summary = record_session(session, folder, config, seconds, started, console)
+        session.haptic_map.check()
         run = Run(folder, summary, session)
         if record is None:
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
@@ -130,7 +131,9 @@ class Run:
         return "\n".join(self.summary.lines())
 
     def __repr__(self) -> str:
-        return f"<run of {self.ticks['t'][-1]:.1f} s, {self.summary.path.deviation_rms_mm:.2f} mm RMS from the curve>"
+        alone = self.summary.path.deviation_rms_mm
+        told = "" if alone is None else f", {alone:.2f} mm RMS from the curve"
+        return f"<run of {self.ticks['t'][-1]:.1f} s{told}>"
 
     def _repr_html_(self) -> str:
         """The replay, in a notebook."""

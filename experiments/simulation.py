@@ -11,6 +11,7 @@ from rich.console import Console
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.law import Law
+from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench
@@ -19,7 +20,7 @@ from experiments.config.run_config import Clock, Figure, Phantom
 from experiments.config.run_config import User as RunUser
 from experiments.run_result import Run
 from experiments.setups.budget import SPAN, fastest, tank_for
-from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, reached
+from experiments.setups.figure_maps import Place, composite_parts, cylindrical_parts, own_parts, reached
 from experiments.setups.hands import intent_of, participant
 from experiments.setups.parts import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
@@ -39,7 +40,7 @@ _SECONDS = 1e9  # [s] a hand that traces does so as long as anybody runs it
 
 
 class FigureMap(Protocol):
-    """A haptic map of the figure, to be made for the figure of a run."""
+    """A haptic map of the figure, to be made for the figure of a run; a `HapticMap` of one's own is one as it is."""
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
@@ -159,7 +160,7 @@ class Tick(NamedTuple):
     pose : Array
         The animation h(p), shape (75,).
     figure : Array
-        The figure as it is, qpos, shape (75,).
+        The figure as it is, qpos, shape (75,); empty without a figure.
     """
 
     hand: HandState
@@ -177,8 +178,8 @@ class Simulation:
     ----------
     field : Law
         Law of force, built in, composed or one's own.
-    haptic_map : FigureMap
-        From the stylus to the figure.
+    haptic_map : FigureMap or HapticMap
+        From the stylus to the figure; one of one's own lies along the curve of the field.
     user : User
         The simulated hand.
     device : Phantom
@@ -199,7 +200,7 @@ class Simulation:
     """
 
     field: Law
-    haptic_map: FigureMap
+    haptic_map: FigureMap | HapticMap
     user: User = User()
     device: Phantom = Phantom()  # noqa: RUF009 - frozen
     figure: Figure = Figure()  # noqa: RUF009
@@ -225,8 +226,16 @@ class Simulation:
             If its parts do not fit together.
         """
         world, console = World(self.scene, self.figure.kind), Console(stderr=True)
-        maps = self.haptic_map.parts(world)
+        own = isinstance(self.haptic_map, HapticMap)
+        maps = own_parts(self.haptic_map, self._curve()) if own else self.haptic_map.parts(world)
         return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
+
+    def _curve(self) -> Trajectory:
+        """That of the one law of the field that has one, along which a map of one's own lies."""
+        curves = [law.curve for law in self.field.program().laws if isinstance(getattr(law, "curve", None), Trajectory)]
+        if not curves:
+            raise ParameterError("a map of one's own lies along the curve of the field; expected a field with a curve")
+        return curves[0]
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
@@ -269,6 +278,7 @@ class Simulation:
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         while True:
             ticks, frames = loop.step()
+            session.haptic_map.check()
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
             yield Tick(
                 HandState.of(ticks.hand[0]), Wrench(force, torque), ticks.force[0].copy(),

@@ -124,7 +124,7 @@ def _sign_continuous(quaternions: Array) -> Array:
     return quaternions * signs[:, None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     r"""Curve in the space of stylus poses, open or periodic.
 
@@ -158,6 +158,12 @@ class Trajectory:
     quaternions: npt.ArrayLike | None = None
     periodic: bool = False
     ends: Literal["natural", "clamped"] = "natural"
+
+    def __repr__(self) -> str:
+        points = np.asarray(self.positions, dtype=np.float64)
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        kind = "closed" if self.periodic else "open"
+        return f"<{kind} curve of {len(points)} samples, {length:.3g} m in {self.duration:.3g} s>"
 
     def __post_init__(self) -> None:
         n = np.asarray(self.times).size

@@ -5,10 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.haptic_map.own_map import OWN, Asked, checked_pose, finite_differences
 from controllers.state import Array, Pose
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
 STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H
+_ORIGIN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 class CompiledMap(NamedTuple):
@@ -36,17 +38,18 @@ class HapticMap(ABC):
 
     A configuration has `nq` numbers and a tangent `nv`; what they mean is the map's affair. A map that keeps memory
     (the lap of a travelling animation) is a function of the stylus pose and of that memory.
+
+    A map of one's own says `pose` and no more::
+
+        class Bow(HapticMap):
+            def pose(self, x):  # p_H [m] and R_H (wxyz) -> 75 numbers
+                pose = rest_pose()
+                pose[7:11] = np.cos(5 * x[0]), 0, np.sin(5 * x[0]), 0
+                return pose
+
+    Its configurations are then a root's position and quaternion, and quaternions of joints; its derivative is found by
+    finite differences, and the tick calls it in Python.
     """
-
-    @property
-    @abstractmethod
-    def nq(self) -> int:
-        """Numbers of a configuration."""
-
-    @property
-    @abstractmethod
-    def nv(self) -> int:
-        """Numbers of a tangent."""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -54,16 +57,43 @@ class HapticMap(ABC):
         return ()
 
     @abstractmethod
-    def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
-
-    @abstractmethod
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
 
-    @abstractmethod
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return len(self.pose(np.array(_ORIGIN)))
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent: root velocity in the world; angular velocity of root and joints in their own frames."""
+        return 6 + 3 * ((self.nq - 7) // 4)
+
+    def compiled(self) -> CompiledMap:
+        """The map as its kernel takes it, with the memory of a new run; that of one's own is asked in Python.
+
+        Raises
+        ------
+        ParameterError
+            If `pose` gives no configuration where the stylus begins.
+        """
+        asked = self.__dict__.get("_asked")
+        if asked is None:
+            start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
+            asked = Asked(self.pose, self.jacobian, checked_pose(start, start.size))
+            self.__dict__["_asked"] = asked  # kept: the tick has its address only
+        return CompiledMap(OWN, asked.params, np.zeros(1))
+
+    def check(self) -> None:
+        """Raise what went wrong in a map of one's own while the tick asked it."""
+        asked = self.__dict__.get("_asked")
+        if asked is not None and asked.error is not None:
+            raise asked.error
+
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
+        return finite_differences(self.pose, np.asarray(x, dtype=np.float64))
 
     def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
         """A vector of the control space at x as one of the target's: h_* ẋ, shape (nv,).

@@ -14,6 +14,7 @@ from controllers.haptic_map.cylindrical import CYLINDRICAL, cylindrical_map
 from controllers.haptic_map.expressive import EXPRESSIVE, base_of, express
 from controllers.haptic_map.led import LED, led_map
 from controllers.haptic_map.lifted import LIFTED, lifted_map
+from controllers.haptic_map.own_map import OWN, own_map
 from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
 from controllers.kernel_call import kernel_call
@@ -27,6 +28,7 @@ MAP_KERNELS: dict[int, Kernel] = {
     RIVER_CLIPS: river_clips_map,
     EXPRESSIVE: express,
     LED: led_map,
+    OWN: own_map,
 }
 """Kernels by kind; that of a map that wraps another one changes what the other one wrote."""
 

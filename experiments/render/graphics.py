@@ -31,7 +31,7 @@ import os; os._exit(0)
 
 
 SUN = (38.0, -52.0)  # where its light goes: azimuth to that of the view, elevation [degrees]
-SUN_DISTANCE = 9.0  # of its shadow map from what is looked at [m]
+SUN_DISTANCE = 5.0  # of its shadow map from what is looked at [m]
 
 
 class NoGraphics(SimError):
@@ -113,9 +113,12 @@ class Canvas:
         As `offscreen_backend` gives it.
     most_geoms : int
         Room for geoms in a picture.
+    reach : float, optional
+        Half width of what casts shadows [m], by default the world's: the smaller, the sharper they are.
     """
 
-    def __init__(self, model: mujoco.MjModel, backend: str, most_geoms: int = 2000):
+    def __init__(self, model: mujoco.MjModel, backend: str, most_geoms: int = 2000, reach: float | None = None):
+        model.stat.extent = model.stat.extent if reach is None else reach
         size = model.vis.global_
         self._gl: Any = import_module(f"mujoco.{backend}").GLContext(size.offwidth, size.offheight)
         self._gl.make_current()

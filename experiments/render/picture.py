@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from experiments.render.graphics import Canvas, Image, View, offscreen_backend
 from experiments.render.scenes import Stage, Workspace
-from experiments.render.shown_world import STAGE, ShownWorld, shown_world
+from experiments.render.shown_world import SHADOW_REACH, STAGE, ShownWorld, shown_world
 from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
 from models.humanoid.skeleton import N_POSE
@@ -18,6 +18,8 @@ from sim.recording.recording import Recording
 Array = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
+FINER = 3  # times as many rows and columns are drawn
+DEVICE_REACH = 0.8  # half width of what casts shadows on the device [m]
 DEVICE_SHARE = 0.34  # of the width
 MOMENTS = 5  # of the figure, evenly over the second half of the run
 SPACING = 1.1  # between them [m]
@@ -34,14 +36,18 @@ def draw_picture(folder: Path, target: Path) -> None:
         If the recording or this machine's graphics do not do.
     """
     with Recording(folder / RECORDING) as recording:
-        world = shown_world(recording, WIDTH, HEIGHT)
+        world = shown_world(recording, FINER * WIDTH, FINER * HEIGHT)
         moments = timeline(recording, folder, world, FPS, 0.0, None, "default")
-        left = round(DEVICE_SHARE * WIDTH) if world.has_figure else WIDTH
-        with Canvas(world.model, offscreen_backend(), 20_000) as canvas:
-            picture = _device(recording, world, moments, canvas, left)
-            if world.has_figure:
-                picture = np.hstack((picture, _figures(recording, world, moments, canvas, WIDTH - left)))
-    matplotlib.image.imsave(target, picture)
+        left, backend = round(DEVICE_SHARE * WIDTH) if world.has_figure else WIDTH, offscreen_backend()
+        with Canvas(world.model, backend, 20_000, DEVICE_REACH) as canvas:
+            picture = _device(recording, world, moments, canvas, FINER * left)
+        if world.has_figure:
+            with Canvas(world.model, backend, 20_000, SHADOW_REACH) as canvas:
+                figures = _figures(recording, world, moments, canvas, FINER * (WIDTH - left))
+            picture = np.hstack((picture, figures))
+    # Each pixel is the mean of several: edges of shadows and limbs are smooth.
+    pixels = picture.reshape(HEIGHT, FINER, WIDTH, FINER, 3).mean(axis=(1, 3))
+    matplotlib.image.imsave(target, np.rint(pixels).astype(np.uint8))
 
 
 def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
@@ -49,7 +55,7 @@ def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: 
     user = recording.channel("ticks", "user")
     row = int(np.argmax([np.linalg.norm(user[int(tick)]) for tick in moments.ticks]))
     Stage(recording, world, moments, "front", 1.0).put(row)
-    return Workspace(recording, world, moments).picture(canvas, row, width, HEIGHT)
+    return Workspace(recording, world, moments).picture(canvas, row, width, FINER * HEIGHT)
 
 
 def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
@@ -68,7 +74,7 @@ def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas:
             canvas.look(world.data, _VIEW, STAGE)
         else:
             canvas.add(world.data)
-    return canvas.picture(width, HEIGHT)
+    return canvas.picture(width, FINER * HEIGHT)
 
 
 def _facing_the_camera(pose: Array, place: Array) -> PlanarDisplacement:

@@ -89,7 +89,7 @@ def config_of(recording: Recording) -> RunConfig:
 
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
     """The clips of a recording, as they were on the figure."""
-    names = recording.texts["clip_names"].split("\n")
+    names = recording.texts["clip_names"].split("\n") if recording.texts["clip_names"] else []
     rates = recording.array("clip_fps")
     return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
 

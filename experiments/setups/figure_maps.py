@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -13,6 +13,7 @@ from controllers.blending.clip_arrays import clip_arrays
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.composite import Composite as CompositeMap
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
 from controllers.haptic_map.cylindrical import correction_shape
@@ -34,6 +35,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
+from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
@@ -106,6 +108,27 @@ def _warnings(clips: tuple[Clip, ...], made: CylindricalMap | CompositeMap, lap:
     """What of different clips will not go well, and why, a line each."""
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
     return (*not_blendable(clips), *off_pace(played, made.loops, lap))
+
+
+def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
+    """A map of one's own about a curve, which has no clips.
+
+    Raises
+    ------
+    ParameterError
+        If its poses are not the figure's.
+    """
+    if haptic_map.nq != N_POSE:
+        name = type(haptic_map).__name__
+        raise ParameterError(f"poses of {name} have {haptic_map.nq} numbers; the figure's have {N_POSE}")
+
+    def none(*_: object) -> Any:
+        raise ParameterError("a map of one's own has no rivers; expected another field")
+
+    return ClipMapParts(
+        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=reached(curve), reach=Circle().radius, rivers=none,
+        river_pushes=none, course=lambda damping: curve,
+    )  # fmt: skip
 
 
 def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

@@ -16,7 +16,7 @@ from experiments.setups.parts import Parts, Settings
 from models.humanoid.skeleton import N_POSE, standing_com
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
-from models.scene import FIGURE, P_WH
+from models.scene import P_WH
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
 from sim.users.participant import Participant
@@ -70,6 +70,11 @@ class Session:
 
         return {"ask": ask, "ask_seconds": own.every}
 
+    @property
+    def _played(self) -> str:
+        """What the figure plays, in a word."""
+        return ", ".join(clip.name for clip in self.clips) or type(self.haptic_map).__name__
+
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """What the recording keeps beside the channels."""
         phases, notes = np.linspace(self.curve.start, self.curve.end, 241), self.parts.notes
@@ -90,7 +95,7 @@ class Session:
             "com_height": standing_com(scene.stature, scene.mass),
             "scene": np.array([scene.stature, scene.mass, scene.servo_period, scene.physics_step]),
             "figure": self.world.kind,
-            "title": f"{notes.title} over {', '.join(clip.name for clip in self.clips)}",
+            "title": f"{notes.title} over {self._played}",
             "clip_names": "\n".join(clip.name for clip in self.clips),
             **{f"clip_{i}": clip.poses for i, clip in enumerate(self.clips)},
             "clip_fps": np.array([clip.fps for clip in self.clips]),
@@ -104,11 +109,6 @@ class Session:
         figure = self.world.figure
         return float(figure.body_subtreemass[1]) * float(np.linalg.norm(figure.opt.gravity))
 
-    @property
-    def figure_root(self) -> int:
-        """Where the figure's pose begins in a configuration of the world."""
-        return int(self.world.model.joint(FIGURE + "root").qposadr[0])
-
     def figure_pose(self, qpos: Array) -> Array:
-        """The figure's part of a configuration of the world, shape (75,)."""
-        return qpos[self.figure_root : self.figure_root + N_POSE].copy()
+        """The figure's part of a recorded configuration, shape (75,); empty where there is no figure."""
+        return qpos[self.world.pose_at : self.world.pose_at + N_POSE].copy()

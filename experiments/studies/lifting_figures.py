@@ -72,10 +72,20 @@ def curves_figure(lifted: LiftedClips, hand_made: Layout) -> Figure:
     for meeting in lifted.lifting.after.meetings:
         i, j = meeting.transition.first, meeting.transition.second
         apart = 1e3 * np.linalg.norm(layout.sites[:, i] - layout.sites[:, j], axis=1)
-        (line,) = lap.plot(angle, apart, label=f"{layout.names[i]} – {layout.names[j]}")
-        lap.plot(np.degrees(meeting.transition.angle), 1e3 * meeting.distance, "o", color=line.get_color())
-    lap.set(xlabel="θ [°]", ylabel="distance of the curves [mm]", title="transitions found", ylim=(0.0, None))
-    lap.legend(fontsize=8)
+        # Of two curves: a line of the one's colour, dashed with the other's.
+        lap.plot(angle, apart, color=_COLOURS[i], lw=2.2)
+        lap.plot(angle, apart, color=_COLOURS[j], lw=2.2, ls=(0, (4, 4)))
+        lap.plot(
+            np.degrees(meeting.transition.angle), 1e3 * meeting.distance, "o", color=_COLOURS[i],
+            markeredgecolor=_COLOURS[j], markeredgewidth=1.8, ms=8,
+        )  # fmt: skip
+        highest = int(np.argmax(apart))
+        lap.annotate(
+            f"{layout.names[i]} – {layout.names[j]}", (angle[highest], apart[highest]), (0, 5),
+            textcoords="offset points", ha="center", fontsize=8,
+        )  # fmt: skip
+    lap.set(xlabel="θ [°]", ylabel="distance of the curves [mm]", title="transitions found (at the dots)")
+    lap.set_ylim(0.0, 1.12 * lap.get_ylim()[1])
     return figure
 
 

@@ -172,9 +172,11 @@ def _words(chance: random.Random, command: str, n: int) -> list[str]:
     return words
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
+@pytest.mark.parametrize(
+    ("seed", "lines"), [(0, 20), *(pytest.param(seed, 60, marks=pytest.mark.slow) for seed in (1, 2, 3))]
+)
 def test_no_command_line_ends_in_a_traceback(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    seed: int, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Random options with random values: what runs is of one tick, without a figure and a page."""
     monkeypatch.chdir(tmp_path)
@@ -183,7 +185,7 @@ def test_no_command_line_ends_in_a_traceback(
         monkeypatch.setattr(COMMANDS[name], "__call__", lambda self: 0)  # what is typed is read, and no more
     chance = random.Random(seed)
     ran = 0
-    for k in range(50):
+    for k in range(lines):
         if k % 5:
             name, words = "run", ["--figure", "none", "--seconds", "0.02", *_words(chance, "run", chance.randint(1, 2))]
         else:
@@ -203,7 +205,7 @@ def test_no_command_line_ends_in_a_traceback(
             assert [said for said in captured.err.splitlines() if said.startswith("hvf: ")], line
         ran += code == 0
         shutil.rmtree(tmp_path / "runs", ignore_errors=True)
-    assert ran > 5
+    assert ran > 0.1 * lines
 
 
 # ---- runs that are damaged, stopped, or two at a time
@@ -331,7 +333,7 @@ def test_figures_are_printed_as_json(run: Path, tmp_path: Path, capsys: pytest.C
 @pytest.mark.slow
 def test_figures_of_slow_commands_are_printed_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
-    assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["residual_share"] < 0.5
+    assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["root_error"] < 0.1
     assert _json(["arm", "--seconds", "1.5", "--user", "relaxed", "--out", str(tmp_path / "arm")], capsys)["lines"]
     assert _json(["prepare", str(WALK), str(tmp_path / "p.bvh")], capsys)["well_formed"]
     assert _json(["certify", "--clip", "walk", "--out", str(tmp_path / "c")], capsys)["ballistic"]["verdict"]

@@ -15,7 +15,8 @@ PRINTS = {
     "sweep_gains": "k_r = 400 N/m",
     "step_by_step": "half way after",
     "edited_motion": "edited.bvh: 3.0 s",
-    "own_hand": "mm from the river",
+    "own_hand": "she felt",
+    "own_map": "a push bows the trunk",
 }
 
 

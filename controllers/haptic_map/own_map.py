@@ -1,0 +1,122 @@
+"""Maps of one's own in Python, as the compiled tick calls them: by the address of a C function that asks the map.
+
+The tick runs without the GIL; the C function takes it for as long as the map computes a pose.
+"""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+from controllers.errors import ParameterError
+from controllers.rotations import logarithm, multiply
+from controllers.state import Array, Pose
+
+OWN = 8
+_NUMBERS = ctypes.POINTER(ctypes.c_double)
+_CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
+_STEP = 1e-5  # of finite differences [m, rad]: the cube root of rounding, of lengths of some centimetres
+
+
+@intrinsic
+def _call(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: Any, rows: Any) -> Any:
+    """Call ``void (double *x, double *pose, double *jacobian, int64 nq, int64 rows)``; all are given as int64."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer, word = ir.DoubleType().as_pointer(), ir.IntType(64)
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer, pointer, word, word]).as_pointer()
+        place, *arrays, nq, rows = arguments
+        given = [*(builder.inttoptr(array, pointer) for array in arrays), nq, rows]
+        builder.call(builder.inttoptr(place, kind), given)
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 6), generate
+
+
+@njit
+def own_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of a map in Python: the bits of the first parameter are the address of what asks it (see `Asked`)."""
+    place, rows = params.view(np.int64)[0], jacobian.shape[0]
+    _call(place, x.ctypes.data, pose.ctypes.data, jacobian.ctypes.data, pose.shape[0], rows)
+
+
+class Asked:
+    """A map's function as the tick asks it; the first error in it is kept, and the pose then stays what it was.
+
+    Parameters
+    ----------
+    pose, jacobian : callable
+        From a stylus pose (7,) to a configuration (nq,), and to the derivative (nv, 6).
+    start : Pose
+        The configuration until the first is found.
+    """
+
+    def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array], start: Pose):
+        self.error: Exception | None = None
+        self._last = start
+
+        def ask(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
+            try:
+                if self.error is None:
+                    place = np.ctypeslib.as_array(x, (7,)).copy()
+                    self._last = checked_pose(pose(place), nq)
+                    if rows:
+                        np.ctypeslib.as_array(derivative, (rows, 6))[:] = jacobian(place)
+            except Exception as error:  # nothing may leave a C function
+                self.error = error
+            np.ctypeslib.as_array(target, (nq,))[:] = self._last
+
+        self._callback = _CALLBACK(ask)
+        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
+        self.params: Array = np.array([address], dtype=np.int64).view(np.float64)
+
+
+def checked_pose(pose: Any, nq: int) -> Pose:
+    """A configuration of so many finite numbers.
+
+    Raises
+    ------
+    ParameterError
+        If it is not one.
+    """
+    numbers = np.asarray(pose, dtype=np.float64)
+    if numbers.shape != (nq,) or not np.isfinite(numbers).all():
+        raise ParameterError(f"a map of one's own gave a pose of shape {numbers.shape}; expected {nq} finite numbers")
+    return numbers
+
+
+def difference(before: Pose, after: Pose) -> Array:
+    """The tangent that leads from one configuration to another, shape (nv,).
+
+    Root velocity in the world; angular velocity of root and joints in their own frames, as MuJoCo has them.
+    """
+    parts = [after[:3] - before[:3]]
+    for k in range(3, len(before), 4):
+        w, x, y, z = before[k : k + 4]
+        parts.append(np.array(logarithm(*multiply(w, -x, -y, -z, *after[k : k + 4]))))
+    return np.concatenate(parts)
+
+
+def finite_differences(pose: Callable[[Array], Pose], x: Array) -> Array:
+    """Derivative of a map at a stylus pose (7,) by central differences, shape (nv, 6)."""
+    columns: list[Array] = []
+    for k in range(6):
+        before, after = (_moved(x, k, step) for step in (-_STEP, _STEP))
+        columns.append(difference(pose(before), pose(after)) / (2.0 * _STEP))
+    return np.stack(columns, axis=1)
+
+
+def _moved(x: Array, k: int, step: float) -> Array:
+    """A stylus pose moved along, or turned about, an axis of H."""
+    moved = x.copy()
+    if k < 3:
+        moved[k] += step
+        return moved
+    turn = np.zeros(4)
+    turn[0], turn[1 + k - 3] = np.cos(0.5 * step), np.sin(0.5 * step)
+    moved[3:] = multiply(*turn, *x[3:])
+    return moved
