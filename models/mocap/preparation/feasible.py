@@ -32,6 +32,7 @@ _MARGIN = 0.02  # to the joints' limits [rad]
 _STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
 _KNOT, _STEP = 0.05, 0.0125  # of the change and of the instants [s]; 80 and 20 ms cost half, and a run falls
 _TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
+_GOOD, _SURE = 0.25, 1e-2  # share of the promised decrease, and damping, at which a step may be the last
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
 _N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
@@ -123,7 +124,7 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 16, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
+    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
 ) -> Feasible:
     """The nearest motion with these contacts that needs no help.
 
@@ -188,16 +189,19 @@ class _Problem:
         for _ in range(iterations):
             system, g = self._linearised(x)
             for _ in range(12):
-                trial = x - system.solve(g, damping)
-                if (cost := self.cost(self.errors(trial, False), trial)) < costs[-1]:
+                step = system.solve(g, damping)
+                if (cost := self.cost(self.errors(x - step, False), x - step)) < costs[-1]:
                     break
                 damping = max(8.0 * damping, 1e-4)
             else:
                 break
-            x, damping = trial, max(damping / 8.0, 1e-8)
+            # Half of what the linearisation promises at most; where contacts change, it holds only nearby.
+            good = costs[-1] - cost > _GOOD * (g @ step)
+            x = x - step
             costs.append(cost)
-            if costs[-2] - cost < _TOLERANCE * cost:
+            if good and damping < _SURE and costs[-2] - cost < _TOLERANCE * cost:
                 break
+            damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
         return x, costs
 
     def _linearised(self, x: Array) -> tuple[Normal, Array]:
