@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all test-commands test-processes lint format docs bench gate fuzz hil-vm clean
+.PHONY: setup demo test test-all test-commands test-processes lint format docs bench gate fuzz fault-table hil-vm clean
 
 setup: $(READY)
 
@@ -54,6 +54,10 @@ gate: $(READY)
 fuzz: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
 	$(BIN)/python tests/models/mocap/fuzz_readers.py -max_total_time=300
+
+# Injects every fault, and writes the table of docs/validation/fault-matrix.md.
+fault-table: $(READY)
+	$(BIN)/python -m tests.devices.fault_table
 
 # The HID driver on Linux's own hidraw, in a virtual machine whose kernel has uhid; needs qemu-system-x86 and busybox-static.
 hil-vm: $(READY)

@@ -1,6 +1,7 @@
 """Whether a recorded run happens again, bit for bit, from its recorded configuration."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -47,7 +48,7 @@ class _Comparison:
         self._rows[group] += n
 
 
-def _check_map(config: RunConfig, recording: Recording) -> None:
+def check_map(config: RunConfig, recording: Recording) -> None:
     """Refuse a map whose file is not the one that was recorded with."""
     recorded = recording.texts.get("map_sha256")
     if recorded is None:
@@ -61,8 +62,35 @@ def _check_map(config: RunConfig, recording: Recording) -> None:
         )
 
 
-def reproduce(folder: Path) -> int:
-    """Run a recording's configuration again, say whether every tick and frame is the same, and return an exit code.
+@dataclass(frozen=True)
+class Reproduced:
+    """What came of running a recording again.
+
+    Attributes
+    ----------
+    same : bool
+        Whether every tick and frame is, bit for bit.
+    ticks : int
+        How many were compared.
+    differences : dict of str to str
+        The first one of each group of channels.
+    remarks : tuple of str
+        What is other here than where it was recorded.
+    """
+
+    same: bool
+    ticks: int
+    differences: dict[str, str]
+    remarks: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """In words."""
+        found = f"the same, bit for bit, over {self.ticks} ticks and what the figure did"
+        return [*self.remarks, found if self.same else f"not the same: {'; '.join(self.differences.values())}"]
+
+
+def reproduce(folder: Path) -> Reproduced:
+    """Run a recording's configuration again, and compare every tick and frame.
 
     Raises
     ------
@@ -74,28 +102,25 @@ def reproduce(folder: Path) -> int:
     with Recording(folder / RECORDING) as recording:
         if "live" in recording.texts:
             raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
-        _tell_what_is_other(recording.versions)
-        config = config_of(recording)
-        _check_map(config, recording)
+        remarks, config = _others(recording.versions), config_of(recording)
+        check_map(config, recording)
         session = wire(config, clips_of(recording))
         comparison = _Comparison(recording, session)
         recorded_ticks = len(recording.channel("ticks", "t"))
         Loop(session.servo, session.world, comparison).run(recorded_ticks * session.servo.plant.period)
-    if comparison.differences:
-        print(f"not the same: {'; '.join(comparison.differences.values())}")
-        return 1
-    print(f"the same, bit for bit, over {recorded_ticks} ticks and what the figure did")
-    return 0
+    return Reproduced(not comparison.differences, recorded_ticks, comparison.differences, remarks)
 
 
-def _tell_what_is_other(versions: Mapping[str, str]) -> None:
-    """Say which packages, and whether the processor, are others than those of a recording."""
+def _others(versions: Mapping[str, str]) -> tuple[str, ...]:
+    """Which packages, and whether the processor, are others than those of a recording, in words."""
+    said: list[str] = []
     for package, recorded in versions.items():
         if package == "processor":
             here = get_host_cpu_name()
             if here != recorded:
-                print(
+                said.append(
                     f"recorded on a processor {recorded}, this is {here}: libraries round otherwise, expect differences"
                 )
         elif package != "python" and version(package) != recorded:
-            print(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+            said.append(f"recorded with {package} {recorded}, now {version(package)}: expect differences")
+    return tuple(said)

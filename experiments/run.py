@@ -16,6 +16,7 @@ from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
+from experiments.foresight import SIMULATING, check_length, foreseen
 from experiments.results.folder import (
     CONFIG,
     DEFAULT,
@@ -24,6 +25,8 @@ from experiments.results.folder import (
     REPORT,
     SUMMARY,
     check_folder,
+    check_holds,
+    claimed,
     clear_folder,
 )
 from experiments.results.measures import BLOCK_FRAMES, summarise
@@ -33,6 +36,7 @@ from experiments.setups.default_animation import default_poses
 from experiments.setups.parts import Measuring
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
+from experiments.working import keep_seconds
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from models.scene import P_WH
 from sim.loop.clock import RealTime
@@ -74,20 +78,29 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
 
     console = Console(stderr=True)
     check_folder(out, overwrite)
+    check_length(out, config.seconds, config.clock.servo_period)
     session = wire(config, ready=lambda units: compile_once(console, units))
     for remark in session.remarks:
         console.print(remark, highlight=False)
-    clear_folder(out)
     whole = cast(RunConfig, session.config)
-    (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
-    summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
-    write_animations(out, session)
-    (out / SUMMARY).write_text(json_text(asdict(summary) | {"lines": summary.lines()}) + "\n", encoding="utf-8")
-    write_report_of(out)
-    for line in summary.lines():
-        print(line)
+    takes = foreseen(out, whole.seconds, groups(session.servo))
+    if takes is not None:
+        console.print(takes, highlight=False)
+    with claimed(out):
+        check_holds(out, overwrite)
+        clear_folder(out)
+        (out / CONFIG).write_text(to_json(whole), encoding="utf-8")
+        summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
+        write_animations(out, session)
+        write_summary(out, summary)
+        write_report_of(out)
     console.print(f"Written to {out}: {REPORT} (open it in a browser), {EDITED}, {DEFAULT}, {SUMMARY}, {RECORDING}.")
     return summary
+
+
+def write_summary(out: Path, summary: RunSummary) -> None:
+    """Write what happened beside its recording."""
+    (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
 
 
 def record(
@@ -117,7 +130,7 @@ def record(
     with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
-        summary = _measure(out, session, speed)
+        summary = measured(out, session, speed)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     return summary
 
@@ -159,6 +172,7 @@ def _simulate(
 
         times = loop.run(seconds - first, progress)
     page.close()
+    keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
 
 
@@ -170,7 +184,8 @@ def _live_page(session: Session) -> Page:
     return LivePage(session.world.full_model(), courses(static), radius, P_WH, session.world.kind)
 
 
-def _measure(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
+def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
+    """What happened in a session that has been run, from its recording."""
     parts = session.parts
 
     def keep_curve(curve: Trajectory) -> None:

@@ -9,21 +9,25 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.curves.trajectory import Trajectory
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict
 from experiments.config.run_config import ArmConfig
 from experiments.files.json_text import json_text
+from experiments.foresight import check_length
 from experiments.results.arm import ArmSummary, arm_figure, arm_groups, arm_summary, record_arm
 from experiments.results.figures import STYLE
-from experiments.results.folder import RECORDING, REPORT, SUMMARY, check_folder
+from experiments.results.folder import RECORDING, REPORT, SUMMARY, check_folder, check_holds, claimed
 from experiments.results.report import write_report
 from experiments.setups.robot_arm import HOME, SCALE, wire_arm
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import P_WH, ROBOT
 from sim.loop.loop import Loop
+from sim.loop.servo import Servo
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import Target
+from sim.world.robot_world import RobotWorld
 
 FIGURE = "arm.png"
 _TARGET = Target(ROBOT, "robot arm", "h(p, R)", 1.6)
@@ -39,10 +43,29 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     """
     console = Console(stderr=True)
     check_folder(out, overwrite)
+    check_length(out, config.seconds, config.clock.servo_period)
     servo, world, curve = wire_arm(config, lambda units: compile_once(console, units))
-    out.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, SUMMARY, REPORT, FIGURE):
-        (out / name).unlink(missing_ok=True)
+    with claimed(out):
+        check_holds(out, overwrite)
+        for name in (RECORDING, SUMMARY, REPORT, FIGURE):
+            (out / name).unlink(missing_ok=True)
+        summary = _recorded(config, servo, world, curve, out, console)
+        (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
+        with Recording(out / RECORDING) as recording:
+            with mpl.rc_context(STYLE):
+                arm_figure(recording, HOME, SCALE).savefig(out / FIGURE, dpi=150)
+            said = summary.lines()
+            write_report(
+                out / REPORT, recording, world.model, "FOLLOW leads a robot arm", said, [out / FIGURE], _TARGET
+            )
+    console.print(f"Written to {out}: {REPORT} (open it in a browser), {SUMMARY}, {RECORDING}.")
+    return summary
+
+
+def _recorded(
+    config: ArmConfig, servo: Servo, world: RobotWorld, curve: Trajectory, out: Path, console: Console
+) -> ArmSummary:
+    """Run and record; what happened."""
     static: dict[str, npt.ArrayLike | str] = {
         "curve": curve.point(np.linspace(curve.start, curve.end, 241)), "tube_radius": 0.02, "p_WH": P_WH,
         "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
@@ -60,14 +83,4 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
         with Recording(out / RECORDING) as recording:
             summary = arm_summary(recording, world.arm, config, times.real_time_factor)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
-    (out / SUMMARY).write_text(json_text(asdict(summary)) + "\n", encoding="utf-8")
-    with Recording(out / RECORDING) as recording:
-        with mpl.rc_context(STYLE):
-            arm_figure(recording, HOME, SCALE).savefig(out / FIGURE, dpi=150)
-        write_report(
-            out / REPORT, recording, world.model, "FOLLOW leads a robot arm", summary.lines(), [out / FIGURE], _TARGET
-        )
-    for line in summary.lines():
-        print(line)
-    console.print(f"Written to {out}: {REPORT} (open it in a browser), {SUMMARY}, {RECORDING}.")
     return summary

@@ -1,20 +1,18 @@
 """The physical figure on its own, following clips: how well, and with how much help."""
 
 import time
-from dataclasses import asdict
 
 from rich.console import Console
 
 from experiments.compiling import compile_once
-from experiments.files.json_text import json_text
 from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
 from sim.body.tracking import TrackingReport, track
 from sim.compilation.units import Unit
 
 
-def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
-    """Track clips and print a report of each.
+def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> dict[str, TrackingReport]:
+    """Track clips, and report on each by name.
 
     Parameters
     ----------
@@ -22,8 +20,8 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
         Embedded clips or files; all embedded clips if there is none.
     seconds : float
         Simulated time for each [s].
-    as_json : bool
-        Print one JSON object, clip by clip, instead of a line each.
+    raw : bool
+        Take motion files as captured, not prepared.
 
     Raises
     ------
@@ -32,7 +30,7 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
     """
     console = Console(stderr=True)
     names = names or embedded_names()
-    clips, remarks = load_clips(names)
+    clips, remarks = load_clips(names, raw)
     for remark in remarks:
         console.print(remark, highlight=False)
 
@@ -46,8 +44,4 @@ def track_clips(names: tuple[str, ...], seconds: float, as_json: bool) -> None:
         rest = (len(names) - k - 1) * (time.perf_counter() - began) / (k + 1)
         if rest > 0.0:
             console.print(f"{k + 1} of {len(names)} clips tracked, about {rest:.0f} s left", highlight=False)
-    if as_json:
-        print(json_text({name: asdict(report) for name, report in reports.items()}))
-        return
-    for name, report in reports.items():
-        print(f"{name}: {report}")
+    return reports

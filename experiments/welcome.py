@@ -15,6 +15,7 @@ hvf --help lists all commands, hvf COMMAND --help the options of one."""
 def next_step(folder: str) -> str:
     """What can be done with what a run that was stopped has recorded."""
     return (
-        f"what was recorded until then is in {folder}: hvf report {folder} draws it, hvf render {folder} films it, "
+        f"what was recorded until then is in {folder}: hvf report {folder} writes its page, summary and animations, "
+        f"hvf render {folder} films it, "
         f"hvf run --config {folder}/config.json --out NEW runs it again"
     )

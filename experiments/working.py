@@ -49,14 +49,19 @@ def working(what: str, share: float = 1.0) -> Generator[None]:
         How much of it there is, in units of its own, such as clips: time is taken to grow with it.
     """
     console, began = Console(stderr=True), time.perf_counter()
-    seconds = _kept().get(what)
+    seconds = expected_seconds(what)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), _Left(seconds and share * seconds))
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         bar.add_task(what, total=None)
         yield
     taken = time.perf_counter() - began
     if taken > _WORTH_KEEPING:
-        _keep(what, taken / share)
+        keep_seconds(what, taken / share)
+
+
+def expected_seconds(what: str) -> float | None:
+    """How long something took the last time on this machine [s], a unit of it; None if that is not known."""
+    return _kept().get(what)
 
 
 def _file() -> Path:
@@ -75,9 +80,10 @@ def _kept() -> dict[str, float]:
     return {name: float(value) for name, value in items if isinstance(value, int | float) and value > 0.0}
 
 
-def _keep(what: str, seconds: float) -> None:
+def keep_seconds(what: str, seconds: float) -> None:
+    """Keep how long a unit of something took [s]."""
     try:
         _file().parent.mkdir(parents=True, exist_ok=True)
-        _file().write_text(json.dumps(_kept() | {what: round(seconds, 2)}), encoding="utf-8")
+        _file().write_text(json.dumps(_kept() | {what: float(f"{seconds:.3g}")}), encoding="utf-8")
     except OSError:
         return

@@ -5,12 +5,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
 
 import matplotlib.pyplot as plt
 import pytest
 
-from experiments.cli import Command, parsed
+from experiments.cli import COMMANDS, parsed
 from experiments.config.words import config_of_options
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -90,9 +89,6 @@ def _parses(arguments: list[str], line: str) -> None:
     options = getattr(command, "options", None)
     if options is not None and options.config is None:  # the file would be a run's that there has not been
         assert config_of_options(options), line
-
-
-COMMANDS = [get_args(part)[1].name for part in get_args(Command)]
 
 
 def test_the_reference_lists_every_command() -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_docs import COMMANDS, DOCS, PAGES, ROOT, blocks, commands, name
+from experiments.cli import COMMANDS
+from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
 FALLS = ["--clips walk run jump angry", "--clips backflip --governor"]  # pages say so beside them
 EARLIER = {  # what a page takes for granted: another page's result

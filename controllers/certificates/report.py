@@ -3,7 +3,7 @@
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Literal, TypeAlias, cast, get_args
 
 import numpy as np
@@ -60,6 +60,17 @@ class Verdict:
             raise CertificateError(f"a verdict is one of {', '.join(get_args(Outcome))}, got {self.verdict!r}")
         if (self.verdict == "refuted") != bool(self.counterexample):
             raise CertificateError(f"a counterexample goes with what is refuted, and only with it; {self.reason}")
+
+
+def leaving_out(verdict: Verdict, laws: Sequence[str]) -> Verdict:
+    """A verdict on a part of a program, as one on the whole that also executes these laws: no longer certified.
+
+    What is refuted stays so, where the other laws give no force.
+    """
+    named = " and ".join(laws)
+    if verdict.verdict == "refuted":
+        return replace(verdict, assumptions=(*verdict.assumptions, f"where this happens there is no force of {named}"))
+    return replace(verdict, verdict="unknown", reason=f"left out: {named}; without: {verdict.reason}")
 
 
 @dataclass(frozen=True, eq=False)

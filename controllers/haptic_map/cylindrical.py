@@ -11,7 +11,7 @@ from controllers.blending.blend import blend_corrected
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.curves.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.clearance import cleared
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
@@ -92,7 +92,9 @@ class Cylindrical(AnimationMap):
     limbs : sequence of Limb
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
     corrections : Array, shape (n, k, 2 + 4 limbs), optional
-        What a map of the same clips and limbs has as its `corrections`, which then need not be found again.
+        What a map of the same clips, limbs and lap has as its `corrections`, which then need not be found again.
+    lap : float, optional
+        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
 
     Attributes
     ----------
@@ -116,6 +118,7 @@ class Cylindrical(AnimationMap):
         z_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
         corrections: Array | None = None,
+        lap: float | None = None,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -123,7 +126,7 @@ class Cylindrical(AnimationMap):
             )
         self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs, lap)
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
@@ -132,7 +135,7 @@ class Cylindrical(AnimationMap):
             self._correct(self._found(limbs) if corrections is None else corrections)
 
     def _found(self, limbs: Sequence[Limb]) -> Array:
-        rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
+        rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
         channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
         found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
         share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
@@ -174,7 +177,7 @@ class Cylindrical(AnimationMap):
         arrays = {"domain": np.array([self.r_range, self.z_range])}
         if self.limbs:
             arrays["corrections"] = self.corrections
-        return arrays | clip_arrays(self.clips, self.names, self.limbs)
+        return arrays | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Cylindrical":
@@ -189,4 +192,5 @@ class Cylindrical(AnimationMap):
         limbs, corrections = kept_limbs(arrays), None
         if limbs:
             corrections = kept(arrays, "corrections", (None, *correction_shape(len(limbs))))
-        return Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), limbs, corrections)
+        lap = kept_lap(arrays)
+        return Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), limbs, corrections, lap)

@@ -2,12 +2,17 @@
 
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from controllers.certificates.loop.device import Device
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.linkage import Linkage
 from sim.world.world import phantom_angles
+
+Array = npt.NDArray[np.float64]
 
 
 def phantom_device(linkage: Linkage | None = None) -> Device:
@@ -21,6 +26,11 @@ def phantom_device(linkage: Linkage | None = None) -> Device:
         rows = mass_matrix.py_func(theta)
         return tuple(tuple(m + (added[i] if i == j else 0.0) for j, m in enumerate(row)) for i, row in enumerate(rows))
 
+    def numbers(theta: Array) -> tuple[Array, Array]:
+        at = (float(theta[0]), float(theta[1]), float(theta[2]))
+        columns = [vector_to_hand_frame(column) for column in zip(*jacobian(at), strict=True)]
+        return np.array(vector_to_hand_frame(forward_kinematics(at))), np.array(columns).T
+
     p, found = PREMIUM_1_5, linkage or Linkage()
     added = found.inertia
     return Device(
@@ -28,4 +38,5 @@ def phantom_device(linkage: Linkage | None = None) -> Device:
         jacobian=jacobian_H, mass=mass if any(added) else mass_matrix.py_func, coriolis=coriolis_matrix.py_func,
         gravity=gravity_torques.py_func, angles=phantom_angles, viscous=found.viscous,
         coulomb=found.coulomb, encoder_step=p.encoder_step, peak_torque=p.peak_torque,
+        numbers=numbers,
     )  # fmt: skip

@@ -3,8 +3,10 @@
 Nothing here needs CasADi, so a stored certificate is checked without starting it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import cast
 
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.loop.hand import HandRange
@@ -12,10 +14,12 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
 from experiments.config.maps import Composite, Cylindrical, Led, MapFile, RiverClips
 from experiments.config.modes import Lead, Rivers
+from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
-from experiments.setups.certified_law import certified_laws, leading_drag
+from experiments.setups.certified_law import certified_laws, governor_drag, leading_drag, left_out
+from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
@@ -38,7 +42,10 @@ def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
 
 
 def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile) -> dict[str, Trajectory]:
-    return {"": Trajectory.circle(part.around.radius, part.around.lap)}
+    from experiments.setups.pace import course_of
+
+    circle = Trajectory.circle(part.around.radius, part.around.lap)
+    return {"": circle if isinstance(config.mode, Rivers) else course_of(circle, leading_drag(config))}
 
 
 def _curves_of_file(config: RunConfig, part: MapFile) -> dict[str, Trajectory]:
@@ -65,6 +72,31 @@ MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
 def certified_sampling(config: RunConfig, delay: float) -> Sampling:
     """The clock of a run, with a delay of the torques [s]."""
     return Sampling(config.clock.servo_period, delay, config.device.cutoff)
+
+
+def certified_options(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
+    """The numbers that a certificate is of as a person gives them, by option: to say which of them differs.
+
+    Parameters
+    ----------
+    config, delay, hands, push
+        Of `certificate_inputs`.
+    """
+    found = linkage_of(config.device)
+    told: dict[str, object] = {"coulomb": found.coulomb, "viscous": found.viscous, "inertia": found.inertia}
+    for part in (config.mode, config.map, config.device, config.clock):
+        told |= _leaves(to_dict(part))
+    for unused in ("kind", "device_file", "physics_step"):
+        del told[unused]
+    chosen = {"mode": config.mode.kind, "map": config.map.kind, "delay": delay, "hand_push": push}
+    return told | chosen | {f"hand_{name}": value for name, value in asdict(hands).items()}
+
+
+def _leaves(values: Mapping[str, object]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for name, value in values.items():
+        found |= _leaves(cast(Mapping[str, object], value)) if isinstance(value, Mapping) else {name: value}
+    return found
 
 
 def certificate_inputs(
@@ -94,7 +126,9 @@ def certificate_inputs(
     """
     sampling, mode = certified_sampling(config, delay), config.mode
     return {
-        "gains": certified_laws(config),
+        # Every parameter of every law, those that no certificate covers too.
+        "gains": (certified_laws(config), resolved(config).mode),
+        "added": config.map if left_out(config) or governor_drag(config) else None,
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
         "curve": certified_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
@@ -103,7 +137,8 @@ def certificate_inputs(
         "period": sampling.period,
         "delay": sampling.delay,
         "filter": sampling.cutoff,
-        "device": (PREMIUM_1_5, linkage_of(config.device)) if config.device.device_file else PREMIUM_1_5,
+        # Where the encoders' zero is changes with every calibration, and no verdict.
+        "device": (PREMIUM_1_5, replace(linkage_of(config.device), offset=(0.0, 0.0, 0.0))),
         "hand": hands,
         "push": push,
         "code": code_inputs(),

@@ -2,37 +2,47 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from controllers.certificates.flight.tolerance import JUDGING, Judging
 from controllers.certificates.loop.energy import energy
+from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS
 from controllers.certificates.loop.passivity import passivity
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import River
 from controllers.certificates.region.region import region
-from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of
+from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, leaving_out
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
 from experiments.certify.certified_clips import certify_clips
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.certified_field import certificate_inputs, certified_curves, certified_sampling
+from experiments.certify.certified_field import (
+    certificate_inputs,
+    certified_curves,
+    certified_options,
+    certified_sampling,
+)
 from experiments.certify.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certify.certified_rivers import certify_rivers
+from experiments.certify.executed_field import walled
 from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
-from experiments.files.certificate_files import clip_inputs, read_certificate
+from experiments.files.certificate_files import OPTIONS, clip_inputs, read_certificate
 from experiments.files.device_files import linkage_of
+from experiments.files.json_text import json_text
 from experiments.flights.ballistics import clip_ballistics
-from experiments.setups.certified_law import certified_laws
+from experiments.setups.certified_law import certified_laws, governor_drag, left_out
 from experiments.setups.clips import load_clips
 from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
+_MOMENT = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"
 PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
@@ -44,7 +54,7 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     Raises
     ------
     ParameterError
-        If there is no certificate for the run's mode, or a number is out of its interval.
+        If a number is out of its interval.
     """
     curves, sampling = certified_curves(config), certified_sampling(config, delay)
     device = phantom_device(linkage_of(config.device))
@@ -54,16 +64,23 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     }
 
 
-def certify(rivers: Mapping[str, River], hands: HandRange, push: float) -> dict[str, Verdict]:
-    """Stability and region with hands within intervals, passivity; and the bound for a push [N], FOLLOW's alone."""
+def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:
+    """Stability and region with hands within intervals, passivity; and the bound for a push [N], FOLLOW's alone.
+
+    `drag` [N s/m] is that of a governor beside the first law.
+    """
     verdicts: dict[str, Verdict] = {}
     for name, river in rivers.items():
-        verdicts["stability" + name] = stability(river, hands.hands())
+        verdicts["stability" + name] = governed_stability(river, drag, hands.hands())
         verdicts["passivity" + name] = passivity(river)
         ceiling = ForceLimiter(river.sampling.period).peak
         verdicts["region" + name] = region(river, hands, ceiling, verdicts["stability" + name])
         if river.law is FOLLOW_LAW:
             verdicts["energy" + name] = energy(river, push, ceiling)
+    if drag > 0.0:
+        for name in verdicts:
+            if name.startswith(("energy", "region")):
+                verdicts[name] = leaving_out(verdicts[name], ("the governor (--governor)",))
     return verdicts
 
 
@@ -83,7 +100,8 @@ def certify_into(
     config : RunConfig
         Of the run.
     out : Path
-        Folder; written are ``certificate.json``, ``certificate.html``, ``stability.png``, ``region.png``.
+        Folder; written are ``certificate.json``, ``certificate.html``, ``certified.json`` (the options),
+        ``stability.png``, ``region.png``.
     delay : float
         Of the torques [s].
     hands : HandRange, optional
@@ -113,6 +131,7 @@ def certify_into(
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
         plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
     _write(certificate, plots, out)
+    (out / OPTIONS).write_text(json_text(certified_options(config, delay, hands, push)) + "\n", encoding="utf-8")
     return certificate
 
 
@@ -133,7 +152,7 @@ def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certi
     ModelError
         If there is no such clip, or the file cannot be read.
     """
-    (clip,), remarks = load_clips([name])
+    (clip,), remarks = load_clips([name], raw=True)
     held = _held(out, clip_inputs(clip, judging))
     if held is not None:
         return held
@@ -176,11 +195,18 @@ def _field_verdicts(
         device, sampling = phantom_device(linkage_of(config.device)), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
         return main, certify_leading(field, curve, device, sampling, hands)
-    rivers = certified_rivers(config, delay)
-    verdicts, main = certify(rivers, hands, push), rivers[""]
+    rivers, drag, missing = certified_rivers(config, delay), governor_drag(config), left_out(config)
+    verdicts, main = certify(rivers, hands, push, drag), rivers[""]
     if isinstance(config.mode, Rivers):
-        return main, verdicts | certify_rivers(config, config.mode, main, hands, push, certified_curves(config))
-    for name, curve in certified_curves(config).items():
-        if name:
-            verdicts["stability" + name] = stability(main._replace(curve=curve), hands.hands())
+        verdicts |= certify_rivers(config, config.mode, main, hands, push, certified_curves(config))
+    else:
+        for name, curve in certified_curves(config).items():
+            if name:
+                verdicts["stability" + name] = governed_stability(main._replace(curve=curve), drag, hands.hands())
+    if getattr(config.mode, "orientation", None) is not None:
+        verdicts = {name: replace(it, assumptions=(*it.assumptions, _MOMENT)) for name, it in verdicts.items()}
+    if missing:
+        verdicts = {name: leaving_out(verdict, missing) for name, verdict in verdicts.items()}
+    if getattr(config.mode, "walls", None) is not None and verdicts["stability"].verdict != "refuted":
+        verdicts["stability"] = walled(config, main, verdicts["stability"], hands, clips)
     return main, verdicts

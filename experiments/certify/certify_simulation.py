@@ -1,22 +1,29 @@
 """Certificates of a simulation from Python: of its very field, laws of one's own included."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from controllers.certificates.loop.added_laws import with_added
+from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict, hash_of
 from controllers.errors import ControllerError
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.function_law import FunctionLaw
+from controllers.fields.governor import Governor
 from controllers.fields.instructions import Join
 from controllers.fields.law import Law
+from controllers.fields.orientation import Orientation
 from experiments.certify.certified_device import phantom_device
+from experiments.certify.executed_field import seen
+from experiments.files.device_files import linkage_of
 from experiments.simulation import Simulation
 
 
@@ -40,17 +47,19 @@ class SimulationCertificate:
 
 
 class _Parts(NamedTuple):
-    """The law that drives along a curve, and the others, whose forces are added."""
+    """The law that drives along a curve, those whose forces are added, and the drag of a governor."""
 
     leading: Follow | Bunny
     added: tuple[FunctionLaw, ...]
+    drag: float
 
 
 def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0) -> SimulationCertificate:
     """Say what is certain of a simulation's field: certified, refuted with a counterexample, or unknown with why.
 
-    The field may be FOLLOW or a bunny, alone or with laws of one's own added, and cut to a force. What else it is made
-    of makes the verdicts unknown, by name.
+    The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and laws of one's own added,
+    and cut to a force. What else it is made of makes the verdicts unknown, by name; then the program itself is looked
+    at about the curve, and stability is refuted where it is unstable.
 
     Parameters
     ----------
@@ -64,29 +73,41 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
     try:
-        river, assumed = _river(sim, delay)
+        river, drag, assumed = _river(sim, delay)
     except ControllerError as error:
         unknown = Verdict("unknown", str(error))
-        return SimulationCertificate(unknown, unknown, inputs)
+        return SimulationCertificate(_seen(sim, delay, unknown, hands), unknown, inputs)
     return SimulationCertificate(
-        _assuming(stability(river, hands.hands()), assumed), _assuming(passivity(river), assumed), inputs
+        _assuming(governed_stability(river, drag, hands.hands()), assumed), _assuming(passivity(river), assumed), inputs
     )
 
 
-def _river(sim: Simulation, delay: float) -> tuple[River, tuple[str, ...]]:
+def _seen(sim: Simulation, delay: float, unknown: Verdict, hands: HandRange) -> Verdict:
+    """What the program does about the map's curve, where no certificate covers it."""
+    around, reach = (getattr(sim.haptic_map, name, None) for name in ("around", "reach"))
+    if around is None or reach is None:
+        return unknown
+    sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
+    place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), around, phantom_device(linkage_of(sim.device)), sampling)
+    return seen(sim.field.program(), place, reach, unknown, hands)
+
+
+def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]]:
     parts, assumed = _parts_of(sim.field)
     if parts.added:
         assumed += ("the critical gain is one by which the whole field is scaled, laws of one's own included",)
     law, curve = parts.leading, parts.leading.curve
     if isinstance(law, Follow):
-        base, width = FOLLOW_LAW, law.epsilon
+        base, (k_r, b_d, width) = FOLLOW_LAW, (law.k_r, law.b_d, law.epsilon)
     else:
-        # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
-        base, width = (BUNNY_LAW, law.delta) if law.attraction == "point" else (FOLLOW_LAW, float("inf"))
+        base, (k_r, b_d, width) = BUNNY_LAW, law.felt
+        if law.attraction == "along":
+            # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
+            base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
-    return River(
-        with_added(base, parts.added, law.k_r), law.k_r, law.b_d, width, curve, phantom_device(), sampling
-    ), assumed
+    device = phantom_device(linkage_of(sim.device))
+    made = River(with_added(base, parts.added, k_r), k_r, b_d, width, curve, device, sampling)
+    return made, parts.drag, assumed
 
 
 def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:
@@ -98,15 +119,18 @@ def _parts_of(field: Law) -> tuple[_Parts, tuple[str, ...]]:
             raise ControllerError("no certificate is known of a field that is gated or blended by a weight")
     leading = [law for law in program.laws if isinstance(law, Follow | Bunny)]
     added = tuple(law for law in program.laws if isinstance(law, FunctionLaw))
-    others = [type(law).__name__ for law in program.laws if law not in leading and law not in added]
-    if len(leading) != 1 or others:
+    governors = [law for law in program.laws if isinstance(law, Governor)]
+    if any(isinstance(law, Orientation) for law in program.laws):
+        assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
+    known = (Follow, Bunny, FunctionLaw, Governor, Orientation)
+    others = [type(law).__name__ for law in program.laws if not isinstance(law, known)]
+    if len(leading) != 1 or others or len(governors) > 1:
         names = ", ".join(others) or ", ".join(type(law).__name__ for law in leading) or "no law along a curve"
         raise ControllerError(f"a certificate is of one FOLLOW or bunny, and laws of one's own; the field has {names}")
-    return _Parts(leading[0], added), tuple(assumed)
+    if governors and not np.array_equal(governors[0].curve.packed(), leading[0].curve.packed()):
+        raise ControllerError("a governor is certified on the curve of the law beside it; it has another one")
+    return _Parts(leading[0], added, sum(law.drag for law in governors)), tuple(assumed)
 
 
 def _assuming(verdict: Verdict, assumed: tuple[str, ...]) -> Verdict:
-    return Verdict(
-        verdict.verdict, verdict.reason, verdict.margin, verdict.assumptions + assumed, verdict.counterexample,
-        verdict.figures,
-    )  # fmt: skip
+    return replace(verdict, assumptions=verdict.assumptions + assumed)

@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import Outcome, hash_of
+from controllers.certificates.report import Outcome, hash_of, leaving_out
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
+from experiments.setups.certified_law import governor_drag, left_out
 from experiments.setups.defaults import resolved
 from sim.compilation.compiled import CACHE_FOLDER
 
@@ -59,13 +60,16 @@ def kept_stability(config: RunConfig) -> Stability:
 
 
 def _found(config: RunConfig, hands: HandRange) -> Stability:
-    from controllers.certificates.loop.stability import stability  # brings CasADi
+    from controllers.certificates.loop.governed import governed_stability  # brings CasADi
     from experiments.certify.certify import certified_rivers
 
     try:
-        verdicts = [stability(river, hands.hands()) for river in certified_rivers(config).values()]
+        rivers, drag, missing = certified_rivers(config), governor_drag(config), left_out(config)
+        verdicts = [governed_stability(river, drag, hands.hands()) for river in rivers.values()]
     except ControllerError as error:
         return Stability("unknown", None, str(error))
+    if missing:
+        verdicts = [leaving_out(verdict, missing) for verdict in verdicts]
     worst = max(verdicts, key=lambda verdict: _SEVERITY.index(verdict.verdict))
     margin = min(verdict.margin for verdict in verdicts if verdict.margin is not None)
     return Stability(worst.verdict, margin, worst.reason)

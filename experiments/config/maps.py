@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.config.part import above, part
+from experiments.config.part import above, at_least, part
 
 
 @part
@@ -14,12 +14,12 @@ class Circle:
     Parameters
     ----------
     lap : float
-        Time of a lap [s].
+        Time of a lap [s]; in less than a tenth of a second no hand goes round.
     radius : float
-        [m]
+        Of the circle [m].
     """
 
-    lap: float = above(0.0, default=4.0, unit="s")
+    lap: float = at_least(0.1, default=4.0, unit="s")
     radius: float = above(0.0, default=0.0477, unit="m")
 
 
@@ -37,10 +37,13 @@ class Cylindrical:
         Half width of the map's domain about the curve, in radius and in height [m].
     expressive : bool
         Whether the figure looks where the stylus points, and leans as it leans.
+    raw : bool
+        Whether motion files are taken as captured; by default they are prepared once, as by `hvf prepare`.
     """
 
     kind: Literal["cylindrical"] = "cylindrical"
     clips: tuple[str, ...] = ("squat_dance", "cheer", "angry", "spin")
+    raw: bool = False
     around: Circle = Circle()
     reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
@@ -56,10 +59,13 @@ class Composite:
         Lower body, upper body inside, upper body outside; fewer are repeated.
     around, reach, expressive
         As in `Cylindrical`.
+    raw : bool
+        As in `Cylindrical`.
     """
 
     kind: Literal["composite"] = "composite"
     clips: tuple[str, ...] = ("squat_dance", "angry", "cheer")
+    raw: bool = False
     around: Circle = Circle()
     reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
@@ -75,10 +81,13 @@ class RiverClips:
         Of the level river, the wave, and the high one; fewer are repeated.
     around, reach, expressive
         As in `Cylindrical`.
+    raw : bool
+        As in `Cylindrical`.
     """
 
     kind: Literal["rivers"] = "rivers"
     clips: tuple[str, ...] = ("squat_dance", "cheer", "angry")
+    raw: bool = False
     around: Circle = Circle()
     reach: float = above(0.0, default=0.025, unit="m")
     expressive: bool = False
@@ -111,6 +120,11 @@ class MapFile:
         """None by name: those of the file count."""
         return ()
 
+    @property
+    def raw(self) -> bool:
+        """Those of the file are as they are."""
+        return True
+
 
 @part
 class Led:
@@ -120,10 +134,13 @@ class Led:
     ----------
     clips : tuple of str
         One clip that travels.
+    raw : bool
+        As in `Cylindrical`.
     """
 
     kind: Literal["led"] = "led"
     clips: tuple[str, ...] = ("walk",)
+    raw: bool = False
 
 
 Map = Annotated[Cylindrical | Composite | RiverClips | MapFile | Led, Field(discriminator="kind")]

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from experiments.config.part import above, at_least, part
 
+STIFFEST, MOST_DAMPED = 1e6, 1e4  # [N/m], [N s/m] no device gives more, and certificates search no further
+
 
 @part
 class OrientationMoment:
@@ -14,9 +16,9 @@ class OrientationMoment:
     Parameters
     ----------
     orientation_stiffness : float
-        [N m/rad]
+        Of the moment towards the curve's orientation [N m/rad].
     orientation_damping : float
-        [N m s/rad]
+        Of the stylus's turning with respect to the curve's [N m s/rad].
     """
 
     orientation_stiffness: float = at_least(0.0, default=0.0, unit="N m/rad")
@@ -33,7 +35,7 @@ class SpeedGovernor:
         Of the hand's speed beyond what is admissible [N s/m].
     """
 
-    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m")
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
 
 
 @part
@@ -72,8 +74,8 @@ class Follow:
     """
 
     kind: Literal["follow"] = "follow"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
@@ -92,8 +94,8 @@ class Bunny:
         b_d [N s/m].
     bunny_width : float
         δ of its Gaussian [m].
-    bunny_attraction : {"point", "along"}
-        To the bunny itself, or to the curve beside the hand.
+    bunny_attraction : {"point", "along", "convolution"}
+        To the bunny itself, or to the curve beside the hand; or to the bunny as the paper writes it, convolved.
     bunny_pace : {"clock", "wait"}
         Whether it keeps the clock's pace, or waits for the hand.
     orientation, governor, walls
@@ -101,10 +103,10 @@ class Bunny:
     """
 
     kind: Literal["bunny"] = "bunny"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     bunny_width: float = at_least(1e-4, default=0.05, unit="m")
-    bunny_attraction: Literal["point", "along"] = "point"
+    bunny_attraction: Literal["point", "along", "convolution"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
@@ -131,8 +133,8 @@ class Rivers:
     """
 
     kind: Literal["rivers"] = "rivers"
-    stiffness: float | None = above(0.0, default=None, unit="N/m")
-    damping: float | None = above(0.0, default=None, unit="N s/m")
+    stiffness: float | None = above(0.0, default=None, unit="N/m", most=STIFFEST)
+    damping: float | None = above(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
     river_tube: float = at_least(1e-4, default=0.015, unit="m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     orientation: OrientationMoment | None = None
@@ -152,6 +154,9 @@ class Stretch:
         k_s of a held or pushed tube [N/m].
     tube_damping : float, optional
         Of the search and of the tube [N s/m]; by default 14, and 20 on a map from a file.
+    rubber_from : {"curve", "stylus"}
+        Where a held tube pulls to: the point of the curve that was taken hold of, or, as in the paper, the place of the
+        stylus when it did so.
     rubber_tube : float
         Radius of the tube that can be held and pushed [m].
     bump : float
@@ -161,9 +166,10 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, default=None, unit="N/m")
-    rubber: float = at_least(0.0, default=150.0, unit="N/m")
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
     walls: JointWalls | None = None
@@ -175,7 +181,7 @@ class StretchThenFollow:
 
     Parameters
     ----------
-    seek, rubber, tube_damping, rubber_tube, bump
+    seek, rubber, tube_damping, rubber_from, rubber_tube, bump
         As in `Stretch`.
     stiffness, damping, tube
         Of the performance, as in `Follow`.
@@ -184,13 +190,14 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, default=None, unit="N/m")
-    rubber: float = at_least(0.0, default=150.0, unit="N/m")
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m")
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     walls: JointWalls | None = None
 
@@ -206,12 +213,12 @@ class Lead:
     damping : float
         Of the hand [N s/m].
     floor_scale : float, optional
-        Metres of floor for one of the stylus; by default such that the figure goes along the default S in 5 s.
+        Metres of floor for one of the stylus [1]; by default such that the figure goes along the default S in 5 s.
     """
 
     kind: Literal["lead"] = "lead"
-    leash: float = at_least(0.0, default=120.0, unit="N/m")
-    damping: float = at_least(0.0, default=8.0, unit="N s/m")
+    leash: float = at_least(0.0, default=120.0, unit="N/m", most=STIFFEST)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     floor_scale: float | None = at_least(1e-3, default=None)
 
 

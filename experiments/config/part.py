@@ -13,25 +13,28 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from controllers.errors import ParameterError
 
 _Part = TypeVar("_Part")
+MOST = 1e15
+"""No number of a part is larger, in SI units: its square, and that of a difference, is still a number."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="constants", arbitrary_types_allowed=True)
 
 
-def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False) -> Any:
-    """Number of a part that is `least` or more, by default finite; `unit` is for messages.
+def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
+    """Number of a part that is `least` or more, at most `most`, by default finite; `unit` is for messages.
 
     Without a default it stands in the annotation, where the command line is to find the default itself.
     """
-    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
+    limit = {} if infinite else {"le": most}
+    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit}, **limit)
 
 
-def whole(least: int, *, default: Any = ...) -> Any:
-    """Whole number of a part from `least` on, within what a file's 64 bits hold."""
-    return Field(default=default, ge=least, lt=2**63)
+def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
+    """Whole number of a part from `least` on, by default within what a file's 64 bits hold."""
+    return Field(default=default, ge=least, lt=below)
 
 
-def above(least: float, *, default: Any = ..., unit: str = "") -> Any:
-    """Number of a part that is greater than `least`, and finite."""
-    return Field(default=default, gt=least, allow_inf_nan=False, json_schema_extra={"unit": unit})
+def above(least: float, *, default: Any = ..., unit: str = "", most: float = MOST) -> Any:
+    """Number of a part that is greater than `least`, at most `most`, and finite."""
+    return Field(default=default, gt=least, le=most, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
@@ -103,6 +106,8 @@ def one_line(error: ValidationError, cls: type) -> str:
         within = _within(cls, place[:-1])
         known = ", ".join(field.name for field in fields(cast(Any, within)))
         return f"{'.'.join(map(str, place))} is not known; expected some of {known}"
+    if kind == "less_than_equal":
+        return f"{option} is {float(first['input']):g}; expected at most {context['le']:g}{unit}"
     if kind == "less_than":
         return f"{option} is {first['input']}; expected less than {context['lt']}"
     if kind == "literal_error":

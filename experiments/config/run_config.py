@@ -5,10 +5,11 @@ from typing import Annotated, Literal
 
 from controllers.errors import ParameterError
 from experiments.config.maps import Cylindrical, Map
-from experiments.config.modes import Follow, Mode
+from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
+from sim.body.figure_state import FigureGains
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
@@ -71,15 +72,19 @@ class Figure:
         In the physics, with torques and contacts; the animation itself, evaluated and recorded, which is faster; or the
         device alone, for tuning.
     stature : float
-        [m]
+        Height of the figure [m].
     mass : float
-        [kg]
+        Of the figure [kg].
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
     figure_ticks : int
         Servo ticks between two updates of the figure, between which a foot may land.
     blend : float
         Time in which one clip goes over into another [s].
+    residual_force : float
+        Largest force at the root beside ground and joints, as a share of body weight; 0: none.
+    residual_moment : float
+        Largest such moment, as a share of body weight × stature.
     """
 
     kind: FigureKind = "physical"
@@ -88,6 +93,8 @@ class Figure:
     smoothing: float = above(0.0, default=6.0, unit="Hz")
     figure_ticks: int = whole(1, default=2)
     blend: float = at_least(0.0, default=0.4, unit="s")
+    residual_force: float = at_least(0.0, default=FigureGains().force_bound)
+    residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
 
 
 @part
@@ -202,8 +209,8 @@ class ArmConfig:
     user: Literal["relaxed", "push"] = "push"
     seconds: Annotated[float, at_least(1.5, unit="s")] = 12.0
     seed: Annotated[int, whole(0)] = 1
-    stiffness: Annotated[float, at_least(0.0, unit="N/m")] = 300.0
-    damping: Annotated[float, at_least(0.0, unit="N s/m")] = 8.0
+    stiffness: Annotated[float, at_least(0.0, unit="N/m", most=STIFFEST)] = 300.0
+    damping: Annotated[float, at_least(0.0, unit="N s/m", most=MOST_DAMPED)] = 8.0
     tube: Annotated[float, at_least(1e-4, unit="m", infinite=True)] = 0.25
     lap: Annotated[float, above(0.0, unit="s")] = 4.0
     radius: Annotated[float, above(0.0, unit="m")] = 0.05

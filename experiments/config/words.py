@@ -8,7 +8,7 @@ import types
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Union, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import tyro
@@ -73,6 +73,15 @@ def _plain(hint: Any) -> Any:
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(inner for inner in get_args(hint) if inner is not type(None))
     return hint if hint is bool or get_origin(hint) is tuple else hint | None
+
+
+def _metavar(kind: Any) -> str | None:
+    """What stands for a value in the help: a type or the choices, without the None of what need not be given."""
+    inner = [k for k in get_args(kind) if k is not type(None)] if type(None) in get_args(kind) else []
+    if not inner:
+        return None
+    choices = get_args(inner[0]) if get_origin(inner[0]) is Literal else ()
+    return "{" + ",".join(map(str, choices)) + "}" if choices else inner[0].__name__.upper()
 
 
 VOCABULARY = _vocabulary()
@@ -213,7 +222,8 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     """Fields of the options' dataclass."""
 
     def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any]:
-        return name, Annotated[kind, tyro.conf.arg(help=text, help_behavior_hint="")], field(default=default)
+        shown = tyro.conf.arg(help=text, help_behavior_hint="", metavar=_metavar(kind))
+        return name, Annotated[kind, shown], field(default=default)
 
     top = _parameters(RunConfig)
     yield option("config", Path | None, "A configuration in a JSON file; other options change it.", None)
@@ -232,6 +242,8 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
 
 RunOptions = make_dataclass("RunOptions", list(_options()), frozen=True)
 """The options of a run as the command line takes them; all but those of its parts are left out."""
+Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="run")]  # pyright: ignore
+"""The same for a command that has them among its own."""
 
 
 def config_of_options(options: object) -> RunConfig:

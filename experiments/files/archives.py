@@ -1,6 +1,7 @@
 """Named arrays in a NumPy archive that says what they are, and in which version of the format."""
 
 import zipfile
+import zlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from controllers.state import Array
 from sim.errors import SimError
 
 VERSION = 1
+_MAKERS = {"map": "hvf lift", "field": "save_field"}
 
 
 def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
@@ -56,8 +58,8 @@ def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, di
             arrays: dict[str, Array] = {str(key): archive[str(i)] for i, key in enumerate(archive["keys"])}
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a {what}") from None
-    except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile) as error:
-        raise SimError(f"{path}: is no file of a {what}, or damaged ({error})") from None
+    except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+        raise SimError(f"{path}: is no file of a {what}, or damaged; expected what {_MAKERS[what]} writes") from None
     if version != VERSION:
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
     if kind not in kinds:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from controllers.certificates.flight.tolerance import Judging
 from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
+from experiments.files.json_text import json_text
 from models.mocap.clip import Clip
 from sim.compilation.compiled import source_hash
 
@@ -42,6 +43,21 @@ def read_certificate(file: Path) -> Certificate:
         raise CertificateError(f"{file}: cannot be opened ({error.strerror}); expected a certificate.json") from None
     except (ValueError, RecursionError) as error:
         raise CertificateError(f"{file}: {error}") from None
+
+
+OPTIONS = "certified.json"
+"""Beside a certificate: the options that it was made with."""
+
+
+def changed_options(file: Path, options: Mapping[str, object]) -> str:
+    """Which options the certificate of a file was made with otherwise, in words; empty if that is not known."""
+    try:
+        certified = json.loads((file.parent / OPTIONS).read_text(encoding="utf-8"))
+        here = json.loads(json_text(options))
+        differ = [name for name in (*certified, *here) if certified.get(name) != here.get(name)]
+    except (OSError, ValueError, AttributeError):
+        return ""
+    return ", ".join(f"{name} {certified.get(name)} (here {here.get(name)})" for name in dict.fromkeys(differ))
 
 
 def verify_certificate(file: Path, inputs: Mapping[str, object]) -> Certificate:

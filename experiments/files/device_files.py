@@ -1,33 +1,92 @@
-"""Device files: what `hvf hardware identify` found of a device, for simulation, certificates and hardware runs."""
+"""Device files: what was found of a device, for simulation, certificates and hardware runs.
+
+`hvf hardware calibrate` writes where its encoders' zero is, and of which device; `hvf hardware identify` its friction,
+inertia, delay and weights. Each leaves to the file what the other found; what a file does not tell is as published.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom
 from experiments.files.json_text import json_text
+from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified
-from sim.world.linkage import Linkage
+from sim.world.linkage import Linkage, Triple
 
 _TRIPLES = ("coulomb", "viscous", "inertia")
 _FORMAT = "hvf-device-1"
 
 
-def device_json(found: Identified, recordings: Sequence[str]) -> dict[str, object]:
-    """A device file's content: each quantity with its value and the half of its interval, in SI units."""
+class Calibration(NamedTuple):
+    """Whose encoders' zero a device file has.
+
+    Attributes
+    ----------
+    name, serial : str
+        Of the device.
+    power_up : int
+        See `sim.devices.driver.DeviceIdentity`.
+    """
+
+    name: str
+    serial: str
+    power_up: int
+
+    def why_not(self, identity: DeviceIdentity) -> str:
+        """Why it is not the zero of this device now; empty if it is."""
+        if (self.name, self.serial) != (identity.name, identity.serial):
+            return f"is calibrated for {self.name} {self.serial}".rstrip()
+        if self.power_up != identity.power_up and not identity.calibrated:
+            return "was calibrated before the device was switched off, and its encoders count from where they wake up"
+        return ""
+
+
+def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[str, object]) -> dict[str, object]:
+    """A device file's content with what was found: each quantity with its value and half of its interval, SI units.
+
+    Parameters
+    ----------
+    found : Identified
+        Its offsets are of readings from which those of `base` had been taken off.
+    recordings : sequence of str
+        What it was found in.
+    base : mapping
+        Content of the file that the recorded runs were made with; empty where there was none.
+    """
     values, margins = (dict(zip(NAMES, numbers.tolist(), strict=True)) for numbers in (found.values, found.margins))
 
     def entry(names: Sequence[str]) -> dict[str, object]:
         return {"value": [values[name] for name in names], "margin": [margins[name] for name in names]}
 
+    taken_off = linkage_from(base).offset
+    first = cast(dict[str, list[float]], base.get("offset", {"margin": [None]}))["margin"][0]
     return {
+        **base,
         "format": _FORMAT,
         **{quantity: entry([f"{quantity}{i}" for i in (1, 2, 3)]) for quantity in _TRIPLES},
-        "delay": entry(["delay"]), "offset": entry(["offset2", "offset3"]), "weight": entry(["weight2", "weight3"]),
+        "delay": entry(["delay"]),
+        "offset": {
+            "value": [taken_off[0], taken_off[1] + values["offset2"], taken_off[2] + values["offset3"]],
+            "margin": [first, margins["offset2"], margins["offset3"]],
+        },
+        "weight": entry(["weight2", "weight3"]),
         "windows": found.windows, "unexplained": found.unexplained, "recordings": list(recordings),
     }  # fmt: skip
+
+
+def calibrated_json(
+    offset: Sequence[float], margin: Sequence[float], identity: DeviceIdentity, base: Mapping[str, object]
+) -> dict[str, object]:
+    """A device file's content with the zero of its encoders [rad], shape (3,) each; all else is the `base`'s."""
+    return {
+        **base,
+        "format": _FORMAT,
+        "offset": {"value": list(offset), "margin": list(margin)},
+        "calibration": Calibration(identity.name, identity.serial, identity.power_up)._asdict(),
+    }
 
 
 def save_device(content: Mapping[str, object], path: Path) -> None:
@@ -35,8 +94,8 @@ def save_device(content: Mapping[str, object], path: Path) -> None:
     path.write_text(json_text(content) + "\n", encoding="utf-8")
 
 
-def load_device(path: Path) -> Linkage:
-    """What a device file says the linkage is; what cannot be, such as a friction below zero, is taken as zero.
+def read_device_file(path: Path) -> dict[str, Any]:
+    """A device file's content.
 
     Raises
     ------
@@ -44,20 +103,53 @@ def load_device(path: Path) -> Linkage:
         If the file cannot be read, or is no device file.
     """
     try:
-        content = cast(dict[str, dict[str, list[float]]], json.loads(path.read_text(encoding="utf-8")))
-        if content["format"] != _FORMAT:  # pyright: ignore[reportUnnecessaryComparison]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["format"] != _FORMAT:
             raise KeyError(f"format {content['format']!r}")
-        coulomb, viscous, inertia = ([float(x) for x in content[name]["value"]] for name in _TRIPLES)
-        second, third = (float(x) for x in content["offset"]["value"])
-        delay = max(0.0, float(content["delay"]["value"][0]))
+        linkage_from(content)
+        calibration_from(content)
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected a device file") from None
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise SimError(f"{path}: no device file ({error}); expected what hvf hardware identify writes") from None
-    a, b, c = (max(0.0, x) for x in coulomb)
-    u, v, w = (max(0.0, x) for x in viscous)
-    i, j, k = inertia
-    return Linkage((a, b, c), (u, v, w), (i, j, k), delay, (0.0, second, third))
+        raise SimError(
+            f"{path}: no device file ({error}); expected what hvf hardware identify or calibrate writes"
+        ) from None
+    return cast(dict[str, Any], content)
+
+
+def linkage_from(content: Mapping[str, Any]) -> Linkage:
+    """What a content says the linkage is; what cannot be, such as a friction below zero, is taken as zero."""
+    published = Linkage()
+
+    def three(name: str, least: float, otherwise: Triple) -> Triple:
+        if name not in content:
+            return otherwise
+        a, b, c = (max(least, float(x)) for x in content[name]["value"])
+        return a, b, c
+
+    return Linkage(
+        three("coulomb", 0.0, published.coulomb), three("viscous", 0.0, published.viscous),
+        three("inertia", -float("inf"), published.inertia),
+        max(0.0, float(content["delay"]["value"][0])) if "delay" in content else 0.0,
+        three("offset", -float("inf"), published.offset),
+    )  # fmt: skip
+
+
+def calibration_from(content: Mapping[str, Any]) -> Calibration | None:
+    """Whose zero a content has; None if it has none."""
+    told = content.get("calibration")
+    return Calibration(str(told["name"]), str(told["serial"]), int(told["power_up"])) if told else None
+
+
+def content_of(device: Phantom) -> dict[str, Any]:
+    """Content of a run's device file; empty where it has none.
+
+    Raises
+    ------
+    SimError
+        As `read_device_file`.
+    """
+    return read_device_file(Path(device.device_file)) if device.device_file else {}
 
 
 def linkage_of(device: Phantom) -> Linkage:
@@ -66,6 +158,6 @@ def linkage_of(device: Phantom) -> Linkage:
     Raises
     ------
     SimError
-        As `load_device`.
+        As `read_device_file`.
     """
-    return load_device(Path(device.device_file)) if device.device_file else Linkage()
+    return linkage_from(content_of(device))

@@ -2,20 +2,44 @@
 
 import json
 import math
-from collections.abc import Mapping
-from typing import cast
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
 
 
 def json_text(value: object) -> str:
-    """Indented JSON; null for a number that is not finite, since JSON has none."""
-    return json.dumps(_finite(value), indent=2, allow_nan=False)
+    """Indented JSON; null for a number that is not finite, since JSON has none.
+
+    A dataclass or named tuple is an object of its fields, and of its ``lines`` if it says itself in words.
+    """
+    plain, said = _plain(value), getattr(value, "lines", None)
+    if callable(said) and isinstance(plain, dict):
+        plain = cast(dict[str, object], plain) | {"lines": list(cast(Callable[[], Any], said)())}
+    return json.dumps(plain, indent=2, allow_nan=False)
 
 
-def _finite(value: object) -> object:
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray | np.generic):
+        value = cast(object, value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in cast(Mapping[str, object], value).items()}
+        return {str(key): _plain(item) for key, item in cast(Mapping[object, object], value).items()}
+    names = _names(value)
+    if names:
+        return {name: _plain(getattr(value, name)) for name in names}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in cast(list[object], value)]
+        return [_plain(item) for item in cast(list[object], value)]
     return value
+
+
+def _names(value: object) -> list[str]:
+    """Fields of a dataclass or a named tuple."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return [field.name for field in fields(value)]
+    return list(getattr(value, "_fields", ()))

@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from controllers.safety.arming import State
-from experiments.files.device_files import device_json, save_device
+from experiments.files.device_files import identified_json, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import IdentifyHardware
-from experiments.results.folder import RECORDING
+from experiments.results.folder import DEVICE, RECORDING
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, Identified, Motion, identify_linkage, motions_of
 from sim.recording.recording import Recording
@@ -31,12 +32,29 @@ def identify(options: IdentifyHardware) -> int:
         raise SimError(f"{options.out}: exists; choose another --out, or --overwrite it")
     if not options.runs:
         raise SimError("no recording is given; expected folders of hvf hardware run")
+    base = device_of_runs(options.runs)
     motions = [motion for path in options.runs for motion in recorded_motions(path)]
     found = identify_linkage(motions)
-    content = device_json(found, [str(path) for path in options.runs])
+    content = identified_json(found, [str(path) for path in options.runs], base)
     save_device(content, options.out)
     print(json_text(content) if options.json else "\n".join(lines_of(found, motions)))
     return 0
+
+
+def device_of_runs(runs: Sequence[Path]) -> dict[str, Any]:
+    """Content of the device file that all of these runs were made with; empty where there was none.
+
+    Raises
+    ------
+    SimError
+        If they were made with different ones.
+    """
+    files = [(path if path.is_dir() else path.parent) / DEVICE for path in runs]
+    contents = [read_device_file(file) if file.exists() else {} for file in files]
+    for path, content in zip(runs, contents, strict=True):
+        if content != contents[0]:
+            raise SimError(f"{path}: was run with another device file than {runs[0]}; expected runs with the same one")
+    return contents[0]
 
 
 def recorded_motions(path: Path) -> list[Motion]:
@@ -75,4 +93,4 @@ def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
         unit = _UNITS[name.rstrip("123")]
         known = "" if margin < abs(value) else "  (not told apart from zero)"
         said.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{known}")
-    return [*said, "offset1    is told by no motion: find it at the joint's stop."]
+    return [*said, "offset1    is told by no motion, only by hvf hardware calibrate."]

@@ -23,6 +23,8 @@ class Outcome:
         Of the device.
     fault : str
         What it let go for at last; empty if for nothing.
+    let_go : tuple of str
+        Every time that it let go, and for what; all but the last may have been cleared.
     silent : bool
         Whether the servo stopped without a word.
     broken : str
@@ -46,6 +48,7 @@ class Outcome:
     device: str
     transport: str
     fault: str
+    let_go: tuple[str, ...]
     silent: bool
     broken: str
     ticks: int
@@ -75,6 +78,8 @@ class Outcome:
     def lines(self) -> list[str]:
         """What a person wants to know, first what went wrong."""
         wrong = [f"The device let go: {self.fault}."] if self.fault else []
+        if len(self.let_go) > bool(self.fault):
+            wrong += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]
         wrong += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
         wrong += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
         micro = [" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness)]
@@ -109,7 +114,7 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -
 def _recorded(path: Path) -> dict[str, Any]:
     nothing: dict[str, Any] = dict.fromkeys(
         ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
-    )
+    ) | {"let_go": ()}
     try:
         recording = Recording(path)
     except RecordingError:
@@ -126,7 +131,10 @@ def _recorded(path: Path) -> dict[str, Any]:
         rows = {name: rows[name][on] for name in rows if name in channels}
         sizes = {name: np.linalg.norm(rows[name], axis=1) for name in ("force", "hand_force")}
         some = bool(on.any())
+        t, fault, value = (recording.channel("ticks", name)[:] for name in ("t", "fault", "fault_value"))
+        begun = np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))
         return {
+            "let_go": tuple(f"{t[k]:.3f} s, {Fault(int(fault[k])).words(value[k])}" for k in begun),
             "recorded": len(state), "dropped": int(recording.channel("ticks", "dropped")[-1]),
             "active": float(np.sum(on)) / recording.rates["ticks"],
             "distance": float(np.sqrt(np.mean(rows["distance"] ** 2))) if some else 0.0,

@@ -8,6 +8,7 @@ import numpy as np
 from controllers.safety.gate import Gate
 from controllers.state import Array
 from experiments.config.run_config import Clock, RunConfig
+from experiments.files.device_files import Calibration
 from experiments.hardware.permit import check_device
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
@@ -65,15 +66,21 @@ class MakeServo:
         Its limits.
     offset : three floats
         Of its encoders [rad].
+    calibration : Calibration, optional
+        Whose offset that is.
     packets : socket, optional
         Of an emulated device, instead.
+    calibrated : bool
+        Whether that one knows its zero.
     """
 
     config: RunConfig
     name: str
     gate: Gate
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    calibration: Calibration | None = None
     packets: socket.socket | None = None
+    calibrated: bool = True
 
     def __call__(self) -> GatedServo:
         """Make it.
@@ -85,12 +92,12 @@ class MakeServo:
         """
         session = session_of(self.config)
         driver = self._driver()
-        check_device(driver.identity)
+        check_device(driver.identity, self.calibration)
         return GatedServo(session.servo, session.world, driver, self.gate, np.array(self.offset))
 
     def _driver(self) -> Driver:
         if self.packets is not None:
-            return EmulatedDriver(self.packets)
+            return EmulatedDriver(self.packets, self.calibrated)
         from sim.devices.hardware_list import open_device  # loads what drivers there are
 
         return open_device(self.name)

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import Certificate
+from controllers.certificates.report import Certificate, ChangedInputs
 from experiments.certify.certified_clips import run_and_clips
-from experiments.certify.certified_field import certificate_inputs
+from experiments.certify.certified_field import certificate_inputs, certified_options
 from experiments.config.run_config import RunConfig
-from experiments.files.certificate_files import verify_certificate
-from experiments.files.device_files import linkage_of
+from experiments.files.certificate_files import changed_options, verify_certificate
+from experiments.files.device_files import Calibration, linkage_of
 from models.mocap.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -47,7 +47,13 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     clips: tuple[Clip, ...] = ()
     if config.map.kind in ("led", "file"):
         config, clips = run_and_clips(None, config)
-    found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))
+    try:
+        found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))
+    except ChangedInputs:
+        differ = changed_options(file, certified_options(config, delay, HandRange(), HAND_PUSH))
+        if not differ:
+            raise
+        raise ChangedInputs(f"{file} certifies another field or device: {differ}; certify this one") from None
     stable = {name: verdict for name, verdict in found.verdicts.items() if name.startswith("stability")}
     if not stable:
         raise SimError(f"{file}: says nothing of stability; expected the certificate of a field")
@@ -57,18 +63,26 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     return found
 
 
-def check_device(identity: DeviceIdentity) -> list[str]:
-    """What is to be said of a device that may be armed.
+def check_device(identity: DeviceIdentity, calibration: Calibration | None) -> list[str]:
+    """What is to be said of a device that may be armed, with the zero that its device file has.
 
     Raises
     ------
     SimError
-        If it may not: it has no motors, or does not know where it is.
+        If it may not: it has no motors, or nobody knows where its encoders' zero is.
     """
     if not identity.forces:
         raise SimError(f"{identity.name} has no motors: no force can be felt on it; it plays, it is not armed")
-    if not identity.calibrated:
-        raise SimError(f"{identity.name} is not calibrated: its encoders do not know their zero; calibrate it first")
+    if calibration is None and not identity.calibrated:
+        raise SimError(
+            f"{identity.name} is not calibrated: its encoders do not know their zero; expected a --device-file that "
+            "hvf hardware calibrate has written"
+        )
+    if calibration is not None and calibration.why_not(identity):
+        raise SimError(
+            f"the device file {calibration.why_not(identity)}, this is {identity.name} {identity.serial}".rstrip()
+            + "; calibrate it with hvf hardware calibrate"
+        )
     if identity.watchdog:
         return []
     return [

@@ -7,6 +7,7 @@ import socket
 import sys
 import time
 from collections.abc import Generator
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -17,14 +18,14 @@ from controllers.safety.gate import Gate
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
-from experiments.files.device_files import linkage_of
+from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.outcome import Outcome, outcome_of
 from experiments.hardware.page import show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder, clear_folder
+from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
 from experiments.setups.defaults import resolved
 from models.scene import SceneConfig
 from sim.errors import SimError
@@ -33,6 +34,7 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
+from sim.recording.recording import Recording
 
 _POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 
@@ -62,6 +64,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     config = resolved(config)
+    content = content_of(config.device)
     _permit(config, options, console)
     serving = served(config)
     session = session_of(serving, ready=lambda units: compile_once(console, units))
@@ -74,21 +77,23 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     )  # fmt: skip
     clear_folder(options.out)
     (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+    if content:
+        save_device(content, options.out / DEVICE)
     job = RecordingJob(
         options.out / RECORDING, to_dict(config), session.static(), config.seed,
         SceneConfig(servo_period=period, physics_step=config.clock.physics_step),
     )  # fmt: skip
     with contextlib.ExitStack() as stack:
-        linkage = linkage_of(config.device)
-        make = MakeServo(serving, options.name, gate, linkage.offset)
+        make = MakeServo(serving, options.name, gate, linkage_from(content).offset, calibration_from(content))
         if options.name == EMULATED:
-            scene = SceneConfig(servo_period=period, physics_step=config.clock.physics_step)
-            packets = stack.enter_context(emulated(MakeEmulated(scene, start_of(session), linkage), options.realtime))
-            make = MakeServo(serving, options.name, gate, linkage.offset, packets)
+            hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
+            end = MakeEmulated(job.scene, start_of(session), hidden)
+            packets = stack.enter_context(emulated(end, options.realtime))
+            make = replace(make, packets=packets, calibrated=options.emulate is None or not any(hidden.offset))
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, period, clock, job))
         ready = run.start()
-        for line in (*check_device(ready.identity), *ready.said):
+        for line in (*check_device(ready.identity, make.calibration), *ready.said):
             console.print(line, highlight=False)
         if options.view:
             stack.enter_context(_page(config, run))
@@ -204,4 +209,11 @@ def _write(outcome: Outcome, out: Path, console: Console) -> None:
     for line in outcome.lines():
         print(line)
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
-    console.print(f"Written to {out}: {SUMMARY}, {RECORDING}.", highlight=False)
+    written = [SUMMARY, RECORDING]
+    if outcome.recorded:
+        from experiments.results.hardware_report import write_hardware_report  # brings plots with it
+
+        with Recording(out / RECORDING) as recording:
+            write_hardware_report(out, recording, outcome.lines())
+        written.insert(0, REPORT)
+    console.print(f"Written to {out}: {', '.join(written)}.", highlight=False)

@@ -1,4 +1,4 @@
-"""The options of ``hvf hardware run`` and ``hvf hardware identify``; light, for the command line reads them."""
+"""The options of ``hvf hardware run``, ``calibrate`` and ``identify``; light, for the command line reads them."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import above, at_least, part
-from experiments.config.words import RunOptions
+from experiments.config.words import Options
 
 EMULATED = "emulated"
 
@@ -15,9 +15,12 @@ EMULATED = "emulated"
 class RunHardware:
     """How a field is run on a real device."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
+    options: Options
+    """The field, as in `hvf run`."""
     name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
     """A device as `hvf hardware list` names it, or "emulated": the MuJoCo linkage in a process of its own."""
+    emulate: Path | None = None
+    """Device file of what the emulated device is, hidden from the servo; by default it is as --device-file says."""
     certificate: Path | None = None
     """Folder or certificate.json of `hvf certify` for this very field; only the emulated device runs without."""
     delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
@@ -44,6 +47,24 @@ class RunHardware:
     """Ask the system to run the servo before everything else."""
     view: bool = False
     """Show device and figure in a browser, from a process of its own."""
+
+
+@part
+class CalibrateHardware:
+    """Which device stands at which pose, and where its zero is written."""
+
+    name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
+    """A device as `hvf hardware list` names it, or "emulated"."""
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The joint angles θ1, θ2, θ3 at which the stylus is held, in a fixture or at its reset pose [rad]."""
+    seconds: Annotated[float, above(0.0, unit="s")] = 1.0
+    """How long it is read [s]."""
+    out: Path = Path("device.json")
+    """Device file to write; what an existing one says of friction, inertia and delay is kept."""
+    overwrite: bool = False
+    """Replace the offset that the file has."""
+    emulate: Path | None = None
+    """Device file of what the emulated device is."""
 
 
 @part

@@ -178,7 +178,9 @@ def check_workspace(room: Room) -> None:
                     ) from None
 
 
-def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1) -> LiftedClips:
+def lift_clips(
+    names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
+) -> LiftedClips:
     """Lift clips by name or file.
 
     Parameters
@@ -191,6 +193,8 @@ def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), see
         Of `names`, those that have to close; by default all those are closed that do.
     seed : int
         Of the places from which the arrangement begins.
+    raw : bool
+        Take motion files as captured, not prepared.
 
     Raises
     ------
@@ -203,7 +207,7 @@ def lift_clips(names: Sequence[str], room: Room, cyclic: Sequence[str] = (), see
     if seed < 0:
         raise SimError(f"the seed is {seed}; expected 0 or more")
     check_workspace(room)
-    clips, remarks = load_clips(names)
+    clips, remarks = load_clips(names, raw)
     begin = time.perf_counter()
     labels = _labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
@@ -237,7 +241,13 @@ def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:
 
 
 def lift_into(
-    names: Sequence[str], out: Path, room: Room, cyclic: Sequence[str], seed: int, overwrite: bool
+    names: Sequence[str],
+    out: Path,
+    room: Room,
+    cyclic: Sequence[str],
+    seed: int,
+    overwrite: bool,
+    raw: bool = False,
 ) -> LiftReport:
     """Lift clips, write the map into a file, and measure it; arguments as in `lift_clips`.
 
@@ -252,7 +262,7 @@ def lift_into(
         raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
     if out.exists() and not overwrite:
         raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
-    lifted = lift_clips(names, room, cyclic, seed)
+    lifted = lift_clips(names, room, cyclic, seed, raw)
     out.parent.mkdir(parents=True, exist_ok=True)
     save_map(lifted.haptic_map, out)
     return report_lift(lifted, seed)

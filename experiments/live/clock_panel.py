@@ -27,9 +27,10 @@ class ClockPanel:
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
         self._desk = desk
         self._press = gui.add_checkbox(
-            "Grab (press the switch)", False, hint="With it a drag takes hold of the curve and bends it; so does shift."
-        )
-        self._keep = gui.add_checkbox("Hold on when the mouse lets go", False)
+            "Grab and bend", False, visible=False,
+            hint="The stylus' switch: with it a drag takes hold of the curve and bends it; so does shift.",
+        )  # fmt: skip
+        self._keep = gui.add_checkbox("Hold on", False, hint="Keep the stylus when the mouse lets go of the ball.")
         self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
         self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
@@ -50,9 +51,9 @@ class ClockPanel:
         self._rearm.on_click(acts(lambda event: desk.rearm()))
         keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
             "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
-            "Step": ("S", lambda event: desk.step()),
+            "Step": ("N", lambda event: desk.step()),
             "Reset": ("R", lambda event: desk.reset()),
-            "Undo": ("U", lambda event: desk.undo()),
+            "Undo": ("Z", lambda event: desk.undo()),
             "Redo": ("Y", lambda event: desk.redo()),
             "Grab or let go": ("G", lambda event: self._toggle()),
         }
@@ -80,6 +81,7 @@ class ClockPanel:
         self._from.visible = self._back.value > 0.0
         self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
         built = desk.built
+        self._press.visible = built is not None and built.bends
         self._perform.visible = built is not None and built.config.mode.kind == "stretch-then-follow"
         self._perform.label = "Bend it again" if self._performs else "Perform the bent curve"
 

@@ -157,6 +157,11 @@ class Desk:
         return bool(self.engine.held.rows["grip"][0] > 0.0)
 
     @property
+    def target(self) -> Array:
+        """Where the stylus is held, in H [m], shape (3,)."""
+        return self.engine.held.rows["target"].copy()
+
+    @property
     def paused(self) -> bool:
         """Whether time stands still."""
         return bool(self.engine.held.rows["paused"][0] > 0.0)

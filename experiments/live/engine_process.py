@@ -111,6 +111,7 @@ class _Runner:
         self._take: Take | None = None
         self._parent, self._going = os.getppid(), True
         self._pictured, self._sliced, self._steps = 0.0, 0.0, 0.0
+        self._paced = 0.0, 0.0
         self._curve, self._changed = 0, True
 
     def run(self) -> None:
@@ -238,13 +239,10 @@ class _Runner:
         if engine is None or now - self._pictured < PICTURE:
             return
         servo = engine.session.servo
-        pace = (
-            0.0 if self._pictured == 0.0 else (engine.time - float(self._shown.rows["t"][0])) / (now - self._pictured)
-        )
         self._pictured = now
         trace, hand = engine.memory, servo.device.hand
         shown: dict[str, Any] = {
-            "t": engine.time, "pace": pace, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
+            "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
             "recording": 0.0 if self._take is None else self._take.seconds(engine), "qpos": shown_configuration(servo),
             "reference": servo.reference.pose, "p": hand[1:4], "v": hand[8:11], "switch": hand[14],
             "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
@@ -253,7 +251,9 @@ class _Runner:
             "ghost": self._ghost(trace, servo.reference.pose),
         }  # fmt: skip
         if now - self._sliced > SLICE:
-            self._sliced = now
+            then, at = self._paced
+            shown["pace"] = 0.0 if then == 0.0 else (engine.time - at) / (now - then)
+            self._sliced, self._paced = now, (now, engine.time)
             shown["cost"], shown["bends"] = engine.cost(), engine.bends()
             if self._held.rows["slice"][0] > 0.0:
                 shown["slice"] = self._slice(engine)

@@ -15,22 +15,27 @@ import viser
 from controllers.errors import ControllerError
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
+from experiments.live.cap_hand import cap_there
 from experiments.live.clock_panel import ClockPanel
 from experiments.live.desk import Desk
 from experiments.live.driver import Driver
 from experiments.live.gains_panel import GainsPanel
+from experiments.live.hand_keys import add_hand_keys
 from experiments.live.messages import COURSE_POINTS, SLICE_SIDE
 from experiments.live.plots import Plots
 from experiments.live.run_panel import RunPanel
+from experiments.live.status import FIRST_STEPS, status_html
 from experiments.live.takes_panel import TakesPanel
 from experiments.live.uploads_panel import UploadsPanel
 from models.errors import ModelError
 from models.scene import P_WH, SceneConfig
+from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
-from sim.viewer.live_stage import NARROW, VIEWS, LiveStage, set_view
+from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
+from sim.viewer.views import DEFAULT_SIZE, VIEWS, is_phone, look, look_from
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] between two pictures
@@ -50,23 +55,28 @@ class Page:
         Where takes and clips are kept.
     port : int
         On 127.0.0.1; the next free one is taken if it is in use, and any for 0.
+    shadows : bool
+        Whether they are drawn; a machine without a graphics card is much faster without.
     """
 
-    def __init__(self, config: RunConfig, folder: Path, port: int = 8080):
+    def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
         self.desk, self.driver = Desk(folder, self.say), Driver()
         self._said: list[str] = []
         self._closed = threading.Event()
         with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
-        set_view(self.server.initial_camera, VIEWS["both"])
+        look(self.server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
         self.stage: LiveStage | None = None
         self._ball: HandBall | None = None
         self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
-        self._lay_out(config)
+        self._lay_out(config, shadows)
         self.server.on_client_connect(_looks)
         self.server.on_client_disconnect(self._left)
+        self._cap, said = cap_there()
+        if said:
+            self.say(said)
         self.desk.build(config)
 
     @property
@@ -102,7 +112,7 @@ class Page:
 
         return done
 
-    def _lay_out(self, config: RunConfig) -> None:
+    def _lay_out(self, config: RunConfig, shadows: bool) -> None:
         gui = self.server.gui
         self._status = gui.add_html("")
         self._progress = gui.add_progress_bar(0.0, visible=False)
@@ -111,7 +121,7 @@ class Page:
         with tabs.add_tab("Play", viser.Icon.HAND_STOP):
             self._clock = ClockPanel(gui, self.desk, self.acts)
             self._run = RunPanel(gui, self.desk, self.acts, config)
-            self._seen()
+            self._seen(shadows)
         with tabs.add_tab("Gains", viser.Icon.ADJUSTMENTS):
             self._gains = GainsPanel(gui, self.desk, self.acts)
         with tabs.add_tab("Takes", viser.Icon.PLAYER_RECORD):
@@ -120,23 +130,28 @@ class Page:
             self._uploads = UploadsPanel(gui, self.desk, self.acts)
         with gui.add_folder("Curves", expand_by_default=False):
             self._plots = Plots(gui)
+        with gui.add_folder("First steps", expand_by_default=False):
+            gui.add_markdown(FIRST_STEPS)
+        add_hand_keys(gui, self.desk, self.acts, lambda: self._clock.pressed)
 
-    def _seen(self) -> None:
+    def _seen(self, shadows: bool) -> None:
         gui = self.server.gui
         views = gui.add_button_group("Look at", tuple(VIEWS))
         drive = gui.add_button("Drive", icon=viser.Icon.STEERING_WHEEL, hint="Several may watch, one drives.")
         self._field = gui.add_checkbox("Field arrows", True, hint="On the horizontal plane through the stylus.")
+        self._shadows = gui.add_checkbox("Shadows", shadows, hint="Without a graphics card the page is faster without.")
         self.desk.look(True)
 
         @views.on_click
         def _(event: Any) -> None:
             if event.client is not None:
-                set_view(event.client.camera, VIEWS[views.value])
+                look_from(event.client, VIEWS[views.value])
 
         @drive.on_click
         def _(event: Any) -> None:
             self.say("Another browser drives now." if self.driver.take_over(event.client_id) else "Somebody drives.")
 
+        self._shadows.on_update(self.acts(lambda event: light(self.server.scene, self._shadows.value)))
         self._field.on_update(self.acts(lambda event: self.desk.look(self._field.value)))
 
     def _left(self, client: viser.ClientHandle) -> None:
@@ -151,6 +166,7 @@ class Page:
             self.desk.poll()
             if self.desk.builds != self._builds:
                 self._set_stage()
+            self._push()
             self._draw()
             if begin - written > POLL:
                 written = begin
@@ -161,6 +177,8 @@ class Page:
     def close(self) -> None:
         """Serve no more."""
         self._closed.set()
+        if self._cap is not None:
+            self._cap.close()
         self.desk.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
@@ -171,6 +189,7 @@ class Page:
         stature, mass, servo_period, physics_step = (float(n) for n in np.asarray(built.drawn["scene"]))
         world = World(SceneConfig(stature, mass, servo_period, physics_step), built.config.figure.kind)
         self.server.scene.reset()
+        light(self.server.scene, self._shadows.value)
         kinematic = built.config.figure.kind == "kinematic"
         self.stage = LiveStage(
             self.server.scene, world.full_model(), courses(built.drawn), float(np.asarray(built.drawn["tube_radius"])),
@@ -191,6 +210,21 @@ class Page:
             self.desk.let_go()
         else:
             self.desk.hold(target, shift or self._clock.pressed)
+
+    def _push(self) -> None:
+        """Let a SpaceMouse that is plugged in here move the hand, while no mouse has it."""
+        if self._cap is None or self._ball is None or self._ball.dragged:
+            return
+        held = self._cap.holds
+        try:
+            wish = self._cap.wish(self.desk.now["p"])
+        except DriverFault:
+            self._cap, wish = None, None
+            self.say("The SpaceMouse is gone.")
+        if wish is not None:
+            self.desk.hold(wish[0], wish[1] or self._clock.pressed)
+        elif held and not self._clock.keeps:
+            self.desk.let_go()
 
     def _draw(self) -> None:
         stage, ball, desk = self.stage, self._ball, self.desk
@@ -218,8 +252,8 @@ class Page:
                 stage.draw_course(0, now["course"].reshape(COURSE_POINTS, 3))
             arrows = now["slice"].reshape(SLICE_SIDE**2, 6)
             stage.draw_slice(arrows[:, :3] if self._field.value else arrows[:0, :3], arrows[:, 3:])
-            if not desk.holds:
-                ball.rest(now["p"])
+            if not ball.dragged:
+                ball.rest(desk.target if desk.holds else now["p"])
             stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
 
@@ -229,7 +263,7 @@ class Page:
         self._progress.visible = going is not None
         if going is not None:
             self._progress.value = 100.0 * going.share
-        self._status.content = _status(now, self.driver.client, "" if going is None else going.text, desk)
+        self._status.content = status_html(now, self.driver.client, "" if going is None else going.text, desk)
         self._clock.write()
         self._gains.write()
         self._takes.write()
@@ -239,21 +273,5 @@ class Page:
 
 
 def _looks(client: viser.ClientHandle) -> None:
-    """Let a browser that is higher than wide look at the workspace."""
-    if client.camera.aspect < 1.0:
-        set_view(client.camera, NARROW)
-
-
-def _status(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
-    """The line at the top: clock, pace, what a tick takes, who drives; and what is wrong."""
-    middle, most = 1e3 * now["cost"]
-    doing = "paused" if desk.paused else f"{now['pace'][0]:.2f} × real time"
-    who = "nobody drives: drag the orange ball" if driver is None else f"browser {driver} drives"
-    said = [f"<b>{now['t'][0]:.2f} s</b> · {doing} · a tick takes {middle:.2f} ms, 99 % under {most:.2f} ms · {who}"]
-    if desk.records:
-        said.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
-    if now["fault"][0] != 0.0:
-        said.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
-    if going:
-        said.append(html.escape(going))
-    return "".join(f'<p style="margin:.3rem .75rem;font-size:.8rem">{line}</p>' for line in said)
+    """Let a browser that comes look at both sides; a phone at the workspace, above the panel."""
+    look_from(client, VIEWS["workspace" if is_phone(client) else "both"])

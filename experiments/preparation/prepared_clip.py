@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from experiments.files.kept import kept_array
+from experiments.working import working
 from models.mocap.clip import Clip
 from models.mocap.library import load
 from models.mocap.preparation.prepare import prepared
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 
 
 class PreparedClip(NamedTuple):
@@ -31,7 +32,7 @@ class PreparedClip(NamedTuple):
 def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
     """The motion in a file, prepared; what `write_bvh` wrote is taken as it is, and so is everything if `raw`.
 
-    Prepared clips are kept under a hash of the captured poses and of the project's sources.
+    Prepared clips are kept under a hash of the captured poses and of the code that prepares them.
 
     Raises
     ------
@@ -43,10 +44,11 @@ def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
         return PreparedClip(loaded.clip, () if loaded.report is None else loaded.report.lines())
 
     def find() -> npt.NDArray[np.float64]:
-        clip = prepared(path).clip
+        with working(f"preparing {path.name}"):
+            clip = prepared(path).clip
         return np.vstack((np.full((1, clip.poses.shape[1]), clip.fps), clip.poses))
 
     made_of = (loaded.clip.poses, np.array([loaded.clip.fps, -1.0 if loaded.loops is None else float(loaded.loops)]))
-    rows = kept_array(CACHE_FOLDER, "prepared", made_of, (-1, loaded.clip.poses.shape[1]), find)
+    rows = kept_array(kept_folder(prepared.__module__), "prepared", made_of, (-1, loaded.clip.poses.shape[1]), find)
     clip = Clip(rows[1:], float(rows[0, 0]), loaded.clip.name)
     return PreparedClip(clip, (*loaded.report.lines(), f"{path.name}: prepared; --raw takes the capture as it is"))

@@ -27,7 +27,7 @@ from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 Array = npt.NDArray[np.float64]
 
 POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
-PALE_TUBE, PALE_USER = "#dbe7f4", "#fbe3cd"
+PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -162,8 +162,12 @@ def torques_figure(recording: Recording) -> Figure:
 
 
 def tracking_figure(recording: Recording) -> Figure:
-    """How well the physical figure follows the animation, and what that takes; flights shaded."""
+    """How well the physical figure follows the animation, and what that takes; flights and falls shaded.
+
+    While it lies, or is set back onto the animation, there is nothing to tell of it.
+    """
     t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
+    down = _rows(recording, "frames", "down") > 0.5
     weight = float(recording.array("body_weight"))
     residual = 100 * np.linalg.norm(_rows(recording, "frames", "residual")[:, :3], axis=1) / weight
     ground = 100 * _rows(recording, "frames", "ground")[:, 2] / weight
@@ -175,12 +179,13 @@ def tracking_figure(recording: Recording) -> Figure:
     )
     figure, axes = _panels(4, 1, height=6.4)
     for ax, (title, unit, values) in zip(axes, curves, strict=True):
-        _shade(ax, t, flight, PALE_TUBE, "flight")
-        ax.plot(t, values, color=CURVE)
+        _shade(ax, t, flight & ~down, PALE_TUBE, "flight")
+        _shade(ax, t, down, PALE_FALL, "fallen")
+        ax.plot(t, np.where(down, np.nan, values), color=CURVE)
         ax.set(title=title, ylabel=unit, xlim=(t[0], t[-1]))
         ax.set_ylim(bottom=0)
         _mark_changes(ax, recording)
-    if np.any(flight):
+    if np.any(flight | down):
         legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
     return figure

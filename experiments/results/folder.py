@@ -1,6 +1,11 @@
 """The folder of a run: what lies in it, and what a recording says of its configuration."""
 
+import errno
+import fcntl
+import os
 import shutil
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
@@ -17,21 +22,53 @@ from sim.recording.recording import Recording
 from sim.world.world import FigureKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
-EDITED, DEFAULT, FIGURES = "edited.bvh", "default.bvh", "figures"
+EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be written, or whose run may not be replaced."""
     if out.exists() and not out.is_dir():
         raise SimError(f"{out}: is a file; expected a folder to write the run into")
+    if out.exists():
+        with claimed(out):
+            pass
+    check_holds(out, overwrite)
+
+
+def check_holds(out: Path, overwrite: bool) -> None:
+    """Refuse a folder whose run may not be replaced."""
     if (out / RECORDING).exists() and not overwrite:
         raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
+
+
+@contextmanager
+def claimed(out: Path) -> Generator[None]:
+    """Hold a folder, made when it is missing, for this process alone; a process that ends in any way lets go of it.
+
+    Raises
+    ------
+    SimError
+        If another process holds it.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(out, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SimError(f"{out}: another run is being written into it; expected another --out, or wait") from None
+        except OSError as error:
+            if error.errno not in (errno.EBADF, errno.ENOLCK, errno.EOPNOTSUPP):  # of file systems without locks
+                raise
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def clear_folder(out: Path) -> None:
     """Make the folder, and remove what an earlier run left in it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE):
+    for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE):
         (out / name).unlink(missing_ok=True)
     shutil.rmtree(out / FIGURES, ignore_errors=True)
 

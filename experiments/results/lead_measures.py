@@ -3,20 +3,19 @@
 import math
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from controllers.fields.leading import Leading
 from controllers.walking.walked_path import PATH_HEADING, path_value
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_POSE, figure_model
+from experiments.results.soles import Soles
+from models.humanoid.skeleton import N_POSE
 from models.scene import SceneConfig
 from sim.recording.recording import Recording
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-TOUCH = 0.003  # [m] a sole's point that is lower touches
 BLOCK_FRAMES = 2000
 _FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] that count as much, in looking for the place where it was
 _REMEMBERED = 6000  # places of the way forward, one for each centimetre
@@ -81,7 +80,7 @@ def lead_summary(
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
-    soles, pressing, shown, physical = _Soles(scene), _Soles(scene, 0.0), _Retrace(), _Retrace()
+    soles, pressing, shown, physical = Soles(scene), Soles(scene, 0.0), _Retrace(), _Retrace()
     farthest, force, turns = -math.inf, 0.0, np.zeros(3)
     for first in range(0, len(frames["t"]), BLOCK_FRAMES):
         rows = slice(first, first + BLOCK_FRAMES)
@@ -120,30 +119,6 @@ def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
     rates = np.abs(speed * [path_value(path, float(place), PATH_HEADING)[1] for place in s])
     feet = support_at(field, s)
     return np.array([rates[feet == count].max(initial=0.0) for count in range(3)])
-
-
-class _Soles:
-    """How far points of the soles slide while they are lower than `touch` [m], of poses that come in blocks."""
-
-    def __init__(self, scene: SceneConfig, touch: float = TOUCH):
-        self._touch = touch
-        self._model = figure_model(scene.stature, scene.mass)
-        self._data = mujoco.MjData(self._model)
-        self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
-        self._since = np.full((len(self._geoms), 2), np.nan)
-        self.slide = 0.0
-
-    def add(self, poses: Array) -> None:
-        for pose in poses:
-            self._data.qpos[:] = pose
-            mujoco.mj_kinematics(self._model, self._data)
-            places = self._data.geom_xpos[self._geoms]
-            touching = places[:, 2] - CONTACT_RADIUS < self._touch
-            begins = touching & np.isnan(self._since[:, 0])
-            self._since[begins] = places[begins, :2]
-            self._since[~touching] = np.nan
-            way = np.linalg.norm(places[:, :2] - self._since, axis=1)
-            self.slide = max(self.slide, float(np.max(way[touching], initial=0.0)))
 
 
 class _Retrace:

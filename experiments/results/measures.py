@@ -8,6 +8,10 @@ import numpy.typing as npt
 
 from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
+from experiments.results.figure_measure import FigureMeasure, MeanSquare
+from experiments.results.folder import scene_of
+from experiments.results.oscillation import oscillation_summary
+from experiments.results.soles import Soles
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import (
     AnimationSummary,
@@ -18,7 +22,6 @@ from experiments.results.summary_parts import (
     TankSummary,
     TraceSummary,
 )
-from models.humanoid.skeleton import N_TANGENT
 from models.mocap.clip import pose_difference
 from sim.recording.recording import Recording
 
@@ -28,12 +31,12 @@ Span = tuple[float, float]
 
 SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
 HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
-FALLEN = 0.5  # [m] from the animation's root, beyond which a figure will not come back
-TOUCH = 1.0  # [N] from which the ground bears the figure
+STANDS = 1e-3  # [m] within which a stylus stands still
+SOLES_RATE = 100.0  # [Hz] at which the animation's soles are looked at
 BLOCK_FRAMES = 2000  # of the figure, read at a time
 BLOCK_ROWS = 16_000  # of the ticks, likewise
 _TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
-_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "saturated")
+_FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 
 
 def summarise(
@@ -49,7 +52,8 @@ def summarise(
     ----------
     recording : Recording
         With the channels of `sim.loop.loop.groups`, and arrays ``curve_span`` (start and end of the phase),
-        ``curve_closed`` and ``body_weight``.
+        ``curve_closed``, ``clip_seconds`` (of a lap at the clips' own pace, NaN where a lap plays none), ``scene``,
+        ``body_weight`` and ``com_height``.
     default_poses : callable
         Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,) on rivers (k,); called
         in order of time.
@@ -60,8 +64,9 @@ def summarise(
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
-        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording)
-    )
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
+        oscillation=oscillation_summary(recording),
+    )  # fmt: skip
 
 
 def measured(
@@ -74,7 +79,7 @@ def measured(
     """
     path, animation, figure = (
         PathMeasure(recording, span[0], handled),
-        AnimationMeasure(span[0]),
+        AnimationMeasure(recording, span[0]),
         FigureMeasure(recording),
     )
     tank = TankSummary(math.inf, 0)
@@ -100,28 +105,12 @@ def measured(
 
 def trace_summary(recording: Recording) -> TraceSummary:
     """Measure a hand that traces."""
-    ticks, distance, force = recording.groups["ticks"], _MeanSquare(), 0.0
+    ticks, distance, force = recording.groups["ticks"], MeanSquare(), 0.0
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         rows = slice(first, first + BLOCK_ROWS)
         distance.add(ticks["distance"][rows][ticks["t"][rows] >= SETTLING])
         force = max(force, float(np.linalg.norm(ticks["user"][rows], axis=1).max()))
     return TraceSummary(1e3 * distance.root, force)
-
-
-class _MeanSquare:
-    """Root mean square and largest of numbers that come in blocks."""
-
-    def __init__(self) -> None:
-        self._sum, self.count, self.largest = 0.0, 0, 0.0
-
-    def add(self, values: Array) -> None:
-        self._sum += float(np.sum(values**2))
-        self.count += values.size
-        self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
-
-    @property
-    def root(self) -> float:
-        return math.sqrt(self._sum / self.count) if self.count else 0.0
 
 
 class PathMeasure:
@@ -131,9 +120,11 @@ class PathMeasure:
         self._since, self._handled = since, tuple(handled)
         start, end = recording.array("curve_span")
         self._span, self._closed = float(end - start), bool(recording.array("curve_closed"))
-        self._alone = _MeanSquare()
+        self._alone = MeanSquare()
         self._phase: float | None = None
+        self._clip_seconds = float(recording.array("clip_seconds"))
         self._turned, self._first, self._time = 0.0, 0.0, 0.0
+        self._anchor, self._moved = np.full(3, np.inf), 0.0
         self._released = -math.inf
         self._pushes: list[PushSummary] = []
         self._pushing = False
@@ -147,9 +138,20 @@ class PathMeasure:
         self._released = float(last[-1])
         self._alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed])
         self._add_phase(t, ticks["phase"])
+        self._add_place(t, ticks["p"])
         handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
         self._add_pushes(ticks, size, at_work & ~handled)
         return pushed
+
+    def _add_place(self, t: Array, p: Array) -> None:
+        """When the stylus was last more than `STANDS` from where it was."""
+        k = 0
+        while k < len(t):
+            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDS
+            if not far.any():
+                return
+            k += int(np.argmax(far))
+            self._anchor, self._moved = p[k].copy(), float(t[k])
 
     def _add_phase(self, t: Array, phase: Array) -> None:
         if self._phase is None:
@@ -180,9 +182,13 @@ class PathMeasure:
     def summary(self) -> PathSummary:
         """What was taken so far."""
         laps = self._turned / self._span
-        lap_seconds = (self._time - self._first) / laps if laps >= 1.0 else None
+        seconds, clip = self._time - self._first, self._clip_seconds
+        lap_seconds = seconds / laps if laps >= 1.0 else None
+        stopped = self._moved if self._time - self._moved >= SETTLING else None
+        moving = (seconds if stopped is None else stopped - self._first) or math.inf
+        pace = None if math.isnan(clip) else laps * clip / moving
         alone = 1e3 * self._alone.root if self._alone.count else None
-        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes))
+        return PathSummary(alone, 1e3 * self._alone.largest, laps, lap_seconds, tuple(self._pushes), stopped, pace)
 
 
 def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
@@ -197,12 +203,15 @@ def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
 class AnimationMeasure:
     """`AnimationSummary` of frames that come in blocks, the first at `since` [s]."""
 
-    def __init__(self, since: float = 0.0) -> None:
-        self._since = since
+    def __init__(self, recording: Recording, since: float = 0.0) -> None:
+        self._since, self._soles = since, Soles(scene_of(recording))
+        self._stride, self._next = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
         self._pushed, self._unpushed = 0.0, 0.0
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
         """Take a block of frames, their poses at the curve, and at which the hand pushes."""
+        self._soles.add(frames["reference"][self._next :: self._stride])
+        self._next = (self._next - len(default)) % self._stride
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING
@@ -211,54 +220,7 @@ class AnimationMeasure:
 
     def summary(self) -> AnimationSummary:
         """What was taken so far."""
-        return AnimationSummary(math.degrees(self._pushed), math.degrees(self._unpushed))
-
-
-class FigureMeasure:
-    """`FigureSummary` of frames that come in blocks."""
-
-    def __init__(self, recording: Recording):
-        self._weight, self._rate = float(recording.array("body_weight")), recording.rates["frames"]
-        self._joints, self._root, self._force, self._moment, self._flying = (_MeanSquare() for _ in range(5))
-        self._frames, self._flight, self._grounded, self._saturated, self._ground = 0, 0, 0, 0.0, 0.0
-        self._fell_at: float | None = None
-
-    def add(self, frames: Mapping[str, Array]) -> None:
-        """Take a block of frames; those after a fall do not count."""
-        if self._fell_at is not None:
-            return
-        fallen = frames["root_error"] > FALLEN
-        if np.any(fallen):
-            fall = int(np.argmax(fallen))
-            self._fell_at = float(frames["t"][fall])
-            frames = {name: channel[:fall] for name, channel in frames.items()}
-        flight = frames["flight"] > 0.0
-        residual = frames["residual"]
-        self._joints.add(frames["joint_error"])
-        self._root.add(frames["root_error"])
-        self._force.add(np.linalg.norm(residual[~flight, :3], axis=1))
-        self._moment.add(np.linalg.norm(residual[~flight, 3:], axis=1))
-        self._flying.add(residual[flight])
-        self._frames += len(flight)
-        self._flight += int(np.sum(flight))
-        self._grounded += int(np.sum(~flight & (frames["ground"][:, 2] > TOUCH)))
-        self._saturated += float(np.sum(frames["saturated"]))
-        self._ground += float(np.sum(frames["ground"][:, 2]))
-
-    def summary(self) -> FigureSummary:
-        """What was taken so far."""
-        frames = max(self._frames, 1)
-        return FigureSummary(
-            fell_at=self._fell_at,
-            joint_error_rms_deg=math.degrees(self._joints.root),
-            root_error_rms_cm=100.0 * self._root.root,
-            root_error_max_cm=100.0 * self._root.largest,
-            residual_force_rms=self._force.root / self._weight,
-            residual_force_max=self._force.largest / self._weight,
-            residual_moment_rms=self._moment.root / self._weight,
-            residual_in_flight_max=self._flying.largest,
-            flight_seconds=self._flight / self._rate,
-            saturated=self._saturated / frames / (N_TANGENT - 6),
-            grounded=self._grounded / max(self._frames - self._flight, 1),
-            ground_force_mean=self._ground / frames / self._weight,
+        lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
+        return AnimationSummary(
+            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide
         )

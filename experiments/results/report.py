@@ -1,41 +1,27 @@
 """report.html: what a run did, in one file that opens from disk: its lines, its replay in 3D, its figures."""
 
-import base64
 import html
 from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
 
+from experiments.results.html_page import document, image
 from experiments.results.plots import plots_html
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
 from sim.viewer.replay_html import FIGURE_TARGET, MAGNIFICATION, SECONDS, Target, drawn_tube, replay_html
 
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }}
-h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
-h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
-ul {{ margin: 0 0 1rem; padding-left: 1.2rem; }}
-iframe {{ width: 100%; height: min(42rem, 80vh); border: 1px solid #d9dde4; border-radius: 6px; }}
-p {{ font-size: .9rem; color: #566072; margin: .5rem 0; }}
-p b {{ font-weight: 600; }}
-.figures {{ columns: min(26rem, 100%); column-gap: 1.5rem; }}
-@media (max-width: 600px) {{ body {{ padding: .8rem; }} ul {{ overflow-wrap: anywhere; }} iframe {{ height: 70vh; }} }}
-img {{ width: 100%; margin-bottom: 1rem; break-inside: avoid; }}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-<ul>{lines}</ul>
+_STYLE = """
+ul { margin: 0 0 1rem; padding-left: 1.2rem; }
+p { font-size: .9rem; color: #566072; margin: .5rem 0; }
+p b { font-weight: 600; }
+.figures { columns: min(26rem, 100%); column-gap: 1.5rem; }
+.figures img { width: 100%; margin-bottom: 1rem; break-inside: avoid; }
+@media (max-width: 600px) { ul { overflow-wrap: anywhere; } }
+"""
+_BODY = """<ul>{lines}</ul>
 <iframe title="Replay in 3D" srcdoc="{replay}"></iframe>
 <p>Drag to turn, wheel to zoom, right button to move; space plays and pauses, the bar scrubs.
 <b style="color:{field}">Green</b> arrow: force of the field. <b style="color:{user}">Orange</b> arrow: force of the
@@ -48,8 +34,6 @@ their true size.</p>
 <div class="figures">{figures}</div>
 <h2>Made with</h2>
 <p>{versions}; seed {seed}.</p>
-</body>
-</html>
 """
 
 
@@ -86,28 +70,21 @@ def write_report(
     replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
     radius, drawn = float(recording.array("tube_radius")), drawn_tube(recording)
     tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
-    images = [
-        f'<img alt="{figure.stem}" src="data:image/png;base64,{base64.b64encode(figure.read_bytes()).decode()}">'
-        for figure in figures
-    ]
-    path.write_text(
-        _PAGE.format(
-            title=html.escape(title),
-            lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
-            replay=html.escape(replay_html(recording, model, target)),
-            replayed=replayed,
-            plots=plots_html(recording),
-            curves=_curves(recording, tube),
-            push=PUSH,
-            field=FIELD,
-            user=USER,
-            magnification=MAGNIFICATION,
-            figures="".join(images),
-            versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),
-            seed=recording.seed,
-        ),
-        encoding="utf-8",
+    body = _BODY.format(
+        lines="".join(f"<li>{html.escape(line)}</li>" for line in lines),
+        replay=html.escape(replay_html(recording, model, target)),
+        replayed=replayed,
+        plots=plots_html(recording),
+        curves=_curves(recording, tube),
+        push=PUSH,
+        field=FIELD,
+        user=USER,
+        magnification=MAGNIFICATION,
+        figures="".join(image(figure, figure.stem) for figure in figures),
+        versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),
+        seed=recording.seed,
     )
+    path.write_text(document(title, body, _STYLE), encoding="utf-8")
 
 
 def _curves(recording: Recording, tube: str) -> str:

@@ -1,11 +1,13 @@
 """Figures and page of a run, drawn from its recording, also of a run that was cut short."""
 
+import json
 from pathlib import Path
 from typing import cast
 
 from experiments.files.curve_files import CURVE_FILE
 from experiments.results.figures import draw_figures
-from experiments.results.folder import FIGURES, RECORDING, REPORT, world_of
+from experiments.results.folder import FIGURES, RECORDING, REPORT, SUMMARY, world_of
+from experiments.results.hardware_report import write_hardware_report
 from experiments.results.lead_figure import draw_lead
 from experiments.results.report import write_report
 from experiments.results.stretch_figure import draw_stretch
@@ -15,6 +17,13 @@ from sim.recording.recording import Recording
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording."""
     with Recording(folder / RECORDING) as recording:
+        if "frames" not in recording.groups:  # of a device: no figure was in the loop
+            told = folder / SUMMARY
+            lines = (
+                json.loads(told.read_text(encoding="utf-8"))["lines"] if told.exists() else lines_of(recording, folder)
+            )
+            write_hardware_report(folder, recording, lines)
+            return
         figures = draw_figures(recording, folder / FIGURES)
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")
@@ -22,13 +31,17 @@ def write_report_of(folder: Path) -> None:
         if recording.texts["hand_does"] == "leads":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
-        write_report(
-            folder / REPORT, recording, world_of(recording), recording.texts["title"], _lines(recording), figures
-        )
+        title, said = recording.texts["title"], lines_of(recording, folder)
+        write_report(folder / REPORT, recording, world_of(recording), title, said, figures)
 
 
-def _lines(recording: Recording) -> list[str]:
-    if recording.summary is None:
-        t = recording.channel("ticks", "t")
-        return [f"The run was cut short: {t[-1]:.1f} s of it are recorded, and there is no summary."]
-    return [str(line) for line in cast(list[object], recording.summary["lines"])]
+def lines_of(recording: Recording, folder: Path) -> list[str]:
+    """What happened in a run, in words: as its recording has it, or as was found of one that was stopped."""
+    if recording.summary is not None:
+        return [str(line) for line in cast(list[object], recording.summary["lines"])]
+    stopped = f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."
+    try:
+        found = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["lines"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return [stopped]
+    return [stopped, *map(str, found)]

@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 
+from sim.body.residual import Residual
+
+_TOLD = 5  # falls that are told one by one
+
 
 @dataclass(frozen=True)
 class PushSummary:
@@ -45,6 +49,11 @@ class PathSummary:
         Mean time of a lap; None before the first.
     pushes : tuple of PushSummary
         A hand that grabs, traces or leads does not push.
+    stopped_at : float or None
+        From when on the stylus stood still within a millimetre until the end, if that was a second or more [s]: on an
+        open curve it stays at its end.
+    pace : float or None
+        At which the clips were played while it moved, as a share of their own; None where a lap plays none.
     """
 
     deviation_rms_mm: float | None
@@ -52,6 +61,14 @@ class PathSummary:
     laps: float
     lap_seconds: float | None
     pushes: tuple[PushSummary, ...]
+    stopped_at: float | None = None
+    pace: float | None = None
+
+    def line(self) -> str | None:
+        """When it stopped, and at what pace it went, in a sentence, if there is anything to say."""
+        stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
+        paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their own pace."
+        return " ".join(part for part in (stopped, paced) if part) or None
 
     @property
     def deviation_rms(self) -> float | None:
@@ -69,10 +86,23 @@ class AnimationSummary:
         Largest difference of a joint's rotation between h(p) and h at the curve's nearest point, while the hand does
         something (and until the stylus is back) and otherwise; the first second left out. Of a curve that is bent, h at
         the same phase of the curve that was given.
+    lowest_sole_cm : float
+        Least height of a point of the soles over the floor.
+    foot_skate_cm : float
+        Largest way over the floor of a point of the soles while it is within 3 mm of the floor.
     """
 
     pushed_deg: float
     unpushed_deg: float
+    lowest_sole_cm: float = 0.0
+    foot_skate_cm: float = 0.0
+
+    def soles(self) -> str:
+        """Of its soles, in a sentence."""
+        return (
+            f"Its lowest sole is at {self.lowest_sole_cm:+.1f} cm, and its feet skate {self.foot_skate_cm:.1f} cm "
+            "at most."
+        )
 
 
 @dataclass(frozen=True)
@@ -116,22 +146,27 @@ class TankSummary:
 
 @dataclass(frozen=True)
 class FigureSummary:
-    """How the physical figure followed the animation, until it fell, if it did.
+    """How the physical figure followed the animation while it was up.
 
     Attributes
     ----------
+    falls : tuple of float
+        When it fell [s].
     fell_at : float or None
-        When its root was first half a metre from the animation's [s], if it was. What follows is of the time before.
+        The first of them.
+    seconds, up_seconds : float
+        How long it was looked at [s], and for how much of that it was up: neither lying after a fall nor being set back
+        onto the animation. What follows is of that time.
     joint_error_rms_deg, root_error_rms_cm, root_error_max_cm : float
     residual_force_rms : float
-        Residual force at the root while the reference is on the ground, as a share of body weight.
-    residual_force_max : float
-        Likewise, the largest.
-    residual_moment_rms : float
-        Moment over body weight × 1 m, likewise.
+        Of `stance`: residual force while the reference stands, as a share of body weight.
+    stance, flight, without_ground_force : Residual
+        Residual while a foot of the reference stands, while it flies, and while the ground does not bear the figure,
+        whatever the reference does.
     residual_in_flight_max : float
-        Largest residual force or moment while the reference flies [N, N m].
-    flight_seconds : float
+        Largest share in `flight`; zero by construction.
+    flight_seconds, lost_contact_seconds : float
+        For how long the reference flies [s], and for how long the ground bears nothing though a foot of it stands.
     saturated : float
         Share of the motors' time at their limit.
     grounded : float
@@ -140,27 +175,46 @@ class FigureSummary:
         Mean vertical ground force as a share of body weight.
     """
 
+    falls: tuple[float, ...]
     fell_at: float | None
+    seconds: float
+    up_seconds: float
     joint_error_rms_deg: float
     root_error_rms_cm: float
     root_error_max_cm: float
     residual_force_rms: float
-    residual_force_max: float
-    residual_moment_rms: float
+    stance: Residual
+    flight: Residual
+    without_ground_force: Residual
     residual_in_flight_max: float
     flight_seconds: float
+    lost_contact_seconds: float
     saturated: float
     grounded: float
     ground_force_mean: float
 
-    def line(self) -> str:
-        """How it followed, in a sentence; until it fell, if it did."""
+    def fall_line(self) -> str | None:
+        """When it fell, and what its figures are of, in a sentence, if it did."""
+        if not self.falls:
+            return None
+        when = ", ".join(f"{at:.1f}" for at in self.falls[:_TOLD]) + (", …" if len(self.falls) > _TOLD else "")
+        times = "" if len(self.falls) == 1 else f" {len(self.falls)} times"
         return (
-            ("" if self.fell_at is None else "Until it fell: ")
-            + f"The physical figure followed within {self.joint_error_rms_deg:.2f}° RMS at the joints and "
-            f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
-            f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance."
+            f"The physical figure fell{times} at {when} s; what is said of it is of the {self.up_seconds:.1f} of "
+            f"{self.seconds:.1f} s in which it was up."
         )
+
+    def lines(self) -> list[str]:
+        """How it followed, a sentence or two."""
+        stance, lost = self.stance, self.without_ground_force
+        airborne = f"In {lost.seconds:.2f} s without ground force the residual is {lost.brief()}."
+        return [
+            f"The physical figure followed within {self.joint_error_rms_deg:.2f}° RMS at the joints and "
+            f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
+            f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance.",
+            f"Residual in stance, RMS and peak: {stance.brief()} ({stance.verdict()})."
+            + (f" {airborne}" if lost.seconds > 0.0 else ""),
+        ]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ sway δ of the cart-table model (Kajita et al. 2003), which for a lap is solved 
 What the clips themselves are out of balance is left to their blends: a clip alone does not sway.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -21,7 +20,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.authoring.balance import GRAVITY
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 Array = npt.NDArray[np.float64]
@@ -59,10 +58,9 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
     shape = (_ROWS, len(haptic_map.mixtures), 2)
     model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
     mujoco.mj_saveModel(figure, None, model)
-    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
-    made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]), code)
+    made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]))
     return haptic_map.with_sway(
-        kept_array(CACHE_FOLDER, "sway", made_of, shape, lambda: _sway(haptic_map, figure, lap))
+        kept_array(kept_folder(__name__), "sway", made_of, shape, lambda: _sway(haptic_map, figure, lap))
     )
 
 

@@ -6,7 +6,7 @@ Light to import, as what certificates are checked by is.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from controllers.errors import ParameterError
+from controllers.fields.bunny import felt_bunny
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved, river_gains, tube_gains
@@ -37,13 +37,7 @@ _ANY = float("inf")
 
 
 def certified_laws(config: RunConfig) -> Laws:
-    """The laws that a run uses.
-
-    Raises
-    ------
-    ParameterError
-        If there is no certificate for them.
-    """
+    """The laws that a run uses."""
     return _LAWS[config.mode.kind](resolved(config).mode)
 
 
@@ -55,6 +49,23 @@ def leading_drag(config: RunConfig) -> float:
     return mode.damping if isinstance(mode, Follow | StretchThenFollow) else 0.0
 
 
+def governor_drag(config: RunConfig) -> float:
+    """Drag [N s/m] of the governor that a run's law is added to; 0 without one, and where rivers are gated instead."""
+    governor = getattr(config.mode, "governor", None)
+    return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
+
+
+def left_out(config: RunConfig) -> tuple[str, ...]:
+    """What a run executes besides its certified laws, and no certificate covers; in words."""
+    mode = config.mode
+    names: list[str] = []
+    if getattr(mode, "walls", None) is not None:
+        names.append("the soft walls (--walls)")
+    if isinstance(mode, Rivers) and mode.governor is not None:
+        names.append("the gates of the rivers (--governor)")
+    return tuple(names)
+
+
 def _follow(mode: Follow | StretchThenFollow) -> Laws:
     return {"": CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)}
 
@@ -62,13 +73,11 @@ def _follow(mode: Follow | StretchThenFollow) -> Laws:
 def _bunny(mode: Bunny) -> Laws:
     """Near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
     along = mode.bunny_attraction == "along"
-    width = _ANY if along else mode.bunny_width
-    return {"": CertifiedLaw("follow" if along else "bunny", mode.stiffness, mode.damping, width)}
+    k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
+    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _ANY if along else width)}
 
 
 def _rivers(mode: Rivers) -> Laws:
-    if mode.governor is not None:
-        raise ParameterError("rivers are certified without --governor")
     return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
 
 

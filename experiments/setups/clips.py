@@ -4,13 +4,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from controllers.errors import ParameterError
+from experiments.preparation.prepared_clip import prepared_clip
 from models.errors import ModelError
 from models.mocap.clip import Clip
-from models.mocap.library import embedded, embedded_names, load
+from models.mocap.library import embedded, embedded_names
 
 
-def load_clips(names: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     """Clips by name or file, and what has to be said about them.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of embedded clips, or motion files.
+    raw : bool
+        Take motion files as captured; else they are prepared, once for each content (`prepared_clip`).
 
     Raises
     ------
@@ -25,9 +33,9 @@ def load_clips(names: Sequence[str]) -> tuple[tuple[Clip, ...], tuple[str, ...]]
         elif not Path(name).suffix:
             raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}, or give a file")
         else:
-            loaded = load(Path(name))
-            clips.append(loaded.clip)
-            remarks += [] if loaded.report is None else loaded.report.lines()
+            prepared = prepared_clip(Path(name), raw)
+            clips.append(prepared.clip)
+            remarks += prepared.remarks
     return tuple(clips), tuple(remarks)
 
 

@@ -14,7 +14,7 @@ from sim.users.wishes import ENGAGED, PLACE
 
 POSES = 128  # along a motion: some 3 degrees of a lap apart
 _BESIDE = 2e-3  # [m] by which the stylus is moved to learn what the figure does
-_BLIND = 0.15  # of the strongest effect of a movement on the figure: what shows less is not seen
+_BLIND = 0.15  # λ over the strongest effect of a movement on the figure: what shows less is felt rather than seen
 
 
 def with_eyes(servo: Servo, user: Participant, curve: Array) -> Servo:
@@ -55,6 +55,7 @@ def learned_eye(servo: Servo, places: Array) -> Eye:
         for step in _BESIDE * np.eye(3)
     ], axis=2)  # fmt: skip
     u, strengths, v = np.linalg.svd(effects, full_matrices=False)
-    floor = _BLIND * strengths[:, :1]
-    inverses = np.einsum("nij,ni,nki->njk", v, strengths / (strengths**2 + floor**2), u)
-    return Eye(reference.pose, poses(places), np.ascontiguousarray(places), np.ascontiguousarray(inverses))
+    trust = (_BLIND * strengths[:, 0]) ** 2
+    inverses = np.einsum("nij,ni,nki->njk", v, strengths / (strengths**2 + trust[:, None]), u)
+    unseen = np.eye(3) - inverses @ effects
+    return Eye(reference.pose, poses(places), *(np.ascontiguousarray(a) for a in (places, inverses, unseen, trust)))

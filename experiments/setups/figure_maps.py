@@ -34,7 +34,7 @@ from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
 from models.humanoid.skeleton import BODIES
 from models.mocap.clip import Clip
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
 
 Array = npt.NDArray[np.float64]
@@ -73,7 +73,8 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         If there are none, or more than four, or they do not fit together.
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
-    made = _cylinder(motions, (place.radius - reach, place.radius + reach), (-reach, reach), figure_legs(figure))
+    radii, legs = (place.radius - reach, place.radius + reach), figure_legs(figure)
+    made = _cylinder(motions, radii, (-reach, reach), legs, place.curve.duration)
     return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
 
 
@@ -88,7 +89,8 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     lower, red, blue = _motions(clips, 3, "composite")
     legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
     upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    return _about_circle(place, CompositeMap(lower, red, blue, sorted(upper), radii, legs), clips)
+    made = CompositeMap(lower, red, blue, sorted(upper), radii, legs, place.curve.duration)
+    return _about_circle(place, made, clips)
 
 
 def _cylindrical(config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -107,9 +109,9 @@ def _river_clips_parts(
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
     curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
-    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure))
+    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
     parts = _about_circle(place, made, clips)
-    return replace(parts, moves=True, plays_rivers=True, refined=lambda: with_rests(made, figure))
+    return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -141,8 +143,9 @@ def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipM
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
-        river_pushes=lambda mode, seconds: river_pushes(curve, seconds), course=lambda damping: curve,
-        expressive=place.expressive, held_seconds=made.lap_seconds,
+        river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
+        course=lambda damping: course_of(curve, damping), moves=True, expressive=place.expressive,
+        held_seconds=made.lap_seconds,
     )  # fmt: skip
 
 
@@ -184,14 +187,16 @@ def reached(curve: Trajectory) -> Trajectory:
 
 
 def _cylinder(
-    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...]
-) -> CylindricalMap:
+    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...],
+    lap: float,
+) -> CylindricalMap:  # fmt: skip
     """The map of four clips; its corrections, once found, are kept beside the compiled code."""
 
     def find() -> Array:
-        return CylindricalMap(clips, radii, heights, legs).corrections
+        return CylindricalMap(clips, radii, heights, legs, None, lap).corrections
 
     # Where the clips blend is not among what they depend on.
-    made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
-    corrections = kept_array(CACHE_FOLDER, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
-    return CylindricalMap(clips, radii, heights, legs, corrections)
+    made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
+    folder = kept_folder(CylindricalMap.__module__)
+    corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    return CylindricalMap(clips, radii, heights, legs, corrections, lap)

@@ -1,5 +1,6 @@
 """A run that is wired up: its parts, and what of them a recording keeps."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from controllers.fields.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
 from experiments.setups.parts import Parts, Settings
-from models.humanoid.skeleton import N_POSE
+from models.humanoid.skeleton import N_POSE, standing_com
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.scene import FIGURE, P_WH
@@ -84,7 +85,9 @@ class Session:
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
             "motor_peak": np.array(PREMIUM_1_5.peak_torque),
+            "clip_seconds": math.nan if self.parts.maps.lap_seconds is None else self.parts.maps.lap_seconds,
             "body_weight": self.weight,
+            "com_height": standing_com(scene.stature, scene.mass),
             "scene": np.array([scene.stature, scene.mass, scene.servo_period, scene.physics_step]),
             "figure": self.world.kind,
             "title": f"{notes.title} over {', '.join(clip.name for clip in self.clips)}",

@@ -37,7 +37,7 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
     """
     remarks: tuple[str, ...] = ()
     if clips is None:
-        clips, remarks = load_clips(config.map.clips)
+        clips, remarks = load_clips(config.map.clips, config.map.raw)
     setups: dict[str, Callable[..., MapParts[Any]]] = {**MAP_SETUPS, "led": led_parts}
     setup = setups[config.map.kind]
     return setup(config, config.map, clips, figure).said(remarks)

@@ -87,12 +87,17 @@ def _parts(
     performance: _Performance, remarks: tuple[str, ...],
 ) -> Parts:  # fmt: skip
     if mode.bump > 0.5 * maps.curve.duration:
-        raise ParameterError(f"bump is {mode.bump} s; expected at most half a lap, {0.5 * maps.curve.duration:g} s")
+        lap = maps.curve.duration
+        raise ParameterError(
+            f"a lap of {lap:g} s is too short for a bend of --bump {mode.bump:g} s to either side; expected --lap "
+            f"{2.0 * mode.bump:g} or more, or --bump {0.5 * lap:g} or less"
+        )
     user = _user(config, mode, maps)
     seek, damping = tube_gains(mode)
     tubes = StretchyTubes(
         course, seek, mode.rubber, damping,
         epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE,
+        hold=mode.rubber_from,
     )  # fmt: skip
     pushed = first_pushed_lap(maps.curve, user.grabs)
     if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:

@@ -189,7 +189,10 @@ def _reference(parts: Parts, world: World, compiled: CompiledMap) -> CompiledRef
 
 
 def _physical(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyState, CompiledReference]:
-    figure = Figure(world.model, world.data, world.figure, FIGURE, parts.gains)
+    period = parts.config.clock.servo_period * parts.config.figure.figure_ticks
+    bounds = parts.config.figure
+    gains = parts.gains._replace(force_bound=bounds.residual_force, moment_bound=bounds.residual_moment)
+    figure = Figure(world.model, world.data, world.figure, FIGURE, gains, period)
     return figure.state, _reference(parts, world, compiled)
 
 

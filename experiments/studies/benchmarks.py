@@ -7,7 +7,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.state import HandState
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
-from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
 from experiments.results.folder import SUMMARY
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs
@@ -31,8 +31,11 @@ from experiments.setups.session import Session
 from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from experiments.setups.wiring import wire
+from experiments.studies.bench_figures import Figure, tell
 from experiments.studies.field_cost import heaviest_field, tick_microseconds
 from experiments.studies.figure_cost import figure_cost
+from experiments.studies.recorder_cost import recorder_cost
+from experiments.studies.tick_cost import MODES, STEP, prepared, tick_cost
 from experiments.studies.trial_cost import trial_cost
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
@@ -41,83 +44,107 @@ from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
-from sim.loop.loop import make_logs
-from sim.loop.servo import FrameLog, TickLog, run_block
+from sim.loop.servo import run_block
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-SECONDS = 2.0  # simulated in each measurement of the loop
 ROUNDS = 7
+_START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
+"""What a program of these libraries cannot do without before its first tick."""
 
 
-def bench() -> None:
-    """Print every figure with what it has to reach."""
-    config = RunConfig(seconds=SECONDS)
-    clips, _ = load_clips(config.map.clips)
-    ratio, factor, same = closed_loop_over_replay(lambda: wire(config, clips))
-    print(f"closed loop / replay of its controls, one thread: {ratio:.3f} (≤ 1.05); same states bit for bit: {same}")
-    print(f"real-time factor of one thread: {factor:.2f}")
-    print(f"two threads / twice one thread: {thread_scaling(lambda: wire(config, clips)):.2f} (≥ 0.90)")
-    small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
-    print(f"closest point: {small:.2f} µs on 10 pieces, {large:.2f} µs on 10 000: ×{large / small:.2f} (≤ 3)")
-    print(f"ten rivers of higher order, with the limiter: {tick_microseconds(*heaviest_field()):.1f} µs a tick (≤ 20)")
-    print(f"second start of hvf to its first tick: {second_start_seconds():.1f} s (≤ 3)")
-    cost = figure_cost()
-    print(f"kinematic figure, against the physical one: {cost.physical / cost.kinematic:.1f} × as fast (≥ 3)")
-    print(f"no figure, against the physical one: {cost.physical / cost.none:.1f} × as fast (≥ 5)")
-    print(f"a tick without figure: {cost.none / cost.bare_step:.1f} bare mj_steps of the linkage (≤ 3)")
-    trials = trial_cost()
-    print(f"a study beside its trials, processor time: {100 * trials.overhead:.1f} % (≤ 5)")
-    print(f"trials on two threads / twice one: {trials.scaling:.2f} (≥ 0.90)")
-    print(f"memory after 400 short trials more / before: {trials.grown:.3f} (≤ 1.01)")
-    print(f"soft walls of 17 joints: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
-    print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
-    four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))
-    print(f"lifted map, h(p) with h_*, four clips near: {four:.1f} µs (≤ 20)")
-    print(f"lifted map, 10 → 100 clips: {ten:.1f} → {hundred:.1f} µs: ×{hundred / ten:.2f} (≤ 2)")
-    made, verified = certificate_seconds()
-    print(f"certificate of the demo: {made:.1f} s (≤ 20), verified in {verified:.2f} s (≤ 1)")
-    print(f"ten clips of 10 s lifted, with the report: {lifting_seconds():.1f} s (≤ 60)")
+def bench(as_json: bool = False, check: bool = False) -> int:
+    """Measure all figures and tell them; see `experiments.studies.bench_figures.tell` for what is returned."""
+    return tell(figures(), as_json, check)
 
 
-def closed_loop_over_replay(make: Callable[[], Session]) -> tuple[float, float, bool]:
-    """Time of the closed loop over that of replaying its controls, real-time factor, and whether the states agree.
+def figures() -> Iterator[Figure]:
+    """Every figure with what it has to keep to, as it is measured; bounds are ratios within one run.
 
-    Both run through `sim.loop.servo.run_block`, in turn; the median of the ratios of neighbouring runs is taken.
+    What is bounded in units of a step, `mj_steps`, is so many times a bare step of the demo's world on this machine.
     """
-    ratios: list[float] = []
-    factors: list[float] = []
-    same = True
-    for _ in range(ROUNDS):
-        session, ticks, frames, n = _prepared(make)
-        closed = _timed(session, n, False, ticks, frames)
-        end = session.world.data.qpos.copy()
-        other, _, unused, _ = _prepared(make)
-        replayed = _timed(other, n, True, ticks, unused)
-        same = same and bool(np.array_equal(end, other.world.data.qpos))
-        ratios.append(closed / replayed)
-        factors.append(SECONDS / closed)
-    return statistics.median(ratios), statistics.median(factors), same
+    costs = {name: tick_cost(make()) for name, make in MODES.items()}
+    step = costs["follow"].step
+    yield Figure(
+        "simulated seconds per second, physics and servo at 1 kHz, figure at 500 Hz", STEP / costs["follow"].tick
+    )
+    yield Figure("microseconds of a bare mj_step of the world", 1e6 * step)
+    for name, cost in costs.items():
+        yield Figure(f"a closed-loop tick, {name}", cost.tick / cost.step, "mj_steps", at_most=1.5)
+    default = tick_cost(run_config())
+    yield Figure("simulated seconds per second, default clock", 1e-3 / default.tick)
+    yield Figure("a closed-loop tick of the default clock, two steps", default.tick / default.step, "mj_steps")
+    agree = all(cost.same for cost in (*costs.values(), default))
+    yield Figure("runs whose replayed controls give the same states, bit for bit, of all", float(agree), at_least=1.0)
+    cost = figure_cost()
+    yield Figure(
+        "kinematic figure, against the physical one", cost.physical / cost.kinematic, "× as fast", at_least=3.0
+    )
+    yield Figure("no figure, against the physical one", cost.physical / cost.none, "× as fast", at_least=5.0)
+    yield Figure("a tick without figure", cost.none / cost.bare_step, "mj_steps of the linkage", at_most=3.0)
+    config = run_config()
+    clips, _ = load_clips(config.map.clips)
+    yield Figure("two threads / twice one thread", thread_scaling(lambda: wire(config, clips)), at_least=0.9)
+    recorder = recorder_cost()
+    yield Figure("a run with its recorder, against one without", recorder.ratio, "× the processor time", at_most=1.15)
+    yield Figure("memory after 20 s recorded / before", recorder.grown, at_most=1.02)
+    small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
+    yield Figure("closest point, 10 → 10 000 pieces", large / small, "×", at_most=3.0)
+
+    def in_steps(name: str, microseconds: float, most: float) -> Figure:
+        return Figure(name, 1e-6 * microseconds / step, "mj_steps", at_most=most)
+
+    yield in_steps("ten rivers of higher order, with the limiter", tick_microseconds(*heaviest_field()), 0.3)
+    yield in_steps("soft walls of 17 joints", walls_microseconds(wire(config, clips)), 0.5)
+    yield in_steps("h(p) with h_* over four clips", map_microseconds(wire(config, clips)), 1.0)
+    four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))
+    yield in_steps("lifted map, h(p) with h_*, four clips near", four, 1.0)
+    yield Figure("lifted map, 10 → 100 clips", hundred / ten, "×", at_most=2.0)
+    trials = trial_cost()
+    yield Figure("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
+    yield Figure("trials on two threads / twice one", trials.scaling, at_least=0.9)
+    yield Figure("memory after 10 000 short trials / after 400", trials.grown, at_most=1.01)
+    start = libraries_seconds()
+    yield Figure(
+        "second start of hvf to its first tick", second_start_seconds() / start, "× its libraries", at_most=3.0
+    )
+    yield Figure("second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0)
+    yield Figure("hvf --help", _seconds_of("--help") / start, "× its libraries", at_most=1.5)
+    made, verified = certificate_seconds()
+    yield in_steps("certificate of the demo", 1e6 * made, 300_000)
+    yield Figure("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
+    yield in_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
+
+
+def libraries_seconds() -> float:
+    """Seconds that a new process takes to import the libraries that a run needs, the best of three."""
+    times: list[float] = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, "-c", _START], check=True)
+        times.append(time.perf_counter() - begin)
+    return min(times)
 
 
 def thread_scaling(make: Callable[[], Session]) -> float:
     """Throughput of two threads, a session each, over twice that of one."""
     ratios: list[float] = []
     for _ in range(ROUNDS):
-        session, ticks, frames, n = _prepared(make)
-        alone = _timed(session, n, False, ticks, frames)
-        pair = [_prepared(make) for _ in range(2)]
+        alone, pair = prepared(make), [prepared(make) for _ in range(2)]
         threads = [
             threading.Thread(target=run_block, args=(session.servo, 0, n, False, ticks, frames))
             for session, ticks, frames, n in pair
         ]
         begin = time.perf_counter()
+        session, ticks, frames, n = alone
+        run_block(session.servo, 0, n, False, ticks, frames)
+        one, begin = time.perf_counter() - begin, time.perf_counter()
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        ratios.append(alone / (time.perf_counter() - begin))
+        ratios.append(one / (time.perf_counter() - begin))
     return statistics.median(ratios)
 
 
@@ -152,19 +179,6 @@ def lifting_seconds() -> float:
 def _seconds_of(*arguments: str) -> float:
     begin = time.perf_counter()
     subprocess.run([sys.executable, "-m", "experiments.cli", *arguments], check=True, capture_output=True)
-    return time.perf_counter() - begin
-
-
-def _prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
-    session = make()
-    n = round(SECONDS / session.servo.plant.period)
-    ticks, frames = make_logs(session.servo, n)
-    return session, ticks, frames, n
-
-
-def _timed(session: Session, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> float:
-    begin = time.perf_counter()
-    run_block(session.servo, 0, n, replay, ticks, frames)
     return time.perf_counter() - begin
 
 

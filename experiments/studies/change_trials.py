@@ -73,7 +73,7 @@ def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
     """The default rivers, one for each of three embedded clips, with the phases at which these can stand."""
     figure = figure_model()
     rivers = river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, _TUBE).rivers
-    clips = [(clip.poses, clip.fps) for clip in load_clips(names)[0]]
+    clips = [(clip.poses, clip.fps) for clip in load_clips(names, raw=True)[0]]
     return with_rests(RiverClips([river.curve for river in rivers], clips, _TUBE, figure_legs(figure)), figure)
 
 

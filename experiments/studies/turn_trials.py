@@ -163,7 +163,7 @@ def main(names: list[str]) -> None:
     """Print a table of clips."""
     print("| clip | played at | certified up to | missed from | error | misses by at least | misses | its mean |")
     print("|---|---|---|---|---|---|---|---|")
-    clips, _ = load_clips(names)
+    clips, _ = load_clips(names, raw=True)
     for clip in clips:
         margin = clip_ballistics(clip).certificate.verdicts["turns"].margin or 0.0
         pace = max(1.0, _FASTER * float(np.sqrt(1.0 + margin)))

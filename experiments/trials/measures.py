@@ -13,12 +13,14 @@ import numpy.typing as npt
 
 from controllers.state import Array
 from experiments.config.run_config import PERSONAL, RunConfig
-from experiments.results.measures import FALLEN, SETTLING, TOUCH
+from experiments.results.figure_measure import TOUCH
+from experiments.results.measures import SETTLING
 from experiments.results.pose_distance import geodesic_distance, seen_distance
 from experiments.results.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.trials.trial_log import TrialLog
+from sim.body.falls import UP
 
 SEEN_RATE = 25.0  # [Hz] at which animations are compared: what an eye tells apart
 _NAN = float("nan")
@@ -164,7 +166,7 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
 
 def _of_figure(frames: Mapping[str, Array], weight: float) -> dict[str, float]:
     """Of the physical figure, until it fell if it did."""
-    fallen = frames["root_error"] > FALLEN
+    fallen = frames["down"] != UP
     until = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
     flight = frames["flight"][:until] > 0.0
     standing = frames["ground"][:until, 2][~flight] > TOUCH

@@ -1,41 +1,17 @@
 """report.html of a tuning: what was chosen, what it gains, in one file that opens from disk."""
 
-import base64
 import html
-import io
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from experiments.results.html_page import document, image, sentences, short
 from experiments.tuning.contenders import Contender
 from experiments.tuning.tune_config import TuneConfig, label_of
 
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1000px; padding: 1.5rem; }}
-h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
-h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
-.found {{ border-left: 4px solid #1f5fbf; padding-left: 1rem; }}
-.found p {{ margin: .4rem 0; }}
-p.note {{ font-size: .9rem; color: #566072; }}
-table {{ border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: .25rem .9rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; }}
-th:first-child, td:first-child, td.l {{ text-align: left; }}
-img {{ max-width: 100%; }}
-pre {{ background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-<div class="found">{sentences}</div>
+_BODY = """{sentences}
 <h2>Candidates</h2>
 {plots}
 <h2>On {users} users who took no part in the tuning</h2>
@@ -48,20 +24,17 @@ rule of Ziegler and Nichols, at the default damping.</p>
 <table>{verdicts}</table>
 <h2>The tuning</h2>
 <pre>{text}</pre>
-</body>
-</html>
 """
 
 
 def tuning_page(
-    config: TuneConfig, text: str, sentences: Sequence[str], judged: Sequence[Contender], comparisons: Sequence[Any],
+    config: TuneConfig, text: str, said: Sequence[str], judged: Sequence[Contender], comparisons: Sequence[Any],
     importances: Mapping[str, Mapping[str, float]], plots: Sequence[Figure | None], verdicts: Mapping[str, str],
 ) -> str:  # fmt: skip
     """The page; comparisons are of `experiments.tuning.tuning.Comparison`, verdicts are reasons by name."""
-    return _PAGE.format(
-        title=html.escape(config.name),
-        sentences="".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences),
-        plots="".join(_image(plot) for plot in plots if plot is not None),
+    body = _BODY.format(
+        sentences=sentences(said),
+        plots="".join(image(plot, "plot") for plot in plots if plot is not None),
         users=config.held_back.number,
         contenders=_contenders(config, judged, comparisons),
         importances=_importances(importances),
@@ -70,12 +43,7 @@ def tuning_page(
         ),
         text=html.escape(text),
     )
-
-
-def _image(figure: Figure) -> str:
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    return f'<img alt="plot" src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
+    return document(config.name, body)
 
 
 def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Sequence[Any]) -> str:
@@ -87,10 +55,10 @@ def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Se
         cells = ""
         for k, objective in enumerate(config.objectives):
             gain = gains.get((contender.name, objective))
-            told = "" if gain is None else _short(gain.better_by)
+            told = "" if gain is None else short(gain.better_by)
             if gain is not None and math.isfinite(gain.low):
                 told += f" ({gain.low:.3g} to {gain.high:.3g})"
-            cells += f"<td>{_short(float(contender.means[k]))}</td><td>{told}</td>"
+            cells += f"<td>{short(float(contender.means[k]))}</td><td>{told}</td>"
         margin = "–" if contender.stability.margin is None else f"{contender.stability.margin:.3g}"
         rows.append(f"<tr><td>{html.escape(contender.name)}</td><td>{values}</td><td>{margin}</td>{cells}</tr>")
     return "".join(rows)
@@ -104,7 +72,3 @@ def _importances(importances: Mapping[str, Mapping[str, float]]) -> str:
         for objective, shares in importances.items() for word, share in shares.items()
     )  # fmt: skip
     return f"<h2>Which number matters</h2><table><tr><th>for</th><th>number</th><th>share</th></tr>{rows}</table>"
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "–"

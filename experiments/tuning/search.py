@@ -1,12 +1,10 @@
 """The search: candidates are proposed, certified, and only then tried on the panel; all of it is kept as it goes."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import optuna
-from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from experiments.certify.kept_stability import Stability, kept_stability
@@ -43,18 +41,23 @@ class Candidate(NamedTuple):
 
 
 def search(
-    config: TuneConfig, journal: Path, identity: str, panel: Panel, sampler: str, progress: Callable[[int], None]
+    config: TuneConfig,
+    storage: optuna.storages.BaseStorage,
+    identity: str,
+    panel: Panel,
+    sampler: str,
+    progress: Callable[[int], None],
 ) -> list[Candidate]:
-    """Search until enough candidates have been simulated, going on with what the journal has.
+    """Search until enough candidates have been simulated, going on with what the storage has.
 
     Parameters
     ----------
     config : TuneConfig
         What is tuned.
-    journal : Path
-        File of optuna's journal.
+    storage : optuna.storages.BaseStorage
+        That keeps the search; see `experiments.tuning.storage`.
     identity : str
-        Of the tuning, by which the journal knows it.
+        Of the tuning, by which the storage knows it.
     panel : Panel
         That tries candidates.
     sampler : str
@@ -63,7 +66,6 @@ def search(
         Called with the number of simulated candidates.
     """
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    storage = optuna.storages.JournalStorage(JournalFileBackend(str(journal)))
     study = optuna.create_study(
         storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP, n_warmup_steps=1),

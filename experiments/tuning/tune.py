@@ -34,8 +34,8 @@ class Search:
         Runs at a time.
     allow_unknown : bool
         Try candidates of which nothing is certain, too; what is refuted is never tried.
-    journal : path, optional
-        File that keeps the search, so that it goes on where it was stopped.
+    journal : path or URL, optional
+        What keeps the search, so that it goes on where it was stopped: a file, or a database as of ``sqlite:///``.
     seed : int
         Of what is random in it.
     """
@@ -137,12 +137,11 @@ def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
 
 def _study(search: Search, space: Mapping[str, tuple[float, float]]) -> Any:
     import optuna
-    from optuna.storages.journal import JournalFileBackend
+
+    from experiments.tuning.storage import storage_of
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    kept = None
-    if search.journal is not None:
-        kept = optuna.storages.JournalStorage(JournalFileBackend(str(search.journal)))
+    kept = None if search.journal is None else storage_of(search.journal)
     name = f"hvf.tune {sorted(space.items())}"
     directions: list[Literal["minimize", "maximize"]] = ["minimize"] * search.costs
     return optuna.create_study(storage=kept, study_name=name, load_if_exists=True, directions=directions)

@@ -70,6 +70,9 @@ class TuneConfig:
         Try candidates of which nothing is certain, too; what is refuted is never tried.
     seed : int
         Of the search and of the trials.
+    storage : str
+        URL of a database that SQLAlchemy knows and that keeps the search, such as ``sqlite:///tune.db``; by default a
+        journal file in the folder.
     """
 
     name: str
@@ -86,6 +89,7 @@ class TuneConfig:
     least_margin: float = at_least(0.0, default=0.0)
     allow_unknown: bool = False
     seed: int = whole(0, default=1)
+    storage: str = ""
 
     @property
     def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:

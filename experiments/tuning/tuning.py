@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from optuna.storages import BaseStorage
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -23,6 +24,7 @@ from experiments.tuning.page import tuning_page
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.plots import gains_figure, objectives_figure
 from experiments.tuning.search import Candidate, chosen, search
+from experiments.tuning.storage import storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
@@ -116,13 +118,13 @@ def run_tuning(
         If it contradicts itself, or cannot go on; what was tried is kept.
     """
     console, text = console or Console(stderr=True), text or to_json(config)
-    identity = hashlib.sha256(to_json(replace(config, candidates=1, name="")).encode()).hexdigest()[:16]
+    identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
         first = panel_runs(config.config({}), config.users, 1, config.seed)[0][0]
         warm([first], SHELF, console)
         with executor(threads, workers, cluster) as runs:
-            panel = Panel(database, runs)
-            found = _searched(config, out / JOURNAL, identity, panel, config.sampler, console)
+            panel, storage = Panel(database, runs), storage_of(config.storage or out / JOURNAL)
+            found = _searched(config, storage, identity, panel, config.sampler, console)
             best = chosen(found, config.directions)
             if best is None:
                 raise StudyError(
@@ -131,7 +133,7 @@ def run_tuning(
                 )
             others: dict[str, Candidate | None] = {}
             if config.sampler != "random":
-                drawn = _searched(config, out / JOURNAL, identity, panel, "random", console)
+                drawn = _searched(config, storage, identity, panel, "random", console)
                 others[RANDOM] = chosen(drawn, config.directions)
             with console.status("held-back users"):
                 judged = contenders(config, best, others, panel)
@@ -139,12 +141,12 @@ def run_tuning(
 
 
 def _searched(
-    config: TuneConfig, journal: Path, identity: str, panel: Panel, sampler: str, console: Console
+    config: TuneConfig, storage: BaseStorage, identity: str, panel: Panel, sampler: str, console: Console
 ) -> list[Candidate]:
     columns = (TextColumn(f"{sampler} candidates"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
     with Progress(*columns, TimeRemainingColumn(), console=console) as progress:
         bar = progress.add_task("", total=config.candidates)
-        return search(config, journal, identity, panel, sampler, lambda n: progress.update(bar, completed=n))
+        return search(config, storage, identity, panel, sampler, lambda n: progress.update(bar, completed=n))
 
 
 def _told(

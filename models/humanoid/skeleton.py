@@ -128,6 +128,7 @@ FOOT_CONTACTS: tuple[str, ...] = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel_out", "heel_in", "toe_out", "toe_in")
 )
 HAND_CONTACTS: tuple[str, ...] = ("left_palm", "right_palm")
+_NEARLY_HALF_TURN = np.deg2rad(175.0)  # where the rotation vector of a joint jumps to its opposite
 CONTACT_RADIUS = 0.02  # of the contact spheres, at the default stature [m]
 
 
@@ -197,6 +198,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
         body.explicitinertial = True
         body.mass, body.ipos, body.inertia = inertia.mass, inertia.com, inertia.principal
     for segment, limit in zip(SEGMENTS[1:], limits, strict=True):
+        _add_stop(spec.joint(segment.joint), segment)
         for axis, name in enumerate("xyz"):
             gear = [float(axis == k) for k in range(3)] + [0.0, 0.0, 0.0]
             spec.add_actuator(
@@ -204,6 +206,26 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
                 ctrllimited=True, ctrlrange=(-limit[axis], limit[axis]),
             )  # fmt: skip
     return spec
+
+
+def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> float:
+    """Height of the centre of mass of the figure in its rest pose over the floor [m]."""
+    model = figure_model(stature, mass)
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest_pose(stature)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return float(data.subtree_com[0, 2])
+
+
+def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
+    """Stop a ball joint at the largest angle that its limits admit, where that is less than half a turn.
+
+    MuJoCo's ball joints know one limit, of the angle of the whole rotation: the corner of the box of `Segment.limit`.
+    """
+    angle = float(np.linalg.norm(np.abs(segment.limit).max(axis=1)))
+    if angle < _NEARLY_HALF_TURN:
+        joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [0.0, angle]
 
 
 def figure_model(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> mujoco.MjModel:

@@ -15,6 +15,8 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.retarget import Hints, RetargetReport, retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 
+_FORMATS = "BVH, AMC (with its ASF beside it) or DeepMimic JSON"
+_BY_CONTENT = ("", ".txt", ".json")  # suffixes that do not tell the format
 _CLIPS = files("models.mocap") / "clips"
 
 
@@ -100,12 +102,14 @@ def read_motion(path: Path) -> SourceMotion:
         return read_bvh(path)
     if suffix == ".amc":
         return read_amc(path)
+    if suffix not in _BY_CONTENT:
+        raise MotionFileError(path, 0, f"{suffix} files are not read", _FORMATS)
     start = next((text.strip() for _, text in numbered_lines(path) if text.strip()), "")
     if start.upper().startswith("HIERARCHY"):
         return read_bvh(path)
     if start.startswith(("{", "[")):
         return read_deepmimic(path)
-    raise MotionFileError(path, 1, "not a motion file", "BVH, AMC (with its ASF beside it) or DeepMimic JSON")
+    raise MotionFileError(path, 1, "not a motion file", _FORMATS)
 
 
 def convert(source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None) -> Loaded:

@@ -15,7 +15,7 @@ is
 left, bounded, in proportion to the support, and zero while the reference flies or nothing touches: then the root falls
 as it must. The torques are the other 51 rows. A motor that would need more than its limit gives way: its joint's
 acceleration becomes the one that the limit allows, and the plan is made again; what the saturated joints of a standing
-leg cannot give is residual too. No spring holds the root.
+leg cannot give is residual too. No spring holds the root. A figure that falls lies, and is set back (`sim.body.falls`).
 """
 
 from dataclasses import dataclass, field
@@ -35,7 +35,8 @@ from models.humanoid.skeleton import (
     SEGMENTS,
 )
 from sim.body.contact_forces import N_EDGES
-from sim.body.figure_state import Array, FigureGains, FigureState
+from sim.body.falls import fall_state
+from sim.body.figure_state import REPORT_SIZE, Array, FigureGains, FigureState
 from sim.body.whole_body import figure_torque
 from sim.compilation.units import unit_function
 from sim.errors import SimError
@@ -64,6 +65,8 @@ class Figure:
         Of the figure's names in the world.
     gains : FigureGains
         Feedback and bounds.
+    period : float
+        Between two updates of the control [s].
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Figure:
     twin: mujoco.MjModel
     prefix: str = ""
     gains: FigureGains = FigureGains()  # noqa: RUF009 - immutable
+    period: float = 2e-3
     twin_data: mujoco.MjData = field(init=False, repr=False)
     state: FigureState = field(init=False, repr=False)
 
@@ -110,6 +114,7 @@ class Figure:
         motors = slice(motor, motor + _N_MOTORS)
         world_M = np.zeros((m.nv, m.nv))
         radius = float(m.geom_size[spheres[0], 0])
+        stature = DEFAULT_STATURE * radius / CONTACT_RADIUS
         legs = [[BODIES.index(f"{side}_{name}") for name in ("thigh", "shank", "foot")] for side in ("left", "right")]
         return FigureState(
             model=m._address, data=d._address, twin_model=twin._address, twin_data=self.twin_data._address,
@@ -123,7 +128,7 @@ class Figure:
             world_M=world_M, M=world_M[dofs, dofs], parent=np.array([segment.parent for segment in SEGMENTS]),
             legs=np.array(legs), torque_limit=m.actuator_ctrlrange[motors, 1].copy(),
             weight=float(m.body_subtreemass[body]) * float(np.linalg.norm(m.opt.gravity)),
-            stature=DEFAULT_STATURE * radius / CONTACT_RADIUS, radius=radius,
+            stature=stature, radius=radius,
             friction=_RELIED_ON * float(m.geom_friction[spheres[0], 0]),
             acceleration=np.zeros(N_TANGENT), wanted_root=np.zeros(6), rotation=np.zeros((2, 3)), loaded=np.zeros(2),
             share=np.zeros(n), near=np.zeros(n), points=np.zeros((n, 3)), edges=np.zeros((N_EDGES * n, 6)),
@@ -131,5 +136,6 @@ class Figure:
             residual=np.zeros(6), force=np.zeros((n, 3)), given=np.zeros(N_TANGENT), demand=np.zeros(6),
             wrench=np.zeros(6), offset=np.zeros(9), response=np.zeros((2, 9, 6)), lost=np.zeros(_N_MOTORS),
             yielding=np.zeros(_N_MOTORS, dtype=np.int64), block=np.zeros((_N_MOTORS, _N_MOTORS)),
-            correction=np.zeros(_N_MOTORS), report=np.zeros(8),
+            correction=np.zeros(_N_MOTORS), report=np.zeros(REPORT_SIZE),
+            fall=fall_state(m, d, twin, self.twin_data, self.prefix, self.period, stature),
         )  # fmt: skip

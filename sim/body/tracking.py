@@ -11,11 +11,14 @@ from numba import typeof, types
 
 from controllers.kernel_call import call_as_given
 from models.floor import add_floor
-from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec
+from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.clip import Clip, pose_difference
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
+from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
+from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, REPORT_SIZE
+from sim.body.residual import Residual, ResidualMeasure
 from sim.compilation.compiled import entry_point
 from sim.compilation.native import mj_step
 from sim.compilation.units import Unit
@@ -25,6 +28,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 _PREFIX = "figure/"
+_BEARS = 1.0  # [N] from which the ground bears the figure
 
 
 @dataclass(frozen=True)
@@ -71,15 +75,13 @@ class TrackedMotion(NamedTuple):
     poses : Array
         What the figure did, shape (n, 75).
     reports : Array
-        Support, saturated motors, residual wrench (see `FigureState.report`), shape (n, 8).
-    flying : Array
-        1 while all contact points of the reference are above the height of flight, shape (n,).
+        See `sim.body.figure_state.REPORT_SUPPORT` and what follows it, shape (n, 10).
     contacts : Array
         Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
     ground : Array
         Force of the ground on the figure [N], shape (n, 3).
-    weight, stature : float
-        Of the figure [N], [m].
+    weight, com_height : float
+        Of the figure [N], and of its centre of mass over the floor where it stands [m].
     warnings : int
         Warnings that MuJoCo gave.
     """
@@ -87,11 +89,10 @@ class TrackedMotion(NamedTuple):
     reference: ClipMotion
     poses: Array
     reports: Array
-    flying: Array
     contacts: Array
     ground: Array
     weight: float
-    stature: float
+    com_height: float
     warnings: int
 
 
@@ -103,18 +104,22 @@ class TrackingReport:
     ----------
     seconds, flight_seconds : float
         How long the motion was, and how long the reference was in flight [s].
+    falls : tuple of float
+        When the figure fell [s].
+    up_seconds : float
+        For how long it neither lay nor was set back [s]. What follows is of that time.
     joint_error : float
         RMS over joints and time of the angle between a joint and its reference [deg].
     root_error, root_error_max : float
         RMS and largest distance of the root from its reference [m].
     residual_force, residual_force_max : float
-        RMS while the reference stands, and largest; as shares of body weight.
-    residual_moment, residual_moment_max : float
-        The same of the moment about the root, as shares of body weight × stature.
+        Of `stance`, as shares of body weight.
     residual_in_flight : float
         Largest component of the residual while the reference flies [N, N m]; zero by construction.
+    stance, without_ground_force : Residual
+        Residual while a foot of the reference stands, and while the ground does not bear the figure.
     grounded : float
-        Share of the time in which the reference stands that the figure touches the floor.
+        Share of the time in which the reference stands that the ground bears the figure.
     slide : float
         Largest distance that a contact point moved over the floor while it stood [m].
     saturation : float
@@ -125,14 +130,16 @@ class TrackingReport:
 
     seconds: float
     flight_seconds: float
+    falls: tuple[float, ...]
+    up_seconds: float
     joint_error: float
     root_error: float
     root_error_max: float
     residual_force: float
     residual_force_max: float
-    residual_moment: float
-    residual_moment_max: float
     residual_in_flight: float
+    stance: Residual
+    without_ground_force: Residual
     grounded: float
     slide: float
     saturation: float
@@ -140,28 +147,28 @@ class TrackingReport:
 
     def __str__(self) -> str:
         """One line for people."""
+        fell = ", ".join(f"{at:.1f}" for at in self.falls)
+        stance, lost = self.stance, self.without_ground_force
         return (
-            f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
-            f"(largest {100 * self.root_error_max:.1f}), residual {100 * self.residual_force:.1f} % of body weight RMS "
-            f"in stance (largest {100 * self.residual_force_max:.0f} %), {self.flight_seconds:.2f} s of flight, "
-            f"feet on the ground {100 * self.grounded:.0f} % of stance"
+            (f"fell at {fell} s; of {self.up_seconds:.1f} of {self.seconds:.1f} s: " if self.falls else "")
+            + f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
+            f"(largest {100 * self.root_error_max:.1f}), {self.flight_seconds:.2f} s of flight, feet on the ground "
+            f"{100 * self.grounded:.0f} % of stance; residual in stance, RMS and peak: {stance.brief()} "
+            f"({stance.verdict()}); without ground force, {lost.seconds:.2f} s: {lost.brief()}"
         )
 
 
 @entry_point
 def _simulate(
     drive: int, s: FigureState, control_steps: int, q: Array, v: Array, a: Array,
-    poses: Array, reports: Array, flying: Array, contacts: Array, ground: Array, contact_force: Array,
+    poses: Array, reports: Array, contacts: Array, ground: Array, contact_force: Array,
 ) -> None:  # fmt: skip
     for k in range(q.shape[0]):
         poses[k] = s.qpos
         call_as_given(drive, (s, q[k], v[k], a[k]))
-        lowest = np.inf
         for c in range(s.points.shape[0]):
-            lowest = min(lowest, s.twin_contact_pos[s.twin_contact[c], 2] - s.radius)
             contacts[k, c] = s.contact_pos[s.contact[c]]
             contacts[k, c, 2] -= s.radius
-        flying[k] = 1.0 if lowest > s.gains.flight_height else 0.0
         reports[k] = s.report
         for _ in range(control_steps):
             mj_step(s.model, s.data)
@@ -193,26 +200,32 @@ def tracked_motion(
     if not 0.0 < seconds <= 3600.0:
         raise SimError(f"{seconds} s of tracking; expected more than 0 and at most an hour")
     model = floor_world(config)
-    data = mujoco.MjData(model)
-    figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains)
-    period = config.physics_step * config.control_steps
+    data, period = mujoco.MjData(model), config.physics_step * config.control_steps
+    figure = Figure(model, data, figure_model(config.stature, config.mass), _PREFIX, config.gains, period)
     n = max(1, round(seconds / period))
     reference = clip_motion(clip, period * np.arange(n, dtype=np.float64))
     data.qpos[:], data.qvel[:] = reference.poses[0], reference.velocities[0]
     mujoco.mj_forward(model, data)
-    poses, reports, flying = np.empty((n, model.nq)), np.empty((n, 8)), np.empty(n)
+    poses, reports = np.empty((n, model.nq)), np.empty((n, REPORT_SIZE))
     contacts, ground = np.empty((n, len(CONTACTS), 3)), np.zeros((n, 3))
     # Rows of what is not contiguous are of another type, and nothing checks that.
     motion = [np.ascontiguousarray(rows) for rows in (reference.poses, reference.velocities, reference.accelerations)]
     numbers: tuple[Any, ...] = (
-        figure.state, config.control_steps, *motion, poses, reports, flying, contacts, ground, data.qfrc_constraint[:3],
+        figure.state, config.control_steps, *motion, poses, reports, contacts, ground, data.qfrc_constraint[:3],
     )  # fmt: skip
     drive = drive_unit(figure.state)
     ready((drive, Unit.of(_simulate, types.int64, *(typeof(number) for number in numbers))))
     _simulate(drive.address(), *numbers)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
-        reference, poses, reports, flying, contacts, ground, figure.state.weight, config.stature, warnings
+        reference,
+        poses,
+        reports,
+        contacts,
+        ground,
+        figure.state.weight,
+        standing_com(config.stature, config.mass),
+        warnings,
     )
 
 
@@ -228,29 +241,39 @@ def track(
 
 def report(motion: TrackedMotion) -> TrackingReport:
     """Sum up a tracked motion."""
-    times, wrench = motion.reference.times, motion.reports[:, 2:]
+    times = motion.reference.times
     period = float(times[1] - times[0]) if len(times) > 1 else 0.0
-    difference = pose_difference(motion.poses, motion.reference.poses)
-    angles = np.linalg.norm(difference[:, 6:].reshape(len(times), -1, 3), axis=-1)
+    up = motion.reports[:, REPORT_DOWN] == UP
+    falls = times[~up & np.concatenate(([True], up[:-1]))]
+    flies, bears = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > _BEARS
+    wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
+    difference = pose_difference(motion.poses[up], motion.reference.poses[up])
+    angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)
     root = np.linalg.norm(difference[:, :3], axis=1)
-    force = np.linalg.norm(wrench[:, :3], axis=1) / motion.weight
-    moment = np.linalg.norm(wrench[:, 3:], axis=1) / (motion.weight * motion.stature)
-    stands: Flags = np.equal(motion.flying, 0.0)
-    touches: Flags = np.less(motion.contacts[:, :, 2], 0.0)
+    touches: Flags = np.less(motion.contacts[:, :, 2], 0.0) & up[:, None]
+
+    def residual(rows: Flags) -> Residual:
+        measure = ResidualMeasure(motion.weight, motion.com_height, period)
+        measure.add(wrench[up & rows])
+        return measure.summary()
+
+    stance, stands = residual(~flies), up & ~flies
     return TrackingReport(
         seconds=period * len(times),
-        flight_seconds=period * float(np.sum(~stands)),
+        flight_seconds=period * float(np.sum(flies)),
+        falls=tuple(falls.tolist()),
+        up_seconds=period * float(np.sum(up)),
         joint_error=float(np.rad2deg(_rms(angles))),
         root_error=_rms(root),
-        root_error_max=float(root.max()),
-        residual_force=_rms(force[stands]),
-        residual_force_max=float(force.max()),
-        residual_moment=_rms(moment[stands]),
-        residual_moment_max=float(moment.max()),
-        residual_in_flight=float(np.abs(wrench[~stands]).max(initial=0.0)),
-        grounded=float(np.mean(np.any(touches[stands], axis=1))) if stands.any() else 1.0,
+        root_error_max=float(root.max(initial=0.0)),
+        residual_force=stance.force_rms,
+        residual_force_max=stance.force_max,
+        residual_in_flight=float(np.abs(wrench[up & flies]).max(initial=0.0)),
+        stance=stance,
+        without_ground_force=residual(~bears),
+        grounded=float(np.mean(bears[stands])) if stands.any() else 1.0,
         slide=_slide(motion.contacts, touches),
-        saturation=float(motion.reports[:, 1].mean()) / 51.0,
+        saturation=float(motion.reports[up, REPORT_SATURATED].mean()) / 51.0 if up.any() else 0.0,
         warnings=motion.warnings,
     )
 

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from sim.body.figure_state import REPORT_SIZE
+
 Array = npt.NDArray[np.float64]
 
 
@@ -14,7 +16,7 @@ class KinematicFigure(NamedTuple):
     Attributes
     ----------
     applied, report : Array
-        As of the physical figure, always zero: no residual wrench (6,), nothing to report (8,).
+        As of the physical figure, always zero: no residual wrench (6,), nothing to report (10,).
     """
 
     applied: Array
@@ -30,9 +32,9 @@ class NoFigure(NamedTuple):
 
 def kinematic_figure() -> KinematicFigure:
     """What a servo holds for a figure that is only shown."""
-    return KinematicFigure(np.zeros(6), np.zeros(8))
+    return KinematicFigure(np.zeros(6), np.zeros(REPORT_SIZE))
 
 
 def no_figure() -> NoFigure:
     """What a servo holds where there is no figure."""
-    return NoFigure(np.zeros(6), np.zeros(8))
+    return NoFigure(np.zeros(6), np.zeros(REPORT_SIZE))

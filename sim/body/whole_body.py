@@ -4,14 +4,24 @@ import numpy as np
 from numba import njit
 
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
+from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
 from sim.body.feedback import shorten, wanted_acceleration
-from sim.body.figure_state import Array, FigureState
+from sim.body.figure_state import (
+    REPORT_DOWN,
+    REPORT_FLIES,
+    REPORT_RESIDUAL,
+    REPORT_SATURATED,
+    REPORT_SUPPORT,
+    Array,
+    FigureState,
+)
 from sim.body.stance import N_LEG, factor, stance_response, substitute
 from sim.compilation.native import mj_full_m, mj_integrate_pos, mj_kinematics
 
 _LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a residual force
 _FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
 _PLANS = 4  # plans at most in a tick, each with the joints that saturated in the one before giving way
+_SET_BACK_SPEED = 20.0  # [m/s], [rad/s] at most, of what a figure follows that is set back
 _N_FOOT = 4  # contact points of a foot
 
 
@@ -29,6 +39,42 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
+    mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
+    s.report[REPORT_DOWN] = mode
+    if mode == UP:
+        _stand(s, support)
+    elif mode == DOWN:
+        s.ctrl[:] = 0.0
+        s.wrench[:] = 0.0
+    elif mode == SET_BACK:
+        _set_back(s, q_r)
+    s.applied[:] = s.wrench
+    s.report[REPORT_SUPPORT] = support
+    s.report[REPORT_SATURATED] = np.sum(np.abs(s.ctrl) >= 0.999 * s.torque_limit)
+    s.report[REPORT_RESIDUAL : REPORT_RESIDUAL + 6] = s.wrench
+
+
+@njit
+def _set_back(s: FigureState, q_r: Array) -> None:
+    """Torques and a wrench at the root, without bounds, that carry a figure from where it lay to the reference."""
+    follow_back(s.twin_model, s.fall, q_r)
+    for k in range(0, s.fall.velocity.shape[0], 3):
+        shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # where the reference jumps
+    wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
+    mj_full_m(s.model, s.data, s.world_M.ctypes)
+    s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
+    for plan in range(_PLANS):
+        if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
+            break
+    for i in range(6):
+        s.wrench[i] = s.bias[i] - s.passive[i]
+        for k in range(s.acceleration.shape[0]):
+            s.wrench[i] += s.M[i, k] * s.acceleration[k]
+
+
+@njit
+def _stand(s: FigureState, support: float) -> None:
+    """Torques and residual wrench of a figure that is up (see `sim.body.figure`)."""
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     for leg in range(2):
         foot = slice(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT)
@@ -46,10 +92,6 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
         if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
             break
     _make_up_for_legs(s, support)
-    s.applied[:] = s.wrench
-    s.report[0] = support
-    s.report[1] = np.sum(np.abs(s.ctrl) >= 0.999 * s.torque_limit)
-    s.report[2:] = s.wrench
 
 
 @njit
@@ -74,7 +116,7 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         s.points[c] = s.twin_contact_pos[s.twin_contact[c]]
     s.twin_qpos[:] = q_r
     mj_kinematics(s.twin_model, s.twin_data)
-    support = 0.0
+    support, lowest = 0.0, np.inf
     for leg in range(2):
         s.loaded[leg] = 0.0
         for c in range(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT):
@@ -84,6 +126,7 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         now = s.twin_contact_pos[s.twin_contact[c]]
         way = np.sqrt((s.points[c, 0] - now[0]) ** 2 + (s.points[c, 1] - now[1]) ** 2)
         height = max(s.points[c, 2], now[2]) - s.radius
+        lowest = min(lowest, now[2] - s.radius)
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
         touch = _nearness(s.points[c, 2], s.gains.contact_reach)
@@ -93,6 +136,7 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         s.near[c] = rests * _nearness(height, s.gains.stance_height)
         s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)
         support = max(support, touch * _nearness(height, s.gains.flight_height))
+    s.report[REPORT_FLIES] = 1.0 if lowest > s.gains.flight_height else 0.0
     return support
 
 

@@ -86,17 +86,9 @@ class HidPhantom:
 
     def __init__(self, handle: HidHandle, transport: str, clock: Callable[[], float] = time.perf_counter):
         self._handle, self._clock = handle, clock
+        self._transport = transport
         handle.set_nonblocking(True)
-        who = self._feature(protocol.IDENTITY)
-        if int(who["magic"]) != protocol.MAGIC:
-            raise SimError(f"{transport} answers with the mark {int(who['magic']):#x}; expected {protocol.MAGIC:#x}")
-        if int(who["major"]) != protocol.VERSION[0]:
-            raise DriverFault(Fault.VERSION_WRONG, int(who["major"]) + int(who["minor"]) / 10)
-        self._boot = int(who["boot"])
-        self._peak: Array = who["peak_torque"] * protocol.PEAK_UNIT
-        self._watchdog_us = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
-        self._capabilities = int(who["capabilities"])
-        self._who, self._transport = who, transport
+        self._take_identity()
         self.telemetry = fresh_telemetry()
         self._take_calibration()
         self._last: int | None = None  # number of the last input report
@@ -112,6 +104,19 @@ class HidPhantom:
             return protocol.unsealed(bytes(self._handle.get_feature_report(number, protocol.REPORT_SIZE)), number)
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
+
+    def _take_identity(self) -> None:
+        who = self._feature(protocol.IDENTITY)
+        if int(who["magic"]) != protocol.MAGIC:
+            raise SimError(
+                f"{self._transport} answers with the mark {int(who['magic']):#x}; expected {protocol.MAGIC:#x}"
+            )
+        if int(who["major"]) != protocol.VERSION[0]:
+            raise DriverFault(Fault.VERSION_WRONG, int(who["major"]) + int(who["minor"]) / 10)
+        self._who, self._boot = who, int(who["boot"])
+        self._peak: Array = who["peak_torque"] * protocol.PEAK_UNIT
+        self._watchdog_us = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
+        self._capabilities = int(who["capabilities"])
 
     def _take_calibration(self) -> None:
         found = self._feature(protocol.CALIBRATION)
@@ -129,6 +134,7 @@ class HidPhantom:
             who["name"].decode(errors="replace"), self._transport, who["serial"].decode(errors="replace"),
             who["firmware"].decode(errors="replace"), bool(self._capabilities & protocol.HAS_MOTORS),
             bool(self._capabilities & protocol.HAS_WATCHDOG), bool(found["flags"] & protocol.CALIBRATED),
+            self._boot,
         )  # fmt: skip
 
     def calibrate(self, theta: Array, gimbal: Array) -> None:
@@ -205,10 +211,25 @@ class HidPhantom:
         self._again = bool(report.status & protocol.STATUS_WATCHDOG)
 
     def _judge_boot(self, boot: int) -> None:
-        if boot != self._boot:
-            self._boot, self._last, self._enabled_since = boot, None, None
-            self._arrival = self._quickest = math.nan
-            raise DriverFault(Fault.DEVICE_RESET)
+        """A device that began again is asked anew who it is: with its zero it has lost what it was armed by.
+
+        One that still knows its zero may be cleared and armed; any other stays a fault for as long as it is open.
+        """
+        before = self._boot
+        if boot == before:
+            return
+        self._last = self._enabled_since = None
+        self._arrival = self._quickest = math.nan
+        try:
+            self._take_identity()
+            self._take_calibration()
+        except DriverFault:
+            raise
+        except SimError:  # no sound answer
+            self._boot = before
+        if not self.identity.calibrated:
+            self._boot = before
+        raise DriverFault(Fault.DEVICE_RESET)
 
     def _is_next(self, number: int) -> bool:
         """Whether a report's number is ahead of the last one's; the same one again is refused, an older one a fault."""

@@ -97,6 +97,20 @@ class SpaceMouse:
         reading[READING_SEQUENCE] = self._taken
         return True
 
+    @property
+    def pushed(self) -> bool:
+        """Whether somebody pushes or turns the cap, or presses its first button."""
+        return bool(np.any(self._push != 0.0) or self._buttons & 1)
+
+    @property
+    def tip(self) -> Array:
+        """Where the tip is, in H [m], shape (3,)."""
+        return self._p_H.copy()
+
+    def start_at(self, p_H: Array) -> None:
+        """Let the tip go on from a place in H [m], shape (3,)."""
+        self._p_H = p_H.copy()
+
     def _take(self, raw: bytes) -> None:
         """Take one report; other kinds, such as the battery's, are left out, and one that is too short is refused."""
         number, axes = raw[0], np.frombuffer(raw[1 : 1 + 2 * ((len(raw) - 1) // 2)], "<i2")

@@ -1,14 +1,14 @@
 """A device that is real to the software: the MuJoCo linkage behind a driver, with what a linkage's data sheet hides.
 
-Its clock runs by its own steps, one a command, so that a run with it is the same again. Its hand holds the stylus, with
-a tremor, until the motors have been on for a while, and then lets go.
+Its clock runs by its own steps, one a command, so that a run with it is the same again. Its hand holds the stylus where
+it is, with a tremor, until the motors have been on for a while, and then lets go.
 """
 
 import numpy as np
 import numpy.typing as npt
 
 from models.humanoid.skeleton import rest_pose
-from models.phantom.kinematics import encoder_reading, gimbal_reading
+from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
 from models.scene import SceneConfig
 from sim.compilation.compiled import entry_point
 from sim.devices.driver import READ, TELEMETRY_SIZE, TEMPERATURE, DeviceIdentity
@@ -32,11 +32,15 @@ def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Ar
     advance(plant, port, user, t, False, applied)
 
 
-def holding_arm(point: Array, seconds: float) -> Arm:
-    """A hand that holds a stylus at a point of H [m] for a time [s], and trembles."""
-    t = np.arange(0.0, seconds, 2e-3)
-    phases = 2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2])
-    return Arm(path=point + TREMOR * np.sin(phases), period=2e-3)
+def tremor(seconds: float, period: float) -> Array:
+    """Displacement of a hand at rest, shape (n, 3) [m], every so often [s]."""
+    t = np.arange(0.0, seconds, period)
+    return TREMOR * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
+
+
+def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
+    """Who an emulated device is, however it is reached."""
+    return DeviceIdentity("emulated Phantom", transport, "", "", forces=True, watchdog=True, calibrated=calibrated)
 
 
 class EmulatedPhantom:
@@ -78,16 +82,15 @@ class EmulatedPhantom:
         if late > steps:
             raise SimError(f"a delay of {linkage.delay} s is more than the servo period {scene.servo_period} s")
         self._spans = [(s, flag) for s, flag in ((late, False), (steps - late, True)) if s > 0]
-        self._holding = make_hand(holding_arm(start, 600.0)) if holds > 0.0 else None
+        self._tremor = tremor(600.0, 2e-3)
+        self._holding = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
         self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
         self._applied, self._last, self._motors = np.zeros((steps, 3)), np.zeros(3), list(self.port.motor)
         self._steps, self._told = 0, 0
         self.torque = np.zeros(3)
         self.telemetry = np.zeros(TELEMETRY_SIZE)
         self.telemetry[TEMPERATURE : TEMPERATURE + 3] = np.nan
-        self.identity = DeviceIdentity(
-            "emulated Phantom", "MuJoCo", "", "", forces=True, watchdog=True, calibrated=True
-        )
+        self.identity = emulated_identity("MuJoCo", not any(linkage.offset))
 
     @property
     def clock(self) -> float:
@@ -109,6 +112,8 @@ class EmulatedPhantom:
     def write(self, torque: Array, enable: bool) -> None:
         """As `sim.devices.driver.Driver`; then a servo period passes."""
         self.torque[:] = torque if enable else 0.0
+        if self._on > 0.0 and not enable:
+            self._take_hold()
         self._on = self._on + self._plant.period if enable else 0.0
         user = self._relaxed if self._holding is None or self._on > self._holds else self._holding
         t = self.clock
@@ -120,6 +125,12 @@ class EmulatedPhantom:
             t += span
         self._last[:] = self.torque
         self._steps += 1
+
+    def _take_hold(self) -> None:
+        """The hand holds the stylus where it is, so that it does not fall."""
+        if self._holding is not None:
+            a, b, c = (float(self.port.qpos[place]) for place in self.port.arm_q)
+            self._holding.arm.path[:] = vector_to_hand_frame(forward_kinematics((a, b, c))) + self._tremor
 
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`; no time passes."""

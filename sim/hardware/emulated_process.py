@@ -1,8 +1,8 @@
 """The emulated Phantom in a process of its own, behind packets, with a watchdog: what the servo's end cannot spare it.
 
 Packets carry eight-byte numbers, one whole reading or command each, as reports of USB HID do. Each command lets a servo
-period pass in the device, and is answered by a reading. When none comes for the watchdog's time the motors go off, and
-the device's time goes on by itself.
+period pass in the device, and is answered by a reading. When none comes for the watchdog's time, that time passes in
+the device under the last command, then its motors go off, and its time goes on by itself.
 """
 
 import os
@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.safety.faults import Fault
-from sim.devices.driver import LOST, READ, ROUND_TRIP, TELEMETRY_SIZE, TEMPERATURE, DeviceIdentity, DriverFault
+from sim.devices.driver import LOST, READ, ROUND_TRIP, TELEMETRY_SIZE, TEMPERATURE, DriverFault
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
-from sim.hardware.emulated import EmulatedPhantom
+from sim.hardware.emulated import EmulatedPhantom, emulated_identity
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
 
@@ -47,15 +47,18 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
     if realtime:
         become_realtime()
     reading, shown, trips, quiet = np.zeros(READING_SIZE), np.zeros(SHOWN_SIZE), 0, True
-    off = np.zeros(3)
+    off, last = np.zeros(3), np.zeros(4)
     while os.getppid() == parent:
         command = _command(end.packets, end.period if quiet else WATCHDOG)
         if command is None:
-            trips += not quiet
+            if not quiet:
+                trips += 1
+                for _ in range(round(WATCHDOG / end.period)):
+                    device.write(last[:3], last[3] > 0.0)
             quiet = True
             device.write(off, False)
         else:
-            quiet = False
+            quiet, last = False, command
             device.write(command[:3], command[3] > 0.0)
         device.read(reading, 0.0)
         shown[SHOWN_TORQUE : SHOWN_TORQUE + 3] = device.torque
@@ -86,17 +89,17 @@ class EmulatedDriver:
     ----------
     packets : socket.socket
         The other end of `EmulatedEnd`.
+    calibrated : bool
+        Whether its encoders know their zero.
     """
 
-    def __init__(self, packets: socket.socket):
+    def __init__(self, packets: socket.socket, calibrated: bool = True):
         packets.setblocking(False)
         self._packets, self._sent, self._sequence = packets, time.monotonic(), 0.0
         self._command = np.zeros(4)
         self.telemetry = np.zeros(TELEMETRY_SIZE)
         self.telemetry[TEMPERATURE : TEMPERATURE + 3] = np.nan
-        self.identity = DeviceIdentity(
-            "emulated Phantom", "MuJoCo in another process", "", "", forces=True, watchdog=True, calibrated=True
-        )
+        self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`."""

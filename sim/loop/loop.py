@@ -11,7 +11,7 @@ from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_P
 from controllers.state import HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
-from sim.body.figure_state import FigureState
+from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
 from sim.body.robot import RobotState
 from sim.body.unsimulated import KinematicFigure, NoFigure
 from sim.devices.device import read_device, ticks_of
@@ -99,7 +99,8 @@ def groups(servo: Servo) -> dict[str, Group]:
         channels |= {"reference": (N_POSE,)}
     if isinstance(servo.figure, FigureState | RobotState):
         channels |= {
-            "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "saturated": (),
+            "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "down": (),
+            "saturated": (),
         }  # fmt: skip
     return {"ticks": ticks, "frames": Group(1.0 / (plant.period * servo.figure_ticks), channels)}
 
@@ -281,8 +282,9 @@ def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
     joint_error, root_error = pose_errors(frames.qpos[:m, root : root + N_POSE], reference)
     return {
         "t": frames.t[:m], "qpos": frames.qpos[:m], "reference": reference, "joint_error": joint_error,
-        "root_error": root_error, "residual": report[:, 2:8], "ground": frames.ground[:m],
-        "flight": (report[:, 0] == 0.0).astype(np.float64), "saturated": report[:, 1],
+        "root_error": root_error, "residual": report[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6],
+        "ground": frames.ground[:m], "flight": report[:, REPORT_FLIES], "down": report[:, REPORT_DOWN],
+        "saturated": report[:, REPORT_SATURATED],
     }  # fmt: skip
 
 

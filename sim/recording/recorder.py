@@ -9,7 +9,9 @@ The layout is that of `sim.recording.recording`, which reads it.
 import json
 import os
 import platform
+import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -22,6 +24,7 @@ import numpy.typing as npt
 from llvmlite.binding import get_host_cpu_name
 
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
+from sim.recording.unclosed import held
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +32,8 @@ CHUNK_SECONDS = 0.5  # what a killed run can lose, beside what was not yet appen
 # The system copies a page of a write at once, and between two pages a kill can end it: what crosses a page can be torn.
 # HDF5's own structures stay within pages of this size (up to 8176 chunks, more than an hour), rows need not.
 PAGE = 4096
+MARGIN = 4_000_000  # [bytes] left on a disk, for structures and summary of the file
+_KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
 
 
@@ -64,11 +69,22 @@ class Group:
         return max(1, round(self.rate * CHUNK_SECONDS))
 
 
+class DiskFull(RecordingError):
+    """No room for what a run goes on to record; what was recorded until then is kept."""
+
+
+def _check_room(path: Path, size: int) -> None:
+    """Refuse to write so much [bytes] where the disk would then have no room for what closes the file."""
+    free = shutil.disk_usage(path.parent).free
+    if free < size + MARGIN:
+        raise DiskFull(f"{path}: the disk is full ({free / 1e6:.0f} MB free); {_KEPT}")
+
+
 class _Stream:
     """A group on its way to the file: one buffer of fixed size per channel, written when full."""
 
-    def __init__(self, group: Group, node: h5py.Group):
-        self._name = node.name
+    def __init__(self, group: Group, node: h5py.Group, path: Path):
+        self._name, self._path = node.name, path
         self._datasets = {name: dataset_of(node, name) for name in group.channels}
         self._rows = dataset_of(node, "rows")
         self._buffers = {name: np.empty((group.chunk, *shape)) for name, shape in group.channels.items()}
@@ -98,6 +114,14 @@ class _Stream:
         """Write the buffered rows, and only then count them."""
         if self._filled == 0:
             return
+        _check_room(self._path, sum(buffer.nbytes for buffer in self._buffers.values()))
+        try:
+            self._write()
+        except (OSError, RuntimeError) as error:  # such as a quota, which does not say what it leaves
+            said = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error).split("\n")[0]
+            raise DiskFull(f"{self._path}: cannot be written any further ({said}); {_KEPT}") from None
+
+    def _write(self) -> None:
         total = self._written + self._filled
         for name, buffer in self._buffers.items():
             dataset = self._datasets[name]
@@ -159,6 +183,8 @@ class Recorder:
     ------
     RecordingError
         If the file exists.
+    DiskFull
+        When rows are appended for which there is no room.
     """
 
     def __init__(
@@ -186,7 +212,8 @@ class Recorder:
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
         self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
-        self._streams = {name: _Stream(group, group_of(self._file, name)) for name, group in groups.items()}
+        self._held = held(path)
+        self._streams = {name: _Stream(group, group_of(self._file, name), path) for name, group in groups.items()}
 
     def append(self, group: str, blocks: Mapping[str, Array]) -> None:
         """Append rows to every channel of a group.
@@ -225,6 +252,7 @@ class Recorder:
             dataset.flush()
             count[0] = len(text)
         self._file.close()
+        os.close(self._held)
 
     def __enter__(self) -> Self:
         return self
@@ -232,4 +260,13 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if isinstance(error, DiskFull):
+            self._end()
+        else:
+            self.close()
+
+    def _end(self) -> None:
+        """Close the file without what is still buffered, as far as the disk lets it."""
+        with suppress(OSError, RuntimeError):
+            self._file.close()
+        os.close(self._held)

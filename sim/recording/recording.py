@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.errors import SimError
+from sim.recording.unclosed import AsClosed, has_writer, superblock
 
 Array = npt.NDArray[np.float64]
 
@@ -46,16 +47,30 @@ def group_of(node: h5py.Group, name: str) -> h5py.Group:
     return group
 
 
+def _first_line(error: Exception) -> str:
+    return str(error).split("\n")[0]
+
+
 def _names(node: h5py.Group) -> list[str]:
     return [str(name) for name in node]
 
 
 def _opened(path: Path) -> h5py.File:
-    """The file as it is, or, if its writer did not close it (yet), as a reader beside the writer."""
-    try:
-        return h5py.File(path, "r")
-    except OSError:
+    """The file as it is, beside its writer while that lives, or as the writer left it: `sim.recording.unclosed`."""
+    head = superblock(path)
+    if head is None:
+        raise OSError("no HDF5 file of this program")
+    if not head.sound:
+        raise OSError("its first bytes are damaged")
+    if head.being_written and has_writer(path):
         return h5py.File(path, "r", libver="latest", swmr=True)
+    return h5py.File(path if head.whole else AsClosed(path, head.closed), "r")
+
+
+def _missing(path: Path) -> str:
+    """What a file lacks at its end, in words; nothing if it lacks nothing."""
+    head = superblock(path)
+    return "" if head is None or head.size >= head.end else f", cut short: {head.size} bytes of {head.end}"
 
 
 class Channel:
@@ -65,8 +80,8 @@ class Channel:
     rows that count when the recording was opened.
     """
 
-    def __init__(self, dataset: h5py.Dataset, rows: int):
-        self._dataset = dataset
+    def __init__(self, dataset: h5py.Dataset, rows: int, path: Path):
+        self._dataset, self._path = dataset, path
         self._rows = rows
         self.shape = (rows, *dataset.shape[1:])
 
@@ -75,11 +90,17 @@ class Channel:
 
     def __getitem__(self, rows: int | slice) -> Array:
         if isinstance(rows, slice):
-            start, stop, step = rows.indices(self._rows)
-            return self._dataset[start:stop:step]
+            return self._read(slice(*rows.indices(self._rows)))
         if not -self._rows <= rows < self._rows:
             raise IndexError(f"{self._dataset.name}: row {rows}; there are {self._rows}")
-        return np.asarray(self._dataset[rows % self._rows])
+        return np.asarray(self._read(rows % self._rows))
+
+    def _read(self, rows: int | slice) -> Array:
+        try:
+            return self._dataset[rows]
+        except (OSError, RuntimeError) as error:
+            where, said = f"{self._path}{_missing(self._path)}", _first_line(error)
+            raise RecordingError(f"{where}: {self._dataset.name} is damaged ({said})") from None
 
 
 class Recording:
@@ -117,13 +138,14 @@ class Recording:
         try:
             self._file = _opened(path)
         except OSError as error:
-            said = error if path.exists() else "there is no such file"
+            said = (error.strerror or _first_line(error)) if path.exists() else "there is no such file"
             raise RecordingError(f"{path}: cannot be opened ({said}); expected the run.h5 of a run") from None
         try:
             self._read()
-        except (KeyError, OSError, TypeError, ValueError) as error:
+        except (KeyError, OSError, RuntimeError, TypeError, ValueError, IndexError) as error:
             self._file.close()
-            raise RecordingError(f"{path}: not a recording ({error}); expected the run.h5 of a run") from None
+            said = _missing(path) or f", or damaged ({_first_line(error)})"
+            raise RecordingError(f"{path}: not a recording{said}; expected the run.h5 of a run") from None
 
     def _read(self) -> None:
         file = self._file
@@ -142,15 +164,18 @@ class Recording:
             else:
                 self.arrays[name] = np.asarray(value, dtype=np.float64)
         self.groups: dict[str, dict[str, Channel]] = {}
-        self.rates: dict[str, float] = {}
-        for name in _names(file):
-            node = file[name]
-            if isinstance(node, h5py.Group) and "rate" in node:
-                rows = int(dataset_of(node, "rows")[0])
-                self.rates[name] = float(dataset_of(node, "rate")[()])
-                self.groups[name] = {
-                    key: Channel(dataset_of(node, key), rows) for key in _names(node) if key not in RESERVED
-                }
+        nodes = {name: node for name in _names(file) if isinstance(node := file[name], h5py.Group) and "rate" in node}
+        self.rates = {name: float(dataset_of(node, "rate")[()]) for name, node in nodes.items()}
+        rows = {name: int(dataset_of(node, "rows")[0]) for name, node in nodes.items()}
+        if summary:
+            last = np.inf
+        else:  # what was stopped between the writing of two groups ends with the shorter
+            last = min((rows[name] / rate for name, rate in self.rates.items() if rows[name]), default=0.0)
+        for name, node in nodes.items():
+            n = int(min(rows[name], np.ceil(last * self.rates[name] - 1e-6)))
+            self.groups[name] = {
+                key: Channel(dataset_of(node, key), n, self._path) for key in _names(node) if key not in RESERVED
+            }
 
     def channel(self, group: str, name: str) -> Channel:
         """A channel that has rows.

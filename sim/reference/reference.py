@@ -25,7 +25,7 @@ from sim.errors import SimError
 from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
 from sim.reference.river_changes import change_river, may_change, stop
 from sim.reference.settling import approach, let_down, slowness
-from sim.reference.stylus_filter import smooth_hand, smooth_turn
+from sim.reference.stylus_filter import smooth_hand, smooth_turn, turn_rate
 from sim.reference.transition import dwells, make_transition
 
 Array = npt.NDArray[np.float64]
@@ -33,6 +33,7 @@ IntArray = npt.NDArray[np.int64]
 
 
 _MATRIX = types.Array(types.float64, 2, "C")
+_ROUNDS = 8  # in which what comes before a motion is found: each gains three digits at the least
 
 
 @njit
@@ -166,7 +167,14 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
     period = reference.period
     reference.started[0] = 1.0
     reference.trail[0] = p - 2.0 * period * v + 2.0 * period**2 * a
-    reference.hand[:] = p - period * v + 0.5 * period**2 * a, v - period * a, a
+    reference.hand[:] = motion
+    for _ in range(_ROUNDS):
+        before = reference.hand
+        jerk = -(turn_rate.py_func(before[1], before[2]) ** 2) * before[1]
+        acceleration = a - period * jerk
+        velocity = v - period * acceleration - 0.5 * period**2 * jerk
+        point = p - period * velocity - 0.5 * period**2 * acceleration - period**3 * jerk / 6.0
+        reference.hand[:] = point, velocity, acceleration
 
 
 def check_reference(period: float, bandwidth: float, blend: float) -> None:

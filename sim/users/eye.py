@@ -1,11 +1,15 @@
 r"""What a person sees: the animation's pose, and where on the motion that she has in mind such a pose belongs.
 
-She has learned what the figure does along that motion and a little beside it, so a pose q tells her a place
+She has learned what the figure does along that motion and a little beside it. Of a pose q and the place f where she
+feels her hand to be she makes the most likely place: with a picture that is uncertain by σ_q and a feeling by σ_f, and
+λ = σ_q/σ_f,
 
-.. math:: p = \varphi(s^*) + H^+(s^*)\,\bigl(q \ominus h(\varphi(s^*))\bigr), \qquad
-          s^* = \arg\min_s \|q \ominus h(\varphi(s))\|
+.. math:: p = \varphi + H^+\bigl(q \ominus h(\varphi)\bigr) + (1 - H^+ H)(f - \varphi), \qquad
+          H^+ = (H^T H + \lambda^2)^{-1} H^T, \qquad \varphi = \varphi(s^*), \\
+          s^* = \arg\min_s \|q \ominus h(\varphi(s))\|^2 + \lambda^2 \|f - \varphi(s)\|^2
 
-with H⁺ a damped inverse of the map's derivative: what does not show in the figure she cannot see.
+What does not show in the figure she takes from what she feels: each sense has its weight by direction, as vision and
+proprioception are combined (van Beers, Sittig & Gon 1999, J. Neurophysiol. 81: 1355-1364).
 """
 
 from typing import NamedTuple
@@ -35,33 +39,39 @@ class Eye(NamedTuple):
         Where the stylus is then, in H [m], shape (n, 3).
     inverses : Array
         H⁺ there, shape (n, 3, 57).
+    unseen : Array
+        1 − H⁺H there, shape (n, 3, 3).
+    trust : Array
+        λ² there [rad²/m²], shape (n,).
     """
 
     pose: Array
     poses: Array
     places: Array
     inverses: Array
+    unseen: Array
+    trust: Array
 
 
 def no_eye() -> Eye:
     """No figure is shown: she sees the stylus."""
-    return Eye(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3)), np.zeros((0, 3, 0)))
+    return Eye(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3)), np.zeros((0, 3, 0)), np.zeros((0, 3, 3)), np.zeros(0))
 
 
 @njit
-def _nearest(eye: Eye, felt: Array) -> int:
-    """Which of the poses along the motion is most like the one that is shown, near where the hand is felt to be."""
+def _likeliest(eye: Eye, felt: Array) -> int:
+    """Which place along the motion is the most likely one, near where the hand is felt to be."""
     n, q, around, best = eye.poses.shape[0], eye.pose, 0, np.inf
+    away = np.zeros(n)
     for i in range(n):
-        far = 0.0
         for k in range(3):
-            far += (felt[k] - eye.places[i, k]) ** 2
-        if far < best:
-            around, best = i, far
-    best, nearest, reach = np.inf, around, max(1, int(0.5 * _NEAR * n))
+            away[i] += (felt[k] - eye.places[i, k]) ** 2
+        if away[i] < best:
+            around, best = i, away[i]
+    best, likeliest, reach = np.inf, around, max(1, int(0.5 * _NEAR * n))
     for step in range(-reach, reach + 1):
         i = (around + step) % n
-        other, far = eye.poses[i], 0.0
+        other, far = eye.poses[i], eye.trust[i] * away[i]
         for k in range(3):
             far += (q[k] - other[k]) ** 2
         for joint in range(3, q.shape[0], 4):
@@ -70,8 +80,8 @@ def _nearest(eye: Eye, felt: Array) -> int:
                 dot += q[k] * other[k]
             far += 4.0 * (1.0 - dot * dot)
         if far < best:
-            best, nearest = far, i
-    return nearest
+            best, likeliest = far, i
+    return likeliest
 
 
 @njit
@@ -83,21 +93,24 @@ def seen_place(eye: Eye, felt: Array, difference: Array, place: Array) -> None:
     eye : Eye
         With poses.
     felt : Array
-        Where she feels her hand to be [m], shape (3,): poses of a gait are alike, she looks near there.
+        Where she feels her hand to be [m], shape (3,).
     difference : Array
         Room for the difference of two poses, shape (57,).
     place : Array
         Set [m].
     """
-    q, nearest = eye.pose, _nearest(eye, felt)
-    other = eye.poses[nearest]
+    q, i = eye.pose, _likeliest(eye, felt)
+    other = eye.poses[i]
     for k in range(3):
         difference[k] = q[k] - other[k]
-    for j in range((q.shape[0] - 3) // 4):
-        i = 3 + 4 * j
-        a, b, c, d = relative(other[i], other[i + 1], other[i + 2], other[i + 3], q[i], q[i + 1], q[i + 2], q[i + 3])
-        difference[3 + 3 * j], difference[4 + 3 * j], difference[5 + 3 * j] = logarithm(a, b, c, d)
+    for joint in range((q.shape[0] - 3) // 4):
+        r = 3 + 4 * joint
+        a, b, c, d = relative(other[r], other[r + 1], other[r + 2], other[r + 3], q[r], q[r + 1], q[r + 2], q[r + 3])
+        k = 3 + 3 * joint
+        difference[k], difference[k + 1], difference[k + 2] = logarithm(a, b, c, d)
     for k in range(3):
-        place[k] = eye.places[nearest, k]
+        place[k] = eye.places[i, k]
         for j in range(difference.shape[0]):
-            place[k] += eye.inverses[nearest, k, j] * difference[j]
+            place[k] += eye.inverses[i, k, j] * difference[j]
+        for j in range(3):
+            place[k] += eye.unseen[i, k, j] * (felt[j] - eye.places[i, j])

@@ -40,7 +40,9 @@ INTERVALS = {
     "grip_damping": Interval(1.0, 20.0, "N s/m", "Speich et al. 2005 (m): 7.9 N s/m; Hajian & Howe 1997 (m): 2 to 8"),
     "stiffening": Interval(0.0, 1.0, "1/N", "Hasser & Cutkosky 2002: stiffness and damping rise steadily with grip"),
     "strength": Interval(2.0, 60.0, "N", "a hand on a pen: below tip pinch, some 70 N (Mathiowetz 1985, m)"),
-    "fatigue": Interval(0.0, 4.0, "1/min", "Ma et al. 2009 (m): rate k = 1 per minute; 0 for none"),
+    "fatigue": Interval(
+        0.0, 4.0, "1/min", "Frey-Law et al. 2012: rate F of a three-compartment model; grip 0.6 (m); 0 for none"
+    ),
     "reflex_delay": Interval(0.03, 0.06, "s", "short and long latency stretch reflexes of the arm"),
     "reflex_gain": Interval(0.0, 0.5, "", "share of stiffness and damping that is reflex, not muscle"),
     "visual_delay": Interval(
@@ -95,7 +97,7 @@ class Person:
     strength : float
         Largest force on the stylus [N].
     fatigue : float
-        Rate at which force is lost [1/min]; 0 for none.
+        Share of the muscle that tires while all of it is active [1/min]; 0 for none.
     reflex_delay : float
         Of force and motion that are felt [s].
     reflex_gain : float

@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 Dragged = Callable[[Any, Array, bool], None]
 """Called with viser's event, the place of the hand in H [m], shape (3,), and whether shift is held."""
 
-RADIUS = 0.085  # drawn [m]: it covers the magnified gimbal, and is large enough for a finger
+RADIUS = 0.12  # drawn [m]: it covers the magnified gimbal, and is large enough for a finger
 
 
 class HandBall:
@@ -24,11 +24,17 @@ class HandBall:
     ----------
     scene : viser.SceneApi
         In which it is drawn.
+
+    Attributes
+    ----------
+    dragged : bool
+        Whether a mouse has it.
     """
 
     def __init__(self, scene: viser.SceneApi):
         self._ball = scene.add_icosphere("/hand", RADIUS, color=rgb(USER), cast_shadow=False)
         self._offset = np.zeros(3)
+        self.dragged = False
 
     def on_drag(self, told: Dragged) -> None:
         """Tell of every drag; with the left button, and with shift besides."""
@@ -45,7 +51,8 @@ class HandBall:
             if event.phase == "start":
                 self._offset = np.asarray(self._ball.position) - np.asarray(event.start_position)
             place = np.asarray(event.end_position) + self._offset
-            if event.phase != "end":
+            self.dragged = event.phase != "end"
+            if self.dragged:
                 self._ball.position = place
             told(event, taken_at(place), shift)
 

@@ -5,7 +5,7 @@ beside the figures, their axes are the world's. A figure that travels is followe
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,9 +20,9 @@ from sim.viewer.shown import Shown
 
 Array = npt.NDArray[np.float64]
 
-MAGNIFICATION = 6.0
-PHANTOM_AT = np.array([1.6, -0.6, 1.25])  # where the origin of the hand frame is drawn [m]
-GHOST_AT = np.array([-0.95, -0.35, 0.0])  # the ghost's distance from the figure [m]
+MAGNIFICATION = 8.0
+PHANTOM_AT = np.array([1.45, -0.6, 1.2])  # where the origin of the hand frame is drawn [m]
+GHOST_AT = np.array([-0.75, 0.45, 0.0])  # the ghost's distance from the figure [m]
 METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] below which a force is not drawn
 TUBE_SHARE = 0.3  # of the curve's extent: a wider tube would hide what is in it, and is drawn narrower
@@ -31,24 +31,6 @@ FOLLOWS = 0.5  # [s] by which the view is behind a figure that travels
 TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
 LEAPS = 3.0  # [m] a figure that is so far from where the view has it was put there
-
-
-class View(NamedTuple):
-    """Where a camera stands, and what it looks at [m]."""
-
-    position: tuple[float, float, float]
-    look_at: tuple[float, float, float]
-
-
-VIEWS = {
-    "both": View((1.65, -5.6, 2.3), (1.05, 0.0, 1.0)),
-    "workspace": View((1.9, -3.3, 2.2), (1.9, -0.4, 1.25)),
-    "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
-}
-"""By what they show; a little to the right of it, for the panel covers a fifth of the page."""
-NARROW = View((1.6, -5.6, 1.6), (1.6, 0.0, 0.35))
-"""Where a phone looks that is held upright: at the workspace, above the panel."""
-FIELD_OF_VIEW = np.deg2rad(34.0)
 
 
 def drawn_at(p_H: Array) -> Array:
@@ -202,6 +184,14 @@ class LiveStage:
         return min(radius, TUBE_SHARE * float(np.max(np.ptp(course.points, axis=0))))
 
 
-def set_view(camera: viser.InitialCameraConfig | viser.CameraHandle, view: View) -> None:
-    """Put a camera where a view has it."""
-    camera.position, camera.look_at, camera.fov = view.position, view.look_at, FIELD_OF_VIEW
+def light(scene: viser.SceneApi, shadows: bool = True) -> None:
+    """Light a page: a soft sky, a light from beside the camera, and one from above that casts shadows.
+
+    Without viser's environment map, which matt bodies hardly show, and without shadows, a page without a graphics card
+    is drawn tens of times as fast.
+    """
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(shadows, cast_shadow=shadows)
+    sky, front = (1.6, 1.0) if shadows else (2.2, 2.6)
+    scene.add_light_hemisphere("/lights/sky", sky_color=(255, 255, 255), ground_color=(190, 196, 210), intensity=sky)
+    scene.add_light_directional("/lights/front", intensity=front, position=(1.0, -4.0, 4.0))

@@ -75,10 +75,13 @@ class Firmware:
         self.angle = 2.0 * np.pi / (calibration()["counts_per_turn"] * protocol.COUNT_UNIT)
         self.power_up()
 
-    def power_up(self) -> None:
+    def power_up(self, calibrated: bool = True) -> None:
+        """Power goes off and on; encoders that count from where they wake up are not calibrated then."""
         self.boot += 1
         self.sensors.time_us = 0
-        self.c.hvf_begin(self.device, identity().tobytes(), calibration().tobytes(), ctypes.c_uint16(self.boot))
+        kept = calibration()
+        kept["flags"] = protocol.CALIBRATED if calibrated else 0
+        self.c.hvf_begin(self.device, identity().tobytes(), kept.tobytes(), ctypes.c_uint16(self.boot))
 
     def descriptor(self) -> bytes:
         """HID report descriptor."""

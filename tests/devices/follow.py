@@ -2,11 +2,16 @@
 
 import numpy as np
 
+from controllers.safety.arming import ARM
 from controllers.safety.faults import FAULT_RAMP
+from sim.devices.driver import Driver
 from sim.devices.exchange import exchange
+from sim.hardware.gated_servo import Ticker
 from sim.loop.loop import Loop, tick_channels
 from tests.devices.rig import Rig
 from tests.sim.bare_servos import CUTOFF, bare_servo, device_world, run, simulated
+from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+from tests.sim.hardware.emulation import run as run_ticks
 
 LAP = 4.0  # s
 
@@ -32,6 +37,13 @@ def device_follow(make_rig) -> tuple[np.ndarray, Rig]:
 
     Loop(bare_servo(world, device), world, keep, before_tick=rig).run(LAP)
     return np.concatenate(blocks), rig
+
+
+def gated_follow(driver: Driver) -> dict[str, np.ndarray]:
+    """Rows of a gated servo that leads a device which goes on by a period with each command."""
+    rows = run_ticks(Ticker(gated_servo(driver, dead_man=False, **AT_ONCE)), round(LAP * 1e3), request=ARM)
+    assert not rows["fault"].any()
+    return rows
 
 
 def rms(a: np.ndarray, b: np.ndarray) -> float:

@@ -6,8 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from controllers.safety.faults import FAULT_CODE, latch
-from sim.devices.driver import Driver, DriverFault
-from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange
+from models.scene import SceneConfig
+from sim.devices.driver import DeviceIdentity, Driver, DriverFault
+from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, READING_SIZE, READING_THETA, Exchange
+from sim.hardware.emulated import EmulatedPhantom
 from sim.users.arm import Arm
 from sim.world.plant import make_plant
 from tests.devices.firmware import Firmware, FirmwareHandle
@@ -35,6 +37,21 @@ class Linkage:
         self.ticks += 1
 
 
+class HeldLinkage:
+    """A linkage whose hand holds the stylus until the motors have been on for a while (`EmulatedPhantom`)."""
+
+    def __init__(self, start: np.ndarray, period: float):
+        self._device = EmulatedPhantom(SceneConfig(servo_period=period), start)
+
+    def angles(self) -> np.ndarray:
+        reading = np.zeros(READING_SIZE)
+        self._device.read(reading, 0.0)
+        return reading[READING_THETA:]
+
+    def turn(self, torque: np.ndarray) -> None:
+        self._device.write(torque, bool(torque.any()))
+
+
 class Behind(Protocol):
     """The real side of a device."""
 
@@ -45,6 +62,36 @@ class Behind(Protocol):
     def move(self) -> None:
         """The period passes under whatever was commanded."""
         ...
+
+
+class LockStep:
+    """A driver whose device goes on by a period with each command, for a servo without a clock."""
+
+    def __init__(self, driver: Driver, behind: Behind):
+        self.driver, self.behind, self.telemetry, self._told = driver, behind, driver.telemetry, False
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        return self.driver.identity
+
+    def read(self, reading: np.ndarray, timeout: float) -> bool:
+        if not self._told:
+            self.behind.tell()
+            self._told = True
+        return self.driver.read(reading, timeout)
+
+    def write(self, torque: np.ndarray, enable: bool) -> None:
+        try:
+            self.driver.write(torque, enable)
+        finally:
+            self.behind.move()
+            self._told = False
+
+    def let_go(self) -> None:
+        self.driver.let_go()
+
+    def close(self) -> None:
+        self.driver.close()
 
 
 class FirmwareBehind:

@@ -11,8 +11,8 @@ from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, T
 from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle
-from tests.devices.follow import device_follow, rms, simulated_follow
-from tests.devices.rig import FirmwareBehind, Linkage, Rig
+from tests.devices.follow import device_follow, gated_follow, rms, simulated_follow
+from tests.devices.rig import FirmwareBehind, Linkage, LockStep, Rig
 
 POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
 
@@ -37,8 +37,8 @@ def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
     return HidPhantom(handle, "in memory", clock)
 
 
-def test_a_device_says_who_it_is(driver: HidPhantom) -> None:
-    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True)
+def test_a_device_says_who_it_is(driver: HidPhantom, firmware: Firmware) -> None:
+    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot)
 
 
 def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
@@ -141,6 +141,25 @@ def test_who_opens_a_device_that_was_driven_before_is_heard_from_its_first_readi
     np.testing.assert_allclose(firmware.joint_torque, torque, atol=13.3e-6)
 
 
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_a_device_that_began_again_goes_on_only_if_it_still_knows_its_zero(
+    driver, handle, firmware, calibrated
+) -> None:
+    reading = np.zeros(9)
+    handle.tick()
+    assert driver.read(reading, 0.0)
+    firmware.power_up(calibrated)
+    for _ in range(3):
+        handle.tick()
+        if handle.firmware.boot == driver.identity.power_up and calibrated:
+            assert driver.read(reading, 0.0)
+        else:
+            with pytest.raises(DriverFault) as refused:
+                driver.read(reading, 0.0)
+            assert refused.value.fault is Fault.DEVICE_RESET
+    assert driver.identity.calibrated == calibrated
+
+
 def test_a_calibration_without_a_reading_is_refused(driver) -> None:
     with pytest.raises(SimError, match="nothing to calibrate"):
         driver.calibrate(np.zeros(3), np.zeros(3))
@@ -191,3 +210,9 @@ def test_follow_through_the_firmware_is_the_simulation_s_run_within_a_millimetre
     )
     assert rig.fault == Fault.NONE
     assert rms(places, simulated_follow()) < 1e-3
+
+
+@pytest.mark.slow
+def test_follow_through_the_firmware_and_the_gate_is_the_simulation_s_run_within_a_millimetre(handle, firmware) -> None:
+    driver = LockStep(HidPhantom(handle, "in memory"), FirmwareBehind(firmware, handle, Linkage()))
+    assert rms(gated_follow(driver)["p"], simulated_follow()) < 1e-3

@@ -28,7 +28,7 @@ from sim.recording.recording import Recording
 ANGLE = np.linspace(0, 2 * np.pi, 61)
 CURVE = 0.05 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE])
 TICKS = {"t": (), "p": (3,), "distance": (), "force": (3,), "user": (3,), "torque": (3,), "river": ()}
-FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": ()}
+FRAMES = {"t": (), "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "down": ()}
 
 
 def record(path, n=2000, pushing=True, texts=None, summary=None):
@@ -69,6 +69,7 @@ def record(path, n=2000, pushing=True, texts=None, summary=None):
                 "residual": standing * np.array([42.0, 0.0, 56.0, 9.0, 9.0, 9.0]),
                 "ground": standing * np.array([0.0, 0.0, 700.0]),
                 "flight": flight,
+                "down": ((rows >= 1.495) & (rows < 1.695)).astype(float),
             },
         )
         recorder.close(summary or {})
@@ -225,7 +226,10 @@ def test_torques_stand_against_the_limits_of_their_motor(recording, tmp_path):
 def test_the_physical_figure_is_judged_in_degrees_centimetres_and_body_weights(recording):
     axes = tracking_figure(recording).axes
     assert [ax.lines[0].get_ydata()[0] for ax in axes] == pytest.approx([1.0, 2.0, 10.0, 100.0])
-    assert all(spans(ax) == [(pytest.approx(1.0), pytest.approx(1.19))] for ax in axes)
+    flight, fallen = (1.0, 1.19), (1.5, 1.69)
+    assert all(spans(ax) == [pytest.approx(flight), pytest.approx(fallen)] for ax in axes)
+    t, shown = axes[0].lines[0].get_data()
+    assert np.all(np.isnan(shown) == ((t > 1.495) & (t < 1.695)))
     assert axes[2].lines[0].get_ydata()[110] == 0.0
 
 

@@ -67,4 +67,5 @@ def test_ctrl_c_leaves_a_valid_recording_and_says_how_to_go_on(tmp_path: Path) -
         assert not recording.complete
         assert len(recording.channel("ticks", "t")) > 500
     assert main(["report", str(out)]) == 0
-    assert "cut short" in (out / "report.html").read_text(encoding="utf-8")
+    assert "The run was stopped: " in (out / "report.html").read_text(encoding="utf-8")
+    assert (out / "summary.json").exists()

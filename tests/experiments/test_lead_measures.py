@@ -9,7 +9,8 @@ from controllers.haptic_map.led import Led
 from experiments.cli import main
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
-from experiments.results.lead_measures import LeadSummary, _Retrace, _Soles, support_at
+from experiments.results.lead_measures import LeadSummary, _Retrace, support_at
+from experiments.results.soles import Soles
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.lead import gait_remark, leading, leading_hand, led_map, s_curve, walker_argument
 from experiments.setups.wiring import wire
@@ -85,19 +86,19 @@ def test_a_figure_that_turns_on_the_spot_is_compared_with_the_heading_that_it_ha
 
 
 def test_how_far_soles_slide_while_they_touch() -> None:
-    measure, standing = _Soles(SceneConfig()), rest_pose()
-    lowest = _Soles(SceneConfig())
+    measure, standing = Soles(SceneConfig()), rest_pose()
+    lowest = Soles(SceneConfig())
     lowest.add(standing[None])
     moved = np.tile(standing, (5, 1))
     moved[:, 0] += [0.0, 0.01, 0.02, 0.0, 0.0]
     moved[3, 2] += 0.1
     measure.add(moved)
     assert measure.slide == pytest.approx(0.02, abs=1e-9)
-    pressing = _Soles(SceneConfig(), 0.0)
+    pressing = Soles(SceneConfig(), 0.0)
     moved[:, 2] -= 1e-4
     pressing.add(moved)
     assert pressing.slide == pytest.approx(0.02, abs=1e-9)
-    hovering = _Soles(SceneConfig(), 0.0)
+    hovering = Soles(SceneConfig(), 0.0)
     moved[:, 2] += 2e-4
     hovering.add(moved)
     assert hovering.slide == 0.0

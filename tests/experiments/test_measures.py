@@ -11,13 +11,14 @@ from experiments.results.measures import summarise
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import SpeedSummary
 from models.humanoid.skeleton import rest_pose
+from sim.body.residual import Residual
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
 PERIOD, EVERY, N = 1e-3, 10, 4000
 
 
-def recording_of(path: Path, root_error: np.ndarray) -> Recording:
+def recording_of(path: Path, down: np.ndarray) -> Recording:
     """Four seconds on a line, 0.2 mm off, but for a push to 10 mm at 2 s, when one joint is 0.1 rad off."""
     t = np.arange(N) * PERIOD
     pushing = (t >= 2.0) & (t < 2.5)
@@ -34,6 +35,7 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     flight = np.zeros(m)
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
+    residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # in the air, where it should stand
     ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
     ticks |= {"river": np.full(N, -1.0), "tank": 0.1 - 0.02 * t}
     ticks["tank_scale"] = np.where((t >= 3.0) & (t < 3.1), 0.5, 1.0)
@@ -41,7 +43,8 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
     ground[100:120] = 0.0  # in flight
     ground[200:230] = 0.0  # and when it should stand
     frames = {
-        "t": t[::EVERY], "reference": reference, "joint_error": np.full(m, 0.02), "root_error": root_error,
+        "t": t[::EVERY], "reference": reference, "joint_error": np.full(m, 0.02), "root_error": np.full(m, 0.03),
+        "down": down,
         "residual": residual, "ground": ground, "flight": flight,
         "saturated": np.full(m, 5.1),
     }  # fmt: skip
@@ -50,17 +53,15 @@ def recording_of(path: Path, root_error: np.ndarray) -> Recording:
         "frames": Group(1 / PERIOD / EVERY, {name: array.shape[1:] for name, array in frames.items()}),
     }
     static = {"curve_span": np.array([0.0, 1.5]), "curve_closed": 1.0, "body_weight": 700.0}
+    static |= {"com_height": 1.0, "clip_seconds": 1.2, "scene": np.array([1.75, 75.0, 1e-3, 1e-3])}
     with Recorder(path, {}, 0, groups, static) as recorder:
         recorder.append("ticks", ticks)
         recorder.append("frames", frames)
     return Recording(path)
 
 
-def summary_of(
-    path: Path, root_error: np.ndarray | None = None, handled: tuple[tuple[float, float], ...] = ()
-) -> RunSummary:
-    error = np.full(N // EVERY, 0.03) if root_error is None else root_error
-    with recording_of(path, error) as recording:
+def summary_of(path: Path, down: np.ndarray | None = None, handled: tuple[tuple[float, float], ...] = ()) -> RunSummary:
+    with recording_of(path, np.zeros(N // EVERY) if down is None else down) as recording:
         return summarise(
             recording, lambda points, phases, rivers: np.tile(rest_pose(), (len(points), 1)), SpeedSummary(1, 1, 1), {},
             handled,
@@ -89,15 +90,24 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.fell_at is None
     assert figure.joint_error_rms_deg == pytest.approx(np.degrees(0.02))
     assert (figure.root_error_rms_cm, figure.root_error_max_cm) == (pytest.approx(3.0), pytest.approx(3.0))
-    assert figure.residual_force_rms == pytest.approx(5.0 / 700.0)
-    assert figure.residual_moment_rms == pytest.approx(2.0 / 700.0)
+    # 380 frames of stance: 379 with 5 N and 2 N m, and one with 70 N and 7 N m.
+    assert figure.stance.force_rms == pytest.approx(np.sqrt((379 * 5.0**2 + 70.0**2) / 380) / 700.0)
+    assert figure.stance.moment_rms == pytest.approx(np.sqrt((379 * 2.0**2 + 7.0**2) / 380) / 700.0)
+    assert (figure.stance.force_max, figure.stance.moment_max) == (pytest.approx(0.1), pytest.approx(0.01))
+    assert figure.residual_force_rms == figure.stance.force_rms
     assert figure.residual_in_flight_max == 0.0
+    # The ground bears nothing in 0.2 s of flight, and in 0.3 s in which the reference stands.
+    assert figure.without_ground_force.seconds == pytest.approx(0.5)
+    assert figure.without_ground_force.force_max == pytest.approx(0.1)
+    assert figure.lost_contact_seconds == pytest.approx(0.3)
     assert figure.flight_seconds == pytest.approx(0.2)
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
-    assert len(summary.lines()) == 6
+    assert len(summary.lines()) == 9
+    assert summary.path.pace == pytest.approx(1.2 / 1.5)
+    assert summary.path.stopped_at is None
     assert "held the field back at 100 ticks" in summary.lines()[0]
 
 
@@ -113,12 +123,14 @@ def test_blocks_do_not_show(block: int, tmp_path: Path, monkeypatch: pytest.Monk
             other = getattr(getattr(pieces, part), name)
             if name == "pushes":
                 assert vars(other[0]) == pytest.approx(vars(value[0]))
+            elif isinstance(value, Residual):
+                assert vars(other) == pytest.approx(vars(value)), name
             else:
                 assert other == (value if value is None else pytest.approx(value)), name
 
 
 def test_a_part_of_a_run_is_measured_alone(tmp_path: Path) -> None:
-    with recording_of(tmp_path / "run.h5", np.full(N // EVERY, 0.03)) as recording:
+    with recording_of(tmp_path / "run.h5", np.zeros(N // EVERY)) as recording:
         parts = [
             measures.measured(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
             for span in ((0.0, 1.7003), (1.7003, 2.2), (2.2, np.inf))
@@ -156,10 +168,16 @@ def test_a_hand_that_traces_is_told_to(tmp_path: Path) -> None:
     assert not any("push" in line.lower() for line in lines)
 
 
-def test_a_fall_is_told_and_what_follows_does_not_count(tmp_path: Path) -> None:
-    error = np.full(N // EVERY, 0.03)
-    error[300:] = 0.9
-    summary = summary_of(tmp_path / "run.h5", error)
-    assert summary.figure.fell_at == pytest.approx(3.0)
-    assert summary.figure.root_error_max_cm == pytest.approx(3.0)
-    assert "fell at 3.0 s" in " ".join(summary.lines())
+def test_falls_are_told_and_what_follows_does_not_count_until_the_figure_is_back(tmp_path: Path) -> None:
+    down = np.zeros(N // EVERY)
+    down[150:200], down[200:250] = 1.0, 2.0
+    down[380:] = 1.0
+    summary = summary_of(tmp_path / "run.h5", down)
+    figure = summary.figure
+    assert figure.falls == (pytest.approx(1.5), pytest.approx(3.8))
+    assert figure.fell_at == pytest.approx(1.5)
+    assert (figure.seconds, figure.up_seconds) == (pytest.approx(4.0), pytest.approx(2.8))
+    # The time without ground force when it should stand, 2 to 2.3 s, is left out; its flight is not.
+    assert figure.lost_contact_seconds == 0.0
+    assert figure.flight_seconds == pytest.approx(0.2)
+    assert "fell 2 times at 1.5, 3.8 s; what is said of it is of the 2.8 of 4.0 s" in " ".join(summary.lines())

@@ -124,6 +124,8 @@ def test_a_run_that_is_killed_keeps_what_it_recorded_and_can_be_reported(tmp_pat
         "run",
         "--clips",
         "cheer",
+        "--figure",
+        "kinematic",
         "--seconds",
         "600",
         "--out",
@@ -138,6 +140,11 @@ def test_a_run_that_is_killed_keeps_what_it_recorded_and_can_be_reported(tmp_pat
     process.wait()
     with Recording(out / "run.h5") as recording:
         assert not recording.complete
-        assert len(recording.channel("ticks", "t")) > 1000
+        recorded = len(recording.channel("ticks", "t"))
+        assert recorded > 1000
+        assert len(recording.channel("frames", "t")) * 2 == recorded
     assert main(["report", str(out)]) == 0
-    assert "cut short" in (out / "report.html").read_text(encoding="utf-8")
+    assert "The run was stopped: " in (out / "report.html").read_text(encoding="utf-8")
+    assert json.loads((out / "summary.json").read_text())["path"]["laps"] == pytest.approx(recorded / 4000.0, rel=0.2)
+    edited, default = load_clip(out / "edited.bvh"), load_clip(out / "default.bvh")
+    assert edited.n_frames == default.n_frames == pytest.approx(recorded / 20, abs=1)

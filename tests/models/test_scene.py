@@ -57,7 +57,7 @@ def test_a_second_under_bounded_noise_gives_no_warning(model: mujoco.MjModel, se
 
 
 def test_the_two_do_not_touch(model: mujoco.MjModel) -> None:
-    """Only the figure's contact points meet the floor: device, table and limbs are for looking at."""
+    """Only the figure meets the floor: device and table are for looking at."""
     floor = model.geom("floor").id
     pairs = [
         (a, b)

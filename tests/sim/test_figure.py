@@ -173,7 +173,7 @@ def test_the_residual_stays_within_its_bounds():
     gains = FigureGains(force_bound=0.05, moment_bound=0.01)
     _, data, figure, pose = _figure(gains=gains)
     far = pose.copy()
-    far[0] += 2.0
+    far[0] += 0.4  # nearer than what counts as a fall
     figure.update(far, STILL, STILL)
     weight = figure.state.weight
     assert np.linalg.norm(data.qfrc_applied[:3]) <= 0.05 * weight * (1 + 1e-9)

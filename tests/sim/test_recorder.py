@@ -3,6 +3,7 @@
 import json
 import random
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -11,8 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
-from sim.recording.recorder import CHUNK_SECONDS, PAGE, Group, Recorder
+from sim.recording.recorder import CHUNK_SECONDS, PAGE, DiskFull, Group, Recorder
 from sim.recording.recording import Recording, RecordingError
+from sim.recording.unclosed import lookup3
 
 CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
 GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
@@ -270,6 +272,106 @@ def test_what_was_not_recorded_is_named_with_what_was(tmp_path):
             recording.channel("frames", "t")
         with pytest.raises(RecordingError, match=r"no array tube; there are \['curve'\]"):
             recording.array("tube")
+
+
+def recorded(path, closed=True):
+    """A recording of a second, closed or as a kill leaves it."""
+    script = WRITER if closed else WRITER.replace("recorder.close", "import os; os._exit")
+    subprocess.run([sys.executable, "-c", script, str(path), "1000"], stdout=subprocess.PIPE, check=False, timeout=60)
+    return path.read_bytes()
+
+
+def damaged(content):
+    """Thirty bytes of a run cut somewhere, and thirty with bits turned over."""
+    rng = random.Random(3)
+    for _ in range(30):
+        yield content[: rng.randrange(1, len(content))]
+    for k in range(30):
+        spoiled = bytearray(content)
+        for _ in range(1 + k):
+            spoiled[rng.randrange(len(spoiled) if k % 2 else 8000)] ^= 1 << rng.randrange(8)
+        yield bytes(spoiled)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_file_that_is_cut_or_spoiled_is_read_or_refused_at_once(tmp_path, closed):
+    content = recorded(tmp_path / "whole.h5", closed)
+    refused, began = list[str](), time.perf_counter()
+    for k, bytes_of in enumerate(damaged(content)):
+        path = tmp_path / f"{k}.h5"
+        path.write_bytes(bytes_of)
+        try:
+            with Recording(path) as recording:
+                for channel in recording.groups["ticks"].values():
+                    assert len(channel[:]) == len(channel)
+        except RecordingError as error:
+            refused.append(str(error))
+    assert len(refused) > 30
+    assert not [said for said in refused if "\n" in said]
+    assert time.perf_counter() - began < 30.0  # HDF5 alone would wait for ever
+
+
+def test_how_much_a_file_lacks_is_said(tmp_path):
+    content = recorded(tmp_path / "run.h5")
+    (tmp_path / "run.h5").write_bytes(content[:20000])
+    with pytest.raises(RecordingError, match=rf"run\.h5: .*cut short: 20000 bytes of {len(content)}; expected"):
+        Recording(tmp_path / "run.h5")
+
+
+def test_the_hash_of_a_files_head_is_the_published_one():
+    assert lookup3(b"Four score and seven years ago") == 0x17770551  # of lookup3.c itself
+    assert lookup3(b"") == 0xDEADBEEF
+
+
+def test_a_full_disk_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path, monkeypatch):
+    room = [10e6]
+
+    def usage(path):
+        return shutil._ntuple_diskusage(int(10e6), 0, int(room[0]))
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+
+    def run():
+        with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
+            for start in range(0, 4000, 500):
+                room[0] = 10e6 - 2e6 * (start // 500)
+                recorder.append("ticks", block(start, 500))
+
+    with pytest.raises(
+        DiskFull, match=r"run\.h5: the disk is full \(4 MB free\); what was recorded until then is kept"
+    ):
+        run()
+    with Recording(tmp_path / "run.h5") as recording:
+        assert len(recording.channel("ticks", "t")) == 1500
+        assert all(numbered(channel) for channel in recording.groups["ticks"].values())
+
+
+QUOTA = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from sim.recording.recorder import DiskFull, Group, Recorder
+resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
+try:
+    with Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, {"x": (50,)})}, {}) as recorder:
+        for n in range(0, 10**5, 500):
+            recorder.append("ticks", {"x": np.broadcast_to(np.arange(n, n + 500.0)[:, None], (500, 50))})
+except DiskFull as error:
+    print(error)
+"""
+
+
+def test_a_quota_ends_a_run_in_a_line_and_keeps_what_was_recorded(tmp_path):
+    """A limit that the disk does not tell is met while HDF5 writes."""
+    done = subprocess.run(
+        [sys.executable, "-c", QUOTA, str(tmp_path / "run.h5")], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "cannot be written any further (File too large); what was recorded until then is kept" in done.stdout
+    assert done.stderr == ""
+    with Recording(tmp_path / "run.h5") as recording:
+        rows = recording.channel("ticks", "x")
+        assert len(rows) >= 500
+        assert numbered(rows)
 
 
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path):

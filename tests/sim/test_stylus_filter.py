@@ -74,3 +74,19 @@ def test_the_step_of_an_encoder_is_spread_over_several_periods() -> None:
         smooth_turn(q, turning, step, SMOOTHING, PERIOD)
     assert _angle(q, step) < 1e-6
     assert abs(float(q @ q) - 1.0) < 1e-14
+
+
+def test_a_hand_on_a_lap_is_told_the_speed_at_which_it_goes() -> None:
+    # Jerk that turns with the hand: without it the velocity of this lap is 1.6 % short.
+    period, lap = 2e-3, 2.2
+    smoothing, rate = float(np.exp(-2.0 * np.pi * 6.0 * period)), 2.0 * np.pi / lap
+    hand = np.zeros((3, 3))
+    hand[0, 0] = 0.0477
+    for k in range(2000):
+        angle = rate * period * k
+        measured = 0.0477 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        smooth_hand(hand, measured, smoothing, period)
+    radial = measured / 0.0477
+    along = np.array([-radial[1], radial[0], 0.0])
+    np.testing.assert_allclose(hand[1], 0.0477 * rate * along, atol=2e-3 * 0.0477 * rate)
+    np.testing.assert_allclose(hand[2], -0.0477 * rate**2 * radial, atol=3e-2 * 0.0477 * rate**2)

@@ -24,6 +24,7 @@ from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from controllers.state import Array
 
+_ANY_RATE = 100.0  # beyond it a rate says nothing but that nobody is so fast
 _WINDOW = 0.2  # of the local parabolas whose curvature is the acceleration [s]
 
 
@@ -139,7 +140,8 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     )
     if not np.isfinite(rate):
         return Verdict("certified", "nothing turns, starts or stops on the floor", None, assumptions)
-    reason = f"the floor gives it up to {rate:.2f} of its speed; the hardest is at {frame / motion.fps:.2f} s"
+    up_to = f"up to {rate:.2f} of" if rate < _ANY_RATE else f"more than {_ANY_RATE:g} times"
+    reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}

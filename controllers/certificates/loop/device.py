@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi
 
-from controllers.state import Vec3
+from controllers.state import Array, Vec3
 
 casadi.GlobalOptions.setNumpyMode(1)
 
@@ -37,6 +37,8 @@ class Device:
         Δ at the joints [rad].
     peak_torque : three floats
         [N m].
+    numbers : callable
+        θ (3,) → p_H (3,) [m], J (3, 3) [m/rad]; numbers only.
     """
 
     position: Callable[[Symbol], tuple[Symbol, ...]]
@@ -49,6 +51,7 @@ class Device:
     coulomb: Triple
     encoder_step: Triple
     peak_torque: Triple
+    numbers: Callable[[Array], tuple[Array, Array]]
 
 
 def vector(scalars: Any) -> Symbol:

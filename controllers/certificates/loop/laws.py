@@ -32,7 +32,7 @@ class Law(NamedTuple):
     carries: bool
 
 
-def _nearest(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
+def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
     """t* as a function of p: one Newton step from the nearest phase u has its value and its derivative."""
     slope = casadi.dot(vector(piece_point.py_func(piece, 0, u)) - p, vector(piece_velocity.py_func(piece, 0, u)))
     return u - slope / casadi.jacobian(slope, u)
@@ -40,7 +40,7 @@ def _nearest(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
 
 def _follow(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
     """FOLLOW, attracted by the nearest point."""
-    nearest = _nearest(p, piece, u)
+    nearest = nearest_phase(p, piece, u)
     p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
     w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
     return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], v_curve[i], k_r, b_d) for i in range(3)])
@@ -55,7 +55,7 @@ def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Sym
 
 def _seek(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_f: Symbol, b: Symbol, width: Symbol) -> Symbol:
     """Stretchy tubes with the switch open: attracted by the nearest point, and slowed down."""
-    target = piece_point.py_func(piece, 0, _nearest(p, piece, u))
+    target = piece_point.py_func(piece, 0, nearest_phase(p, piece, u))
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_f, b) for i in range(3)])
 
 

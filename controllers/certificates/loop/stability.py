@@ -21,6 +21,7 @@ MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] no device gives more, 
 GRID = 40  # gains tried before bisection
 PHASES = 48
 LAP_PHASES = 400  # for the multipliers of a lap
+CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # shares to which the limiter may cut a force
 LATEST = 16  # periods of delay at which the search for the delay margin ends
 
 
@@ -47,8 +48,12 @@ class River(NamedTuple):
 
     def still(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
         """The loop linearised at `phases` of a curve as slow as if it stood still."""
+        return self.still_at(self.phases(), hand)
+
+    def still_at(self, phases: Array, hand: HandImpedance = NO_HAND) -> LinearLoop:
+        """Likewise at other phases [s]."""
         slow, curve = 1e6, self.curve
-        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * self.phases()
+        times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * phases
         standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
         return linearise(self.device, self.law, standing, places, hand, self.width)
 
@@ -58,6 +63,12 @@ def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
     first = np.where(np.all(stable, axis=0), len(grid), np.argmin(stable, axis=0))
     ends = np.append(grid, np.inf)
     return ends[np.maximum(first - 1, 0)], ends[first]
+
+
+def neighbours(values: Array, periodic: bool) -> tuple[Array, Array]:
+    """Values at phases, along the last axis, and at the next phase; of a closed curve the first follows the last."""
+    after = np.roll(values, -1, axis=-1)
+    return (values, after) if periodic else (values[..., :-1], after[..., :-1])
 
 
 def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
@@ -117,9 +128,9 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     Certified: at every phase on a grid and with every hand, k_r stays below what is critical there by more than the
     critical value changes to the neighbouring phase, or, where that jumps, the spectral radius below 1 by more than it
     changes; and where the hand is carried round a closed curve, the Floquet multipliers of the lap lie inside the unit
-    circle. The margin is (critical k_r)/k_r − 1.
+    circle; and with all gains lowered alike, as by the limiter, it is stable too. The margin is (critical k_r)/k_r − 1.
     """
-    critical, multipliers, bounds = [], [], []
+    critical, multipliers, bounds, cut = [], [], [], 0.0
     worst = (np.inf, NO_HAND, 0)
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
@@ -127,14 +138,17 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         if onset.min() < worst[0]:
             worst = (float(onset.min()), hand, int(onset.argmin()))
         critical.append(onset)
+        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
         radii = loop.radius(river.k_r, river.b_d)
-        bounds.append(float((np.maximum(radii[1:], radii[:-1]) + np.abs(np.diff(radii))).max()))
+        here, following = neighbours(radii, river.curve.periodic)
+        bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
         if river.curve.periodic and river.law.carries:
             multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
     bare = SampledLoop(river.still(), river.sampling)
     onsets = np.array(critical)
     capped = np.minimum(onsets, MOST_STIFFNESS)
-    change = float(np.abs(np.diff(capped, axis=1)).max())
+    here, following = neighbours(capped, river.curve.periodic)
+    change = float(np.abs(following - here).max())
     least, hand, at = worst
     margin = min(least, MOST_STIFFNESS) / max(river.k_r, 1e-3) - 1.0
     radius = bare.radius(river.k_r, river.b_d)
@@ -147,9 +161,11 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
         "delay_margin": delay_margin(bare, river.k_r, river.b_d),
         "multiplier": max(multipliers, default=None),
+        "radius_cut": cut,
     }
     assumptions = (
-        "linear: small deviations, forces below the limiter's and the motors' bounds, no Coulomb friction, no rounding",
+        "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
+        f"lower gains, down to {CUTS[0]:.0%} of them, and its slew is not reached",
         f"phases: {onsets.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
@@ -161,6 +177,9 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
         return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
     if multipliers and max(multipliers) >= 1.0:
         reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"
+        return Verdict("unknown", reason, margin, assumptions, {}, figures)
+    if cut >= 1.0:
+        reason = f"stable, but not where the limiter cuts the force: a factor of {cut:.4g} a period; {said}"
         return Verdict("unknown", reason, margin, assumptions, {}, figures)
     if least - change <= river.k_r and max(bounds) >= 1.0:
         reason = f"the critical k_r changes by {change:.4g} N/m from phase to phase, too coarse a grid; {said}"

@@ -36,16 +36,20 @@ class Room:
 
     Parameters
     ----------
-    r_range, z_range : tuple of two floats
-        Rectangle of the half plane (r, z) of H that is theirs [m].
+    r_range : tuple of two floats
+        Least and greatest distance from the z axis of H [m].
+    z_range : tuple of two floats
+        Least and greatest height in H [m].
     separation : float
         Least distance of two curves at one angle, away from their transitions [m].
     approach : float
         How near they come at a transition where poses agree [m].
     alike : float
-        Relative mismatch of poses, velocities and standing feet up to which two motions have a transition.
-    speed, acceleration : float
-        Greatest of a hand that follows a curve at its clip's pace [m/s, m/s²].
+        Relative mismatch of poses, velocities and standing feet up to which two motions have a transition [1].
+    speed : float
+        Greatest of a hand that follows a curve at its clip's pace [m/s].
+    acceleration : float
+        Likewise [m/s²].
 
     Raises
     ------

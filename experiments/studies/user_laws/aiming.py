@@ -1,17 +1,19 @@
 """Aiming from one target to the next: Fitts' law, and the scatter of a first submovement."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
+from controllers.state import Array
 from experiments.studies.user_laws.bare_device import Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
-from sim.users.person_step import LEAST_SECONDS
-from sim.users.submovement import aimed_seconds
 from sim.users.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
+TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes to see where it ends
+AFTER = 0.1  # [s] after a click in which a movement may still come to rest
 MOVES = 14  # from side to side; the first two are practice
 _PRACTICE = 2
 _MOST_SECONDS = 25.0
@@ -41,19 +43,19 @@ def fitts(people: Sequence[Person], seed: int) -> Study:
 
 
 def scatter(people: Sequence[Person], seed: int) -> Study:
-    """Scatter of the end of a first submovement along its way, over its mean speed A/T."""
+    """Scatter of the end of a first submovement along its way, over A/T, with the time T imposed (time-matched aiming).
+
+    As in Schmidt et al. 1979, distance and time are given, and how wide the target is follows: it is as wide as she
+    hits it in one submovement of that time. The first submovement ends where its speed along the way first falls to
+    zero (Meyer et al. 1988).
+    """
     speeds, spreads = list[float](), list[float]()
-    for amplitude, width in _conditions():
-        speed, spread = list[float](), list[float]()
+    for amplitude, seconds in itertools.product(AMPLITUDES, TIMES):
+        spread = list[float]()
         for i, person in enumerate(people):
-            trace = _tapped(person, amplitude, width, seed + i)
-            seconds = _first_seconds(person, amplitude, width)
-            ends = np.interp(trace.clicks[_PRACTICE:-1] + seconds, trace.t, trace.p[:, 1])
-            errors = ends - 0.5 * amplitude * np.where(np.arange(_PRACTICE, len(trace.clicks) - 1) % 2 == 0, 1.0, -1.0)
-            if len(errors) > 4:
-                spread.append(float(np.std(errors * np.sign(ends))))
-                speed.append(amplitude / seconds)
-        speeds.append(float(np.mean(speed)))
+            width = 2.0 * amplitude * person.caution * person.motor_noise / seconds
+            spread.append(float(np.std(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
+        speeds.append(amplitude / seconds)
         spreads.append(float(np.mean(spread)))
     x, y = np.array(speeds), np.array(spreads)
     slope, intercept = np.polyfit(x, y, 1)
@@ -69,6 +71,22 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
     )  # fmt: skip
 
 
+def _first_ends(trace: Trace) -> Array:
+    """Where the first submovement of each move ends, as the way beyond its start [m], signed along it."""
+    ends = list[float]()
+    for k, (start, end) in enumerate(itertools.pairwise(trace.clicks)):
+        if k < _PRACTICE:
+            continue
+        sign = 1.0 if k % 2 == 0 else -1.0
+        move = (trace.t >= start) & (trace.t < end + AFTER)
+        way, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
+        fastest = int(np.argmax(speed))
+        stopped = np.flatnonzero(speed[fastest:] <= 0.0)
+        if len(stopped):
+            ends.append(float(way[fastest + stopped[0]]))
+    return np.array(ends)
+
+
 def _conditions() -> list[tuple[float, float]]:
     return [(amplitude, width) for amplitude in AMPLITUDES for width in WIDTHS if amplitude >= 2.0 * width]
 
@@ -79,9 +97,3 @@ def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     seconds = min(_MOST_SECONDS, 1.6 * MOVES)
     trace = trial(person, targets(points, width), seconds, seed, points[0])
     return trace._replace(clicks=trace.clicks[: MOVES + 1])
-
-
-def _first_seconds(person: Person, amplitude: float, width: float) -> float:
-    """What a person's first submovement to a target takes, as she decides (see `sim.users.person_step`)."""
-    scatter = person.caution * person.motor_noise
-    return aimed_seconds(2.0 * amplitude / width, scatter, person.visual_delay, LEAST_SECONDS)

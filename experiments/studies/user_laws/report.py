@@ -12,13 +12,14 @@ from experiments.files.json_text import json_text
 from experiments.studies.user_laws.aiming import fitts, scatter
 from experiments.studies.user_laws.holding import grip, step_response, tremor
 from experiments.studies.user_laws.law import Law, Study
+from experiments.studies.user_laws.practice import endurance, practice
 from experiments.studies.user_laws.tracing import power_law, steering
 from sim.users.person import Person
 from sim.users.population import population
 
 STUDIES = {
     "fitts": fitts, "scatter": scatter, "steering": steering, "power-law": power_law, "tremor": tremor,
-    "step-response": step_response, "grip": grip,
+    "step-response": step_response, "grip": grip, "practice": practice, "endurance": endurance,
 }  # fmt: skip
 TABLE = "laws.json"
 

@@ -1,48 +1,20 @@
 """report.html of a study: what it found, in one file that opens from disk."""
 
-import base64
 import html
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
+from experiments.results.html_page import document, image, sentences, short
 from experiments.trials.analysis.replays import Replay
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.measures import MEASURES
 from experiments.trials.study_config import StudyConfig
 
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }}
-h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
-h2 {{ font-size: 1.1rem; margin: 2rem 0 .5rem; }}
-.found {{ font-size: 1.05rem; border-left: 4px solid #1f5fbf; padding-left: 1rem; }}
-.found p {{ margin: .4rem 0; }}
-p.note {{ font-size: .9rem; color: #566072; }}
-.wide {{ overflow-x: auto; }}
-table {{ border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: .25rem .7rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; white-space: nowrap; }}
-th:first-child, td:first-child, th.l, td.l {{ text-align: left; }}
-td.says {{ white-space: normal; text-align: left; }}
-tr.weak {{ color: #7b8698; }}
-iframe {{ width: 100%; height: min(38rem, 75vh); border: 1px solid #d9dde4; border-radius: 6px; }}
-img {{ max-width: 100%; }}
-pre {{ background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-<p>{question}</p>
-<div class="found">{sentences}</div>
+_BODY = """<p>{question}</p>
+{sentences}
 <h2>Users' means</h2>
 {plots}
 <h2>Every measure, level against reference</h2>
@@ -60,8 +32,6 @@ corrected p is 0.05 or more. {interactions}</p>
 <h2>The study</h2>
 <pre>{study}</pre>
 <p class="note">{made}</p>
-</body>
-</html>
 """
 
 
@@ -104,18 +74,17 @@ class Report:
     def page(self) -> str:
         """The page."""
         names = list(dict.fromkeys(contrast.measure for contrast in self.found.contrasts))
-        return _PAGE.format(
-            title=html.escape(self.study.name),
+        body = _BODY.format(
             question=html.escape(self.study.question),
-            sentences="".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences),
+            sentences=sentences(self.sentences),
             plots="".join(
-                f"<p class='note'>{html.escape(what)}</p>{_image(plot)}" for what, plot in self.plots.items()
+                f"<p class='note'>{html.escape(what)}</p>{image(plot, what)}" for what, plot in self.plots.items()
             ),
             table=_table(self.found.contrasts),
             tests=sum(math.isfinite(contrast.p) for contrast in self.found.contrasts),
             interactions=_interactions(self.found),
             remarks="".join(f"<p class='note'>{html.escape(remark)}.</p>" for remark in self.found.remarks),
-            effects="" if self.effects is None else f"<h2>Size of the effects</h2>{_image(self.effects)}",
+            effects="" if self.effects is None else f"<h2>Size of the effects</h2>{image(self.effects, 'effects')}",
             measures="".join(_measure_row(name) for name in names),
             failures=_failures(self.failures),
             replays="".join(
@@ -125,12 +94,7 @@ class Report:
             study=html.escape(self.text),
             made=html.escape(self.made),
         )
-
-
-def _image(figure: Figure) -> str:
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    return f'<img alt="plot" src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
+        return document(self.study.name, body)
 
 
 def _table(contrasts: Sequence[Contrast]) -> str:
@@ -145,8 +109,8 @@ def _table(contrasts: Sequence[Contrast]) -> str:
 def _row(c: Contrast) -> str:
     agree = f"{c.agree} of {c.users}" if c.agree else str(c.users)
     numbers = (
-        _short(c.mean), _short(c.reference_mean), _between(c.difference, c.low, c.high),
-        _between(c.model, c.model_low, c.model_high), _p(c.p), _p(c.p_holm), _short(c.effect), agree,
+        short(c.mean), short(c.reference_mean), _between(c.difference, c.low, c.high),
+        _between(c.model, c.model_low, c.model_high), _p(c.p), _p(c.p_holm), short(c.effect), agree,
     )  # fmt: skip
     weak = " class=weak" if not c.p_holm < 0.05 else ""
     cells = "".join(f"<td>{number}</td>" for number in numbers)
@@ -154,13 +118,9 @@ def _row(c: Contrast) -> str:
     return f"<tr{weak}>{names}<td class=l>{html.escape(c.reference)}</td>{cells}</tr>"
 
 
-def _short(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "–"
-
-
 def _between(value: float, low: float, high: float) -> str:
     ends = f" ({low:.3g} to {high:.3g})" if math.isfinite(low) and math.isfinite(high) else ""
-    return _short(value) + ends
+    return short(value) + ends
 
 
 def _p(value: float) -> str:

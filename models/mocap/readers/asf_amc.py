@@ -99,6 +99,8 @@ def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array
 
 
 def _skeleton_path(path: Path) -> Path:
+    if not path.exists():
+        raise MotionFileError(path, 0, "cannot be opened (No such file or directory)", "a readable motion file")
     names = (path.with_suffix(".asf"), path.with_name(path.stem.partition("_")[0] + ".asf"))
     for candidate in names:
         if candidate.is_file():

@@ -22,10 +22,14 @@ _COUNT = re.compile(r"[0-9]{1,12}")
 
 
 class MotionFileError(ModelError):
-    """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line."""
+    """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line.
+
+    Line 0 is that of what is wrong with the file as a whole, which is said without a line.
+    """
 
     def __init__(self, path: Path | str, line: int, what: str, expected: str) -> None:
-        super().__init__(f"{printable(str(path), 4096)}:{line}: {printable(what, 300)}; expected {expected}")
+        where = f"{printable(str(path), 4096)}:{line}" if line else printable(str(path), 4096)
+        super().__init__(f"{where}: {printable(what, 300)}; expected {expected}")
 
 
 def printable(text: str, limit: int) -> str:

@@ -15,6 +15,7 @@ from experiments.trials.threads import Threads
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of
+from experiments.tuning.storage import storage_of
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning
 
@@ -43,7 +44,8 @@ def certificates(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def searched(config: TuneConfig, folder: Path, sampler: str = "tpe") -> list[Candidate]:
     with Database(folder / "tune.sqlite", "identity", config.name, "") as database:
-        return search(config, folder / "journal", "identity", Panel(database, Threads(1)), sampler, lambda n: None)
+        storage = storage_of(config.storage or folder / "journal")
+        return search(config, storage, "identity", Panel(database, Threads(1)), sampler, lambda n: None)
 
 
 @pytest.mark.usefixtures("certificates")
@@ -64,12 +66,24 @@ def test_a_search_that_is_stopped_goes_on_as_it_would_have(tmp_path: Path, sampl
     assert searched(tuning(), tmp_path / "stopped", sampler) == whole
 
 
+@pytest.mark.usefixtures("certificates")
+def test_a_search_in_a_database_is_that_of_a_journal_and_goes_on(tmp_path: Path) -> None:
+    whole, kept = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
+    searched(tuning(candidates=2, storage=kept), tmp_path / "database")
+    assert searched(tuning(candidates=5, storage=kept), tmp_path / "database") == whole
+
+
+def test_a_database_that_does_not_answer_is_a_line() -> None:
+    for url in ("nosuch://host/base", "sqlite:////no/such/folder/tune.db"):
+        with pytest.raises(StudyError, match="no storage for a search") as raised:
+            storage_of(url)
+        assert "\n" not in str(raised.value)
+
+
 def _begin_one_and_die(folder: Path, sampler: str) -> None:
     import optuna
-    from optuna.storages.journal import JournalFileBackend
 
-    storage = optuna.storages.JournalStorage(JournalFileBackend(str(folder / "journal")))
-    optuna.load_study(study_name=f"identity-{sampler}", storage=storage).ask()
+    optuna.load_study(study_name=f"identity-{sampler}", storage=storage_of(folder / "journal")).ask()
 
 
 @pytest.mark.parametrize(

@@ -200,7 +200,7 @@ WRONG_BVH = {
     "utf-16": (BVH.encode("utf-16"), "x.bvh:1: binary content"),
     "long text line": (BVH.replace("MOTION", "MOTION" + " " * 2_000_000), "x.bvh:19: line of 2000007 bytes"),
     "control characters": ("\x1b[31mHIERARCHY\n", "x.bvh:1: file begins with"),
-    "no length": (BVH.replace("-4", "0"), "x.bvh:0: the legs have no length"),
+    "no length": (BVH.replace("-4", "0"), "x.bvh: the legs have no length"),
     "one leg": (BVH.replace("RightLeg", "Tail"), "x.bvh:1: no joint is taken for the right_shank"),
 }
 
@@ -212,8 +212,8 @@ def test_a_wrong_bvh_is_told_in_one_line(tmp_path, kind):
 
 
 WRONG_ASF = {
-    "no bones": (":version 1.10\n", "1.asf:0: 'every bone' is not in the hierarchy"),
-    "a BVH": (BVH, "1.asf:0: 'every bone' is not in the hierarchy"),
+    "no bones": (":version 1.10\n", "1.asf: 'every bone' is not in the hierarchy"),
+    "a BVH": (BVH, "1.asf: 'every bone' is not in the hierarchy"),
     "section": (ASF.replace(":units", ":untis"), "1.asf:2: section ':untis'"),
     "length nan": (ASF.replace("length 7", "length nan", 1), "1.asf:14: 'nan' is not a number"),
     "length zero": (ASF.replace("0.45", "0"), "1.asf:3: unit of length is '0'"),
@@ -225,7 +225,7 @@ WRONG_ASF = {
     "unknown child": (ASF.replace("lfemur ltibia\n", "lfemur tail\n"), "1.asf:56: child 'tail'"),
     "cycle": (ASF.replace("    lfemur ltibia\n", "    lfemur root\n"), "1.asf:56: child 'root'"),
     "two parents": (ASF.replace("rfemur rtibia", "rfemur rtibia ltibia"), "1.asf:57: child 'ltibia'"),
-    "orphan": (ASF.replace("    rfemur rtibia\n", ""), "1.asf:0: 'rtibia' is not in the hierarchy"),
+    "orphan": (ASF.replace("    rfemur rtibia\n", ""), "1.asf: 'rtibia' is not in the hierarchy"),
     "parent later": (ASF.replace("    rhipjoint rfemur\n", ""), "1.asf:56: 'rfemur' has no parent yet"),
     "1e5 bones": (":bonedata\n" + "".join(f"begin\nname b{k}\nend\n" for k in range(100_000)), "1.asf:3000: too many"),
     "empty": ("", "1.asf:1: file is empty"),

@@ -28,7 +28,9 @@ from sim.recording.recording import Recording
 from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
 
 pytestmark = pytest.mark.processes
-CLOCK = ServoClock(late=0.2, heartbeat=0.6)
+CLOCK = ServoClock(late=20.0, heartbeat=20.0)
+"""So long that a busy machine makes no fault of its own; a test of lateness or silence has a clock of its own."""
+LATE, SILENT = 0.2, 0.6
 
 
 def job(path: Path) -> RecordingJob:
@@ -160,9 +162,9 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
 
 
 def test_controls_that_freeze_are_a_fault_and_controls_that_are_back_can_clear_it() -> None:
-    with running() as run:
-        time.sleep(1.2)
-        look = run.poll()
+    with running(clock=ServoClock(late=20.0, heartbeat=SILENT)) as run:
+        time.sleep(2.0 * SILENT)
+        look = until(run, lambda look: look.fault is not Fault.NONE)
         assert look.fault is Fault.CONTROL_LOST
         assert not look.row["torque"].any()
         time.sleep(0.1)
@@ -182,8 +184,8 @@ def goes_past(run: HardwareRun, ticks: int = 20) -> None:
 
 @pytest.mark.parametrize("stall", [0.05, 0.5])
 def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(stall: float) -> None:
-    """A stop of 50 ms is counted where 200 ms are allowed; one of 500 ms is a fault."""
-    with running() as run:
+    """A stop of 50 ms is counted where more is allowed; one of 500 ms is a fault where 200 ms are."""
+    with running(clock=ServoClock(late=LATE if stall > LATE else 20.0, heartbeat=20.0)) as run:
         assert run.servo.pid is not None
         begin, before = time.monotonic(), run.poll().row
         os.kill(run.servo.pid, signal.SIGSTOP)
@@ -194,7 +196,9 @@ def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(sta
         assert after["missed"] - before["missed"] >= stall / PERIOD - 2
         ran = after["tick"] - before["tick"] - (after["missed"] - before["missed"])
         assert ran <= (time.monotonic() - begin - stall) / PERIOD + 5
-        if stall > CLOCK.late:
+        if stall <= LATE:
+            assert Fault(int(after["fault"])) is Fault.NONE
+        else:
             assert Fault(int(after["fault"])) is Fault.SERVO_LATE
             assert not after["torque"].any()
 
@@ -211,7 +215,7 @@ def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed() -> No
         return bool(seen[SHOWN_TORQUE : SHOWN_TORQUE + 3].any())
 
     try:
-        with HardwareRun(functools.partial(over_packets, ours), PERIOD, CLOCK) as run:
+        with HardwareRun(functools.partial(over_packets, ours), PERIOD, ServoClock(LATE, 20.0)) as run:
             run.start()
             assert run.servo.pid is not None
             for signals in ((signal.SIGSTOP, signal.SIGCONT), (signal.SIGKILL,)):
@@ -223,10 +227,10 @@ def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed() -> No
                 assert seen[SHOWN_TRIPS] > trips
                 until(run, lambda look: not look.alive)
                 for back in signals[1:]:
-                    time.sleep(2.0 * CLOCK.late)
+                    time.sleep(2.0 * LATE)
                     os.kill(run.servo.pid, back)
                     look = until(run, lambda look: look.fault is not Fault.NONE)
-                    assert look.fault in (Fault.SERVO_LATE, Fault.CONTROL_LOST)
+                    assert look.fault in (Fault.SERVO_LATE, Fault.READING_STALE)  # the latter if just before
                     assert not pushes()
                     run.request(CLEAR)
                     until(run, lambda look: look.state is State.DISARMED)
@@ -253,7 +257,11 @@ def test_a_device_that_is_gone_is_a_fault() -> None:
             active(run)
             hosted.kill()
             look = until(run, lambda look: look.fault is not Fault.NONE)
-            assert look.fault in (Fault.UNPLUGGED, Fault.READING_STALE)
+            if look.fault is Fault.READING_STALE:  # of a machine too busy for the device, just before
+                run.request(CLEAR)
+                look = until(run, lambda look: look.fault is not Fault.READING_STALE)
+                look = until(run, lambda look: look.fault is not Fault.NONE)
+            assert look.fault is Fault.UNPLUGGED
             assert not look.row["torque"].any()
     finally:
         hosted.kill()

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from controllers.curves.trajectory import Trajectory
 from sim.devices.simulated import simulated_phantom
@@ -10,9 +11,10 @@ from sim.loop.loop import Loop
 from sim.users.body import arm_matrices
 from sim.users.eye import Eye, seen_place
 from sim.users.intents import Own, Trace, Wish
+from sim.users.muscles import RECOVERY
 from sim.users.participant import Participant
 from sim.users.person import Person
-from sim.users.person_state import BELIEF, FELT_FORCE, REFLEX
+from sim.users.person_state import BELIEF, CAPACITY, FELT_FORCE, REFLEX
 from sim.users.person_step import person_step
 from sim.users.wishes import Wishes, following, resting
 from sim.world.phantom_port import phantom_port
@@ -71,30 +73,65 @@ def test_nobody_pulls_harder_than_she_can() -> None:
     assert np.linalg.norm(hand.force) <= 3.0 + 1e-9
 
 
+def test_a_force_that_is_held_tires_her_by_the_three_compartment_model() -> None:
+    """While she holds a share f of her strength, (1 − C)(t) = (F f/R)(1 − exp(−R t)); see `sim.users.muscles`."""
+    person = replace(QUIET, strength=20.0, fatigue=4.0)
+    hand = Clamped(person, Wishes(following(np.zeros((2, 3)))))
+    hand.hold(np.zeros(3), 0.1)
+    hand.hold(np.array([0.04, 0.0, 0.0]), 1.0)
+    began, load = hand.state.memory[CAPACITY], float(np.linalg.norm(hand.force)) / person.strength
+    hand.hold(np.array([0.04, 0.0, 0.0]), 3.0)
+    assert 0.2 < load < 0.9
+    lost = 4.0 * load / RECOVERY * (1.0 - np.exp(-RECOVERY * 3.0 / 60.0))
+    assert began - hand.state.memory[CAPACITY] == pytest.approx(lost, rel=0.02)
+
+
 def test_a_tired_person_loses_strength_and_a_rested_one_keeps_it() -> None:
     for fatigue, least, most in ((0.0, 1.0, 1.0), (4.0, 0.3, 0.95)):
         hand = Clamped(replace(QUIET, strength=3.0, fatigue=fatigue), Wishes(following(np.zeros((2, 3)))))
         hand.hold(np.zeros(3), 0.1)
         hand.hold(np.array([0.08, 0.0, 0.0]), 5.0)
-        assert least <= hand.state.memory[6] <= most
+        assert least <= hand.state.memory[CAPACITY] <= most
+
+
+PHASE = 2.0 * np.pi * np.arange(64) / 64
+PLACES = 0.04 * np.stack([np.cos(PHASE), np.sin(PHASE), 0.0 * PHASE], axis=1)
+
+
+def eye_of(effect: np.ndarray, p: np.ndarray, trust: float) -> Eye:
+    """An eye that has learned a figure whose root is at effect @ p, and is shown that of a place p."""
+
+    def pose(p: np.ndarray) -> np.ndarray:
+        return np.concatenate([effect @ p, np.tile([1.0, 0.0, 0.0, 0.0], 18)])
+
+    inverse = np.zeros((3, 57))
+    inverse[:, :3] = np.linalg.solve(effect.T @ effect + trust * np.eye(3), effect.T)
+    unseen, n = np.eye(3) - inverse[:, :3] @ effect, len(PLACES)
+    inverses, unseens = np.tile(inverse, (n, 1, 1)), np.tile(unseen, (n, 1, 1))
+    return Eye(pose(p), np.array([pose(q) for q in PLACES]), PLACES, inverses, unseens, np.full(n, trust))
 
 
 def test_an_eye_finds_the_place_that_a_pose_tells() -> None:
-    rng, n = np.random.default_rng(2), 64
-    phase = 2.0 * np.pi * np.arange(n) / n
-    places = 0.04 * np.stack([np.cos(phase), np.sin(phase), 0.0 * phase], axis=1)
-    mixing = 3.0 * rng.normal(size=(3, 3))
-
-    def pose(p: np.ndarray) -> np.ndarray:
-        return np.concatenate([mixing @ p, np.tile([1.0, 0.0, 0.0, 0.0], 18)])
-
-    inverse = np.zeros((n, 3, 57))
-    inverse[:, :, :3] = np.linalg.inv(mixing)
-    place = np.zeros(3)
+    effect, place = 3.0 * np.random.default_rng(2).normal(size=(3, 3)), np.zeros(3)
     for p in (np.array([0.03, 0.02, 0.01]), np.array([-0.04, 0.001, -0.01])):
-        eye = Eye(pose(p), np.array([pose(q) for q in places]), places, inverse)
-        seen_place(eye, p + 0.002, np.empty(57), place)
+        seen_place(eye_of(effect, p, 0.0), p + 0.002, np.empty(57), place)
         np.testing.assert_allclose(place, p, atol=1e-12)
+
+
+def test_what_the_figure_does_not_show_is_felt() -> None:
+    """The most likely place of a picture without noise is that of the linear Gaussian problem, in closed form."""
+    effect, p, felt, place = (
+        np.diag([50.0, 50.0, 0.0]),
+        np.array([0.04, 0.0, 0.006]),
+        np.array([0.043, -0.002, 0.007]),
+        np.zeros(3),
+    )
+    seen_place(eye_of(effect, p, 1e-6), felt, np.empty(57), place)
+    np.testing.assert_allclose(place, [p[0], p[1], felt[2]], atol=1e-6)
+    effect, trust = np.diag([50.0, 30.0, 5.0]), 100.0
+    seen_place(eye_of(effect, p, trust), felt, np.empty(57), place)
+    likeliest = np.linalg.solve(effect.T @ effect + trust * np.eye(3), effect.T @ effect @ p + trust * felt)
+    np.testing.assert_allclose(place, likeliest, atol=1e-9)
 
 
 def servo_of(participant: Participant):

@@ -6,10 +6,11 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import part, whole
+from experiments.saying import Json
 
 
 @part
-class Tune:
+class Command:
     """Tune numbers of a run on simulated people, within what is certified, or go on with a tuning that was stopped."""
 
     tuning: Annotated[Path, tyro.conf.Positional]
@@ -24,8 +25,7 @@ class Tune:
     """Run them in so many processes of a local Dask cluster instead."""
     cluster: str | None = None
     """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
-    json: bool = False
-    """Print what was found as JSON."""
+    json: Json = False
 
     def __call__(self) -> int:
         """Tune, and say what was chosen."""

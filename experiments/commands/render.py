@@ -8,7 +8,7 @@ import tyro
 
 
 @dataclass(frozen=True)
-class Render:
+class Command:
     """Film a run from its recording: the workspace with its forces beside the figure and the default animation."""
 
     folder: Annotated[Path, tyro.conf.Positional]
@@ -32,7 +32,7 @@ class Render:
     height: int = 720
     """Of a frame [pixels]."""
     fps: float = 30.0
-    """Frames per second."""
+    """Frames per second [Hz]."""
     overwrite: bool = False
     """Replace the film if it exists."""
 

@@ -6,9 +6,12 @@ from typing import Annotated
 
 import tyro
 
+from experiments.saying import Json, say
+from experiments.working import working
+
 
 @dataclass(frozen=True)
-class Prepare:
+class Command:
     """Make a well-formed clip of anybody's capture: on the floor, looped or at rest, feasible on contact alone."""
 
     source: Annotated[Path, tyro.conf.Positional]
@@ -27,11 +30,11 @@ class Prepare:
     """Folder for a page that shows what was done."""
     overwrite: bool = False
     """Replace the target if it exists."""
+    json: Json = False
 
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
         from experiments.preparation.command import prepare_file, summary
-        from experiments.working import working
         from models.mocap.preparation.well_formed import well_formed
         from models.mocap.retargeting.retarget import Hints
 
@@ -40,5 +43,6 @@ class Prepare:
                 self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
                 self.overwrite,
             )  # fmt: skip
-        print(summary(made, well_formed(made.clip)))
+        measures = well_formed(made.clip)
+        say({"lines": [summary(made, measures)], "well_formed": measures, "faults": measures.faults()}, self.json)
         return 0

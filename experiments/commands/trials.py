@@ -6,10 +6,11 @@ from typing import Annotated
 import tyro
 
 from experiments.config.part import part, whole
+from experiments.saying import Json
 
 
 @part
-class Trials:
+class Command:
     """Run a study of simulated people from a TOML file, or go on with one that was stopped, and report on it."""
 
     study: Annotated[Path, tyro.conf.Positional]
@@ -26,8 +27,7 @@ class Trials:
     """Run them in so many processes of a local Dask cluster instead."""
     cluster: str | None = None
     """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
-    json: bool = False
-    """Print what was found as JSON."""
+    json: Json = False
 
     def __call__(self) -> int:
         """Run, and say what was found; exit code 1 if trials failed."""

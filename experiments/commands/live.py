@@ -1,23 +1,23 @@
 """What ``hvf live`` is told."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-import tyro
+from experiments.config.part import part, whole
+from experiments.config.words import Options, config_of_options
 
-from experiments.config.words import RunOptions, config_of_options
 
-
-@dataclass(frozen=True)
-class Live:
+@part
+class Command:
     """Take the stylus with the mouse: a page in the browser on which a run is driven, bent, tuned and recorded."""
 
-    options: tyro.conf.OmitArgPrefixes[RunOptions]  # pyright: ignore[reportInvalidTypeForm] - made of the parts
-    port: int = 8080
+    options: Options
+    """What is run."""
+    port: Annotated[int, whole(0, 2**16)] = 8080
     """Of the page; the next free one is taken if it is in use."""
     host: str = "127.0.0.1"
     """Address to listen on; on any but this machine's own, the page asks for a token, which is printed."""
-    out: Path = field(default=Path("runs/live"))
+    out: Path = Path("runs/live")
     """Folder for takes and clips."""
     token: str = ""
     """The token, by default a new one."""

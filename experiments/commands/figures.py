@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True)
-class Figures:
+class Command:
     """Draw Figures 1 to 8 of the paper from runs of this program, as PDF and PNG with a page of them."""
 
     out: Path = Path("runs/figures")

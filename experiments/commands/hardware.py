@@ -8,7 +8,7 @@ import tyro
 from experiments.config.part import above, part
 from experiments.config.words import config_of_options
 from experiments.files.json_text import json_text
-from experiments.hardware.run_options import IdentifyHardware, RunHardware
+from experiments.hardware.run_options import CalibrateHardware, IdentifyHardware, RunHardware
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,17 @@ class RunDevice(RunHardware):
 
 
 @part
+class CalibrateDevice(CalibrateHardware):
+    """Read where the encoders' zero is while the stylus stands at a known pose, and keep it in a device file."""
+
+    def __call__(self) -> int:
+        """Calibrate."""
+        from experiments.hardware.calibrate import calibrate
+
+        return calibrate(self)
+
+
+@part
 class IdentifyDevice(IdentifyHardware):
     """Find friction, inertia, delay and encoder offset of a device in recordings of it with no hand on the stylus."""
 
@@ -111,12 +122,13 @@ Which = (
     Annotated[ListDevices, tyro.conf.subcommand("list")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
     | Annotated[RunDevice, tyro.conf.subcommand("run")]
+    | Annotated[CalibrateDevice, tyro.conf.subcommand("calibrate")]
     | Annotated[IdentifyDevice, tyro.conf.subcommand("identify")]
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Hardware:
+class Command:
     """Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
 
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]

@@ -1,0 +1,97 @@
+r"""Stability of a law along a curve together with a governor: a damper along the curve that acts now and then.
+
+A governor's force is −β(s) along the tangent, s the measured speed along it, with slopes between 0 (within the
+admissible speeds) and b (beyond them). The rest of the loop is linear, with transfer function G(z) from a force along
+the tangent to s. By the circle criterion (Zames 1966; in discrete time Tsypkin 1962) the loop is stable for every such
+β, however it changes with time, if it is stable without it and
+
+.. math:: \mathrm{Re}\,\bigl(1 + b\,G(e^{i\omega})\bigr) > 0 \qquad \text{for all } \omega .
+
+It is refuted where the loop with the whole b is unstable; between the two nothing is known.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import casadi
+import numpy as np
+
+from controllers.certificates.loop.device import Symbol, vector
+from controllers.certificates.loop.hand import NO_HAND, HandImpedance
+from controllers.certificates.loop.laws import Law, nearest_phase
+from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.stability import River, stability, unstable_start
+from controllers.certificates.report import Verdict
+from controllers.curves.trajectory import piece_velocity
+from controllers.state import Array
+
+FREQUENCIES = 400  # of G, from a ten-thousandth of Nyquist's to Nyquist's
+
+
+def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
+    """A law with a damper −drag t (t·v) along the curve added, which goes with the gains that the law has."""
+
+    def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b: Symbol, width: Symbol) -> Symbol:
+        along = vector(piece_velocity.py_func(piece, 0, nearest_phase(p, piece, u)))
+        # In this order no square of a velocity underflows where the curve is made to stand still.
+        tangent = along / casadi.norm_2(along)
+        share = k / k_r if k_r > 0.0 else b / b_d
+        return base.force(p, v, piece, u, k, b, width) - share * drag * tangent * casadi.dot(tangent, v)
+
+    return base._replace(force=force)
+
+
+def response_along(loop: SampledLoop, k_r: float, b_d: float) -> Array:
+    """G(e^{iω}) [m/(N s)] from a force along the curve to the measured speed, complex, shape (n, `FREQUENCIES`)."""
+    linear, (basis, projection) = loop.linear, loop.across
+    tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
+    force = projection @ loop.fresh @ (linear.jacobian.transpose(0, 2, 1) @ tangent[:, :, None])
+    speed = tangent[:, None, :] @ loop.measured_velocity @ basis
+    # Diagonal form: one eigenvalue problem a phase, and any number of frequencies.
+    values, vectors = np.linalg.eig(loop.frozen(k_r, b_d))
+    reached = (speed @ vectors)[:, 0, :] * np.linalg.solve(vectors, force.astype(complex))[:, :, 0]
+    z = np.exp(1j * np.geomspace(1e-4 * np.pi, np.pi, FREQUENCIES))
+    return np.sum(reached[:, None, :] / (z[None, :, None] - values[:, None, :]), axis=2)
+
+
+def most_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
+    """Largest b [N s/m] for which the circle criterion holds at every phase; 0 if the loop is unstable without it."""
+    if loop.radius(k_r, b_d).max() >= 1.0:
+        return 0.0
+    least = float(response_along(loop, k_r, b_d).real.min())
+    return -1.0 / least if least < 0.0 else float("inf")
+
+
+def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]) -> Verdict:
+    """Verdict on a river's stability with a governor of some drag [N s/m], for every one of some hands.
+
+    Certified where the river is and the circle criterion holds, refuted where the loop is unstable while the governor
+    acts; the margin is the lesser of the river's and (largest certain drag)/drag − 1.
+    """
+    alone = stability(river, hands)
+    if drag == 0.0 or alone.verdict == "refuted":
+        return alone
+    if river.k_r == 0.0 and river.b_d == 0.0:
+        return replace(alone, verdict="unknown", reason="a governor alone is not certified; give the field a gain")
+    acting = river._replace(law=with_damper(river.law, drag, river.k_r, river.b_d))
+    worst, certain, where = -1.0, float("inf"), (NO_HAND, 0)
+    for hand in hands:
+        radius = SampledLoop(acting.still(hand), river.sampling).radius(river.k_r, river.b_d)
+        if radius.max() > worst:
+            worst, where = float(radius.max()), (hand, int(radius.argmax()))
+        certain = min(certain, most_drag(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d))
+    said = f"governor of {drag:g} N s/m, certain up to {certain:.3g}"
+    figures = {**alone.figures, "governor_drag": drag, "governor_certain": certain, "governor_radius": worst}
+    assumptions = (
+        *alone.assumptions,
+        "the governor's admissible speeds are held as they are at a phase; it acts or rests at any tick",
+    )
+    if worst >= 1.0:
+        example = unstable_start(acting, *where)
+        shakes = f"unstable while the governor acts, by a factor of {worst:.4g} a period: {said}; {alone.reason}"
+        return Verdict("refuted", shakes, certain / drag - 1.0, assumptions, example, figures)
+    margin = min(alone.margin or 0.0, certain / drag - 1.0)
+    if alone.verdict == "certified" and certain <= drag:
+        reason = f"stable while the governor acts and while it rests, but not certain as it comes and goes: {said}"
+        return Verdict("unknown", f"{reason}; {alone.reason}", margin, assumptions, {}, figures)
+    return Verdict(alone.verdict, f"{alone.reason}; {said}", margin, assumptions, {}, figures)

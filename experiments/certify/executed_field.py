@@ -1,0 +1,50 @@
+"""The program that a run executes, walls and all, looked at where no certificate covers it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from controllers.certificates.loop.executed import Seen, looked_at
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.stability import River
+from controllers.certificates.report import Verdict
+from controllers.fields.law import Program
+from controllers.safety.limiter import ForceLimiter
+from experiments.config.run_config import RunConfig
+from experiments.setups.parts import Parts
+from experiments.setups.setups import map_parts, parts_of
+from models.mocap.clip import Clip
+from sim.world.world import World
+
+
+def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
+    """The parts of a run, as it puts them together.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `experiments.setups.wiring.wire`.
+    """
+    return parts_of(config, map_parts(config, World(config.scene, config.figure.kind).figure, tuple(clips) or None))
+
+
+def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
+    """A verdict that leaves out walls, with what the executed program does at the states that were looked at."""
+    parts = executed_parts(config, clips)
+    return seen(parts.program, main._replace(curve=parts.course), parts.maps.reach, verdict, hands)
+
+
+def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
+    """An unknown verdict on a program, refuted if it is unstable at some state about the curve of `main`."""
+    found = looked_at(program, main, reach, hands.hands())
+    figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": found.strongest}
+    if found.radius >= 1.0:
+        reason = f"unstable, by a factor of {found.radius:.4g} a period at phase {found.phase:.3g} s; {verdict.reason}"
+        return Verdict("refuted", reason, None, verdict.assumptions, _example(found), figures)
+    peak = ForceLimiter(main.sampling.period).peak
+    cut = f", its force up to {found.strongest:.3g} N, which the limiter cuts" if found.strongest > peak else ""
+    told = f"stable at each of {found.states} states of the program that were looked at{cut}"
+    return replace(verdict, reason=f"{verdict.reason}; {told}", figures=figures)
+
+
+def _example(found: Seen) -> dict[str, object]:
+    return {"phase": found.phase, "p": found.p, "v": found.v, "hand": found.hand, "radius": found.radius}

@@ -1,0 +1,22 @@
+"""``hvf bench``: speed, as ratios."""
+
+from dataclasses import dataclass
+
+from experiments.saying import Json
+from experiments.working import working
+
+
+@dataclass(frozen=True)
+class Command:
+    """Measure speed, as ratios within one run, each with what it has to keep to."""
+
+    json: Json = False
+    check: bool = False
+    """Exit with 1 if a figure fails."""
+
+    def __call__(self) -> int:
+        """Measure."""
+        from experiments.studies.benchmarks import bench
+
+        with working("measuring speed"):
+            return bench(self.json, self.check)

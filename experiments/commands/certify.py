@@ -1,0 +1,139 @@
+"""``hvf certify``: what is certain of a field, a run, a map or a clip."""
+
+import sys
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import TypeAdapter
+from tyro.conf import Positional
+
+from controllers.certificates.flight.tolerance import BallisticTolerance, Judging
+from controllers.certificates.loop.hand import NO_HANDS, HandRange
+from controllers.certificates.report import Certificate, ChangedInputs
+from controllers.errors import ParameterError
+from experiments.config.part import above, at_least, from_json, part
+from experiments.config.run_config import RunConfig
+from experiments.config.words import Options, RunOptions, config_of_options
+from experiments.saying import Json, say
+from experiments.working import working
+from models.mocap.clip import Clip
+from sim.errors import SimError
+
+ASKED = "asked.json"
+"""What a certificate was asked for with, beside it."""
+
+
+@part
+class Command:
+    """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
+
+    options: Options = field(default_factory=RunOptions)
+    """The field."""
+    run: Positional[Path | None] = None
+    """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""
+    clip: str | None = None
+    """Judge this motion instead of a field: a file, or the name of an embedded clip."""
+    out: Path | None = None
+    """Folder for the certificate, runs/certificate by default, runs/certificate-CLIP of a clip; a certificate that is
+    there already is taken if nothing has changed."""
+    overwrite: bool = False
+    """Replace a certificate of something else that the folder holds."""
+    delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
+    """Of the motors' torques, for a field [s]."""
+    hand_push: Annotated[float, at_least(0.0, unit="N")] = 1.0
+    """Largest force of the hand for which the distance from the curve is bounded [N]."""
+    hand: HandRange = field(default_factory=HandRange)
+    """Intervals of the impedance of the hands that may hold the stylus."""
+    no_hand: bool = False
+    """Certify for nobody's hand on the stylus."""
+    tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
+    """What passes for a flight."""
+    friction: Annotated[float, above(0.0)] = Judging.friction
+    """Coefficient of friction of soles on the floor, for clips [1]."""
+    verify: Path | None = None
+    """Only check that this certificate.json is of the same field, hands, clips and code, by default of those that it
+    was made for; exit code 1 if it is not."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Certify, or verify."""
+        if self.verify is None:
+            certificate = self._made()
+        else:
+            try:
+                certificate = self._meant(self.verify)._checked(self.verify)
+            except ChangedInputs as error:
+                print(f"hvf: {error}", file=sys.stderr)
+                return 1
+        lines = [f"{name}: {verdict.verdict}; {verdict.reason}" for name, verdict in certificate.verdicts.items()]
+        if self.verify is not None:
+            lines.insert(0, f"{self.verify}: all that it is of is as it was")
+        say(certificate.to_json(), self.json, lines)
+        return 0
+
+    def _hands(self) -> HandRange:
+        return NO_HANDS if self.no_hand else self.hand
+
+    def _judging(self) -> Judging:
+        return Judging(self.tolerance, self.friction)
+
+    def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
+        """The field, and the clips that are certified with it; gains alone have none."""
+        from experiments.setups.certified_law import governor_drag, left_out
+
+        config = config_of_options(self.options)
+        # A governor and walls are made of the clips.
+        of_clips = config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
+        if self.run is None and not of_clips:
+            return config, ()
+        from experiments.certify.certified_clips import run_and_clips
+
+        return run_and_clips(self.run, config)
+
+    def _made(self) -> Certificate:
+        from experiments.certify.certify import CERTIFICATE, certify_clip_into, certify_into
+
+        default = "runs/certificate" if self.clip is None else f"runs/certificate-{Path(self.clip).stem}"
+        folder = self.out or Path(default)
+        if (folder / CERTIFICATE).exists() and not self.overwrite:
+            try:
+                return self._checked(folder / CERTIFICATE)
+            except ChangedInputs:
+                raise SimError(
+                    f"{folder}: holds a certificate of something else; choose another --out, or --overwrite it"
+                ) from None
+        with working("certifying" if self.clip is None else "certifying a clip"):
+            if self.clip is not None:
+                certificate = certify_clip_into(self.clip, folder, self._judging())
+            else:
+                config, clips = self._what()
+                certificate = certify_into(
+                    config, folder, self.delay, self._hands(), self.hand_push, clips, self._judging()
+                )
+        asked = replace(self, out=None, overwrite=False, json=False)
+        (folder / ASKED).write_bytes(TypeAdapter(Command).dump_json(asked, indent=2, exclude_defaults=True))
+        return certificate
+
+    def _meant(self, file: Path) -> "Command":
+        """The command as it was when a certificate was made, where nothing else is asked for."""
+        beside = file.parent / ASKED
+        if replace(self, verify=None, json=False) != Command() or not beside.exists():
+            return self
+        try:
+            return from_json(Command, beside.read_bytes(), str(beside))
+        except OSError as error:
+            raise ParameterError(f"{beside}: cannot be read ({error.strerror})") from None
+
+    def _checked(self, file: Path) -> Certificate:
+        from experiments.certify.certified_field import certificate_inputs
+        from experiments.files.certificate_files import clip_inputs, verify_certificate
+
+        if self.clip is not None:
+            from experiments.setups.clips import load_clips
+
+            inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
+        else:
+            config, clips = self._what()
+            inputs = certificate_inputs(config, self.delay, self._hands(), self.hand_push, clips, self._judging())
+        return verify_certificate(file, inputs)

@@ -1,0 +1,33 @@
+"""``hvf convert``: any motion file as the figure's own BVH, or as glTF."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tyro.conf import Positional
+
+from experiments.saying import Json, say
+
+
+@dataclass(frozen=True)
+class Command:
+    """Convert a BVH, AMC or DeepMimic motion to the figure's own BVH, or to glTF."""
+
+    source: Positional[Path]
+    """Motion file to read."""
+    target: Positional[Path]
+    """File to write: .bvh, or .glb for glTF."""
+    overwrite: bool = False
+    """Replace the target if it exists."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Convert, and say what the file was taken for."""
+        if self.target.suffix.lower() == ".glb":
+            from experiments.export.gltf import convert_to_gltf as convert
+        else:
+            from models.mocap.library import convert
+
+        report = convert(self.source, self.target, overwrite=self.overwrite).report
+        own = "the figure's own skeleton: nothing to retarget"
+        say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))
+        return 0

@@ -1,0 +1,26 @@
+"""``hvf demo``: a run that shows what there is."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.saying import Json, say
+from experiments.started import STARTED
+
+
+@dataclass(frozen=True)
+class Command:
+    """The four-clip cylinder of the paper's Fig. 3: two relaxed laps, then one with pushes outwards and inwards."""
+
+    out: Path = Path("runs/demo")
+    """Folder to write."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Run."""
+        from experiments.demo import demo_config
+        from experiments.run import run
+
+        say(run(demo_config(), self.out, self.overwrite, STARTED), self.json)
+        return 0

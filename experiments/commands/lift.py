@@ -1,0 +1,42 @@
+"""``hvf lift``: a map from clips alone."""
+
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional
+
+from controllers.haptic_map.lifting.room import Room
+from experiments.config.part import part, whole
+from experiments.saying import Json, say
+from experiments.working import working
+
+
+@part
+class Command:
+    """Author a curve for every clip, and one haptic map with all of them, from the clips alone."""
+
+    clips: Positional[tuple[str, ...]]
+    """Names of embedded clips, or files."""
+    out: Path = Path("runs/map.npz")
+    """File to write the map into."""
+    room: Room = field(default_factory=Room)
+    """Where curves may be, and how near to each other and how fast."""
+    cyclic: tuple[str, ...] = ()
+    """Clips that have to close; by default all those are closed curves that do."""
+    seed: Annotated[int, whole(0)] = 1
+    """Of the places from which the arrangement begins."""
+    raw: bool = False
+    """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Lift, and say what came of it."""
+        from experiments.lifting.lift import lift_into
+
+        with working("lifting", len(self.clips)):
+            report = lift_into(self.clips, self.out, self.room, self.cyclic, self.seed, self.overwrite, self.raw)
+        say(report.to_json(), self.json, report.lines())
+        return 0

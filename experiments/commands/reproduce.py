@@ -1,0 +1,25 @@
+"""``hvf reproduce``: a run again, compared bit for bit."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tyro.conf import Positional
+
+from experiments.saying import Json, say
+
+
+@dataclass(frozen=True)
+class Command:
+    """Run a recording's configuration again and compare, bit for bit."""
+
+    folder: Positional[Path]
+    """Folder of a run."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Exit code 0 if every tick is the same, 1 if not."""
+        from experiments.reproduce import reproduce
+
+        found = reproduce(self.folder)
+        say(found, self.json)
+        return 0 if found.same else 1

@@ -1,0 +1,29 @@
+"""``hvf track``: the physical figure on its own."""
+
+from typing import Annotated
+
+from tyro.conf import Positional
+
+from experiments.config.part import above, part
+from experiments.saying import Json, say
+
+
+@part
+class Command:
+    """Let the physical figure follow clips on its own, and report how well it does."""
+
+    clips: Positional[tuple[str, ...]] = ()
+    """Names of embedded clips, or files; all embedded clips by default."""
+    seconds: Annotated[float, above(0.0, unit="s")] = 10.0
+    """Simulated time for each [s]."""
+    raw: bool = False
+    """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Track."""
+        from experiments.track import track_clips
+
+        reports = track_clips(self.clips, self.seconds, self.raw)
+        say(reports, self.json, [f"{name}: {report}" for name, report in reports.items()])
+        return 0

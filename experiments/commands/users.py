@@ -1,0 +1,32 @@
+"""``hvf users``: simulated people against published laws."""
+
+from pathlib import Path
+from typing import Annotated
+
+from experiments.config.part import part, whole
+from experiments.saying import Json, say
+
+
+@part
+class Command:
+    """Hold simulated people against the published laws of human movement: a table, and a figure each."""
+
+    out: Path = Path("runs/users")
+    """Folder to write."""
+    people: Annotated[int, whole(1)] = 3
+    """How many people of a population take part."""
+    seed: Annotated[int, whole(0)] = 8
+    """Of the population and of its noise."""
+    laws: tuple[str, ...] = ()
+    """fitts, scatter, steering, power-law, tremor, step-response, grip, practice, endurance; all by default."""
+    overwrite: bool = False
+    """Replace the table that the folder holds."""
+    json: Json = False
+
+    def __call__(self) -> int:
+        """Exit code 0 if every law holds, 1 if one does not."""
+        from experiments.studies.user_laws.report import laws_into, lines
+
+        laws = laws_into(self.out, self.people, self.seed, self.laws, self.overwrite)
+        say(laws, self.json, lines(laws))
+        return 0 if all(law.holds for law in laws) else 1

@@ -1,0 +1,87 @@
+"""``hvf hardware calibrate``: where the encoders' zero is, from readings of a stylus that stands at a known pose."""
+
+import time
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
+from experiments.hardware.run_options import EMULATED, CalibrateHardware
+from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame
+from models.scene import SceneConfig
+from sim.devices.driver import Driver
+from sim.devices.exchange import READING_SIZE, READING_THETA
+from sim.devices.hardware_list import open_device
+from sim.errors import SimError
+from sim.hardware.emulated import EmulatedPhantom
+from sim.users.arm import Arm
+
+Array = npt.NDArray[np.float64]
+
+STILL = 5e-3
+"""How far a joint may turn while it is read [rad]: a millimetre at the tip, a hand's tremor and not its motion."""
+_PERIOD = 1e-3  # s
+
+
+def calibrate(options: CalibrateHardware) -> int:
+    """Read a device at a known pose with its motors off, say where its zero is, and write it.
+
+    Raises
+    ------
+    SimError
+        If there is no such device, it moves or gives no readings, or the file has a calibration.
+    """
+    base = read_device_file(options.out) if options.out.exists() else {}
+    if "offset" in base and not options.overwrite:
+        raise SimError(
+            f"{options.out}: has an offset of the encoders; choose another --out, or --overwrite that offset"
+        )
+    driver = _fixture(options) if options.name == EMULATED else open_device(options.name)
+    try:
+        readings = still_readings(driver, options.seconds)
+    finally:
+        driver.close()
+    offset, step = readings.mean(axis=0) - np.array(options.pose), np.array(ENCODER_STEP)
+    margin = 0.5 * np.maximum(step, np.ptp(readings, axis=0))
+    save_device(calibrated_json(offset.tolist(), margin.tolist(), driver.identity, base), options.out)
+    for i, (value, half) in enumerate(zip(offset, margin, strict=True), start=1):
+        print(f"offset{i}  {value: .5f} ± {half:.5f} rad")
+    print(
+        f"{driver.identity.name} {driver.identity.serial}".rstrip() + f": {len(readings)} readings; in {options.out}."
+    )
+    return 0
+
+
+def still_readings(driver: Driver, seconds: float) -> Array:
+    """Angles that a device at rest tells for so long [s], shape (n, 3) [rad].
+
+    Raises
+    ------
+    SimError
+        If none come, or the joints turn.
+    """
+    reading, found = np.zeros(READING_SIZE), list[Array]()
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        driver.write(np.zeros(3), False)
+        if driver.read(reading, 2.0 * _PERIOD):
+            found.append(reading[READING_THETA : READING_THETA + 3].copy())
+        time.sleep(0.5 * _PERIOD)
+    if not found:
+        raise SimError(f"{driver.identity.name} gave no reading in {seconds:g} s; expected one a millisecond")
+    readings = np.array(found)
+    moved = float(np.ptp(readings, axis=0).max())
+    if not moved <= STILL:
+        raise SimError(
+            f"a joint turned by {moved:.2g} rad while it was read; expected {STILL:g} or less: hold the stylus still"
+        )
+    return readings
+
+
+def _fixture(options: CalibrateHardware) -> EmulatedPhantom:
+    """The emulated device, held at the pose as stiffly as a fixture holds."""
+    a, b, c = options.pose
+    start = np.array(vector_to_hand_frame(forward_kinematics((a, b, c))))
+    held = Arm(path=np.stack([start, start]), stiffness=2e4, damping=50.0)
+    linkage = linkage_from(read_device_file(options.emulate) if options.emulate else {})
+    return EmulatedPhantom(SceneConfig(servo_period=_PERIOD), start, linkage, held, holds=0.0)

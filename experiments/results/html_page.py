@@ -1,0 +1,70 @@
+"""The frame of every page that is written: one HTML document that opens from disk, in one style."""
+
+import base64
+import html
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }
+h1 { font-size: 1.5rem; margin: 0 0 .5rem; }
+h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
+iframe { width: 100%; height: min(42rem, 80vh); border: 1px solid #d9dde4; border-radius: 6px; }
+img { max-width: 100%; }
+.found { font-size: 1.05rem; border-left: 4px solid #1f5fbf; padding-left: 1rem; }
+.found p { margin: .4rem 0; }
+.note { font-size: .9rem; color: #566072; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; white-space: nowrap; }
+th:first-child, td:first-child, .l { text-align: left; }
+td.says { white-space: normal; text-align: left; }
+tr.weak { color: #7b8698; }
+pre { background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }
+@media (max-width: 600px) { body { padding: .8rem; } iframe { height: 70vh; } }
+"""
+
+
+def document(title: str, body: str, style: str = "") -> str:
+    """A whole page.
+
+    Parameters
+    ----------
+    title : str
+        Of the page, and its heading.
+    body : str
+        HTML below the heading.
+    style : str
+        CSS of this page alone.
+    """
+    name = html.escape(title)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<title>{name}</title>\n<style>{_STYLE}{style}</style>\n</head>\n<body>\n<h1>{name}</h1>\n{body}</body>\n</html>\n"
+    )
+
+
+def image(picture: Figure | Path, name: str) -> str:
+    """A plot, or a PNG file, as it lies within the page."""
+    if isinstance(picture, Path):
+        data = picture.read_bytes()
+    else:
+        drawn = io.BytesIO()
+        picture.savefig(drawn, format="png", dpi=110)
+        data = drawn.getvalue()
+    return f'<img alt="{html.escape(name)}" src="data:image/png;base64,{base64.b64encode(data).decode()}">'
+
+
+def sentences(said: Sequence[str]) -> str:
+    """What a skimming reader should know, a paragraph each."""
+    return f'<div class="found">{"".join(f"<p>{html.escape(one)}</p>" for one in said)}</div>\n'
+
+
+def short(value: float) -> str:
+    """A number of a table, to three digits; a dash where there is none."""
+    return f"{value:.3g}" if math.isfinite(value) else "–"

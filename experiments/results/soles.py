@@ -1,0 +1,48 @@
+"""Soles over the floor, of poses that come in blocks: how low they reach, and how far they slide while they touch."""
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
+from models.scene import SceneConfig
+
+Array = npt.NDArray[np.float64]
+
+TOUCH = 0.003  # [m] a sole's point that is lower touches
+
+
+class Soles:
+    """Points of the soles of a figure; those lower than `touch` [m] touch.
+
+    Attributes
+    ----------
+    slide : float
+        Largest distance over the floor of a point from where it began to touch [m].
+    lowest : float
+        Least height of a point [m]; infinite before the first pose.
+    """
+
+    def __init__(self, scene: SceneConfig, touch: float = TOUCH):
+        self._touch = touch
+        self._model = figure_model(scene.stature, scene.mass)
+        self._data = mujoco.MjData(self._model)
+        self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
+        self._radius = CONTACT_RADIUS * scene.stature / DEFAULT_STATURE
+        self._since = np.full((len(self._geoms), 2), np.nan)
+        self.slide, self.lowest = 0.0, float("inf")
+
+    def add(self, poses: Array) -> None:
+        """Take poses (n, 75), in order of time."""
+        for pose in poses:
+            self._data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            places = self._data.geom_xpos[self._geoms]
+            height = places[:, 2] - self._radius
+            self.lowest = min(self.lowest, float(height.min()))
+            touching = height < self._touch
+            begins = touching & np.isnan(self._since[:, 0])
+            self._since[begins] = places[begins, :2]
+            self._since[~touching] = np.nan
+            way = np.linalg.norm(places[:, :2] - self._since, axis=1)
+            self.slide = max(self.slide, float(np.max(way[touching], initial=0.0)))

@@ -1,0 +1,60 @@
+"""Figures of speed: each with what it has to keep to, whether it does, in words and as JSON."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+from experiments.files.json_text import json_text
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured ratio.
+
+    Attributes
+    ----------
+    name : str
+        What was measured.
+    value : float
+    unit : str
+        Of what, such as ``mj_steps`` or ``×``.
+    at_most, at_least : float or None
+        What it has to keep to; neither of one that is only told.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    at_most: float | None = None
+    at_least: float | None = None
+
+    @property
+    def passes(self) -> bool | None:
+        """Whether it keeps to that; None where it is only told. What is not a number passes nothing."""
+        if self.at_most is None and self.at_least is None:
+            return None
+        return (self.at_most is None or self.value <= self.at_most) and (
+            self.at_least is None or self.value >= self.at_least
+        )
+
+    def line(self) -> str:
+        """As ``pass  a tick of follow: 1.42 mj_steps (≤ 1.5)``."""
+        said = {True: "pass", False: "FAIL", None: "    "}[self.passes]
+        limits = (("≤", self.at_most), ("≥", self.at_least))
+        bounds = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None]
+        told = f" ({', '.join(bounds)})" if bounds else ""
+        return f"{said}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{told}"
+
+
+def tell(figures: Iterable[Figure], as_json: bool, check: bool) -> int:
+    """Print figures as they come, or all as JSON; returns the exit code, 1 if `check` and one fails."""
+    told: list[Figure] = []
+    for figure in figures:
+        told.append(figure)
+        if not as_json:
+            print(figure.line(), flush=True)
+    failed = [figure.name for figure in told if figure.passes is False]
+    if as_json:
+        print(json_text([asdict(figure) | {"passes": figure.passes} for figure in told]))
+    elif failed:
+        print(f"{len(failed)} of {len(told)} figures fail: {'; '.join(failed)}")
+    return 1 if check and failed else 0

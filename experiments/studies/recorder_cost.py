@@ -1,0 +1,46 @@
+"""What recording costs beside the run that is recorded, and whether memory grows with a run."""
+
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+
+from experiments.config.words import run_config
+from experiments.setups.wiring import wire
+from sim.loop.loop import Loop, groups, record_into
+from sim.recording.recorder import Recorder
+
+_SECONDS, _LONG = 2.0, 20.0
+
+
+class RecorderCost(NamedTuple):
+    """Processor time with a recorder over that without, and memory after a run ten times as long over that before."""
+
+    ratio: float
+    grown: float
+
+
+def recorder_cost() -> RecorderCost:
+    """Measure the demo's run."""
+    _seconds(0.1, True)
+    alone, recorded = _seconds(_SECONDS, False), _seconds(_SECONDS, True)
+    before = psutil.Process().memory_info().rss
+    _seconds(_LONG, True)
+    return RecorderCost(recorded / alone, psutil.Process().memory_info().rss / before)
+
+
+def _seconds(seconds: float, recorded: bool) -> float:
+    """Processor time of a run [s], all threads."""
+    session = wire(run_config())
+    with tempfile.TemporaryDirectory() as folder:
+        if not recorded:
+            begin = time.process_time()
+            Loop(session.servo, session.world).run(seconds)
+            return time.process_time() - begin
+        with Recorder(Path(folder) / "run.h5", {}, 1, groups(session.servo), session.static()) as recorder:
+            begin = time.process_time()
+            Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(seconds)
+            recorder.flush()
+            return time.process_time() - begin

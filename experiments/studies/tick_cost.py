@@ -1,0 +1,70 @@
+"""What a closed-loop tick costs in units of one bare `mj_step` of the same world, mode by mode.
+
+The bare steps are those of the same run: its recorded controls are replayed through the same compiled loop, in which
+nothing but `mj_step` then costs time. So contacts and constraints are the same, at every tick.
+"""
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from experiments.config.run_config import RunConfig
+from experiments.config.words import run_config
+from experiments.setups.session import Session
+from experiments.setups.wiring import wire
+from sim.loop.loop import make_logs
+from sim.loop.servo import FrameLog, TickLog, run_block
+
+STEP = 1e-3  # [s] of the physics: one to a servo tick, the fewest there can be
+SECONDS, ROUNDS = 1.0, 3
+
+MODES: Mapping[str, Callable[[], RunConfig]] = {
+    "follow": lambda: run_config(physics_step=STEP),
+    "follow, four clips that walk": lambda: run_config(clips=("walk",) * 4, physics_step=STEP),
+    "bunny": lambda: run_config(mode="bunny", physics_step=STEP),
+    "stretch": lambda: run_config(mode="stretch", physics_step=STEP),
+    "rivers, a clip each": lambda: run_config(mode="rivers", map="rivers", physics_step=STEP),
+    "lead": lambda: run_config(mode="lead", physics_step=STEP),
+    "composite": lambda: run_config(map="composite", clips=("walk", "angry", "cheer"), physics_step=STEP),
+    "gaze and lean": lambda: run_config(expressive=True, user="turn", physics_step=STEP),
+    "soft walls": lambda: run_config(walls=True, physics_step=STEP),
+    "a simulated person": lambda: run_config(person="median", user="trace", physics_step=STEP),
+}
+"""Every kind of law, map and hand, the heavy ones too; the figure is updated every other tick, at 500 Hz."""
+
+
+class TickCost(NamedTuple):
+    """Processor time of a closed-loop tick and of a bare step [s], medians over rounds, and whether states agreed."""
+
+    tick: float
+    step: float
+    same: bool
+
+
+def tick_cost(config: RunConfig) -> TickCost:
+    """Measure a run and the replay of its controls, in turn."""
+    ticks_of, steps_of, same = list[float](), list[float](), True
+    for _ in range(ROUNDS):
+        session, ticks, frames, n = prepared(lambda: wire(config))
+        closed = timed(session, n, False, ticks, frames)
+        other, _, unused, _ = prepared(lambda: wire(config))
+        bare = timed(other, n, True, ticks, unused)
+        same = same and bool((session.world.data.qpos == other.world.data.qpos).all())
+        ticks_of.append(closed / n)
+        steps_of.append(bare / n / session.servo.plant.substeps)
+    return TickCost(statistics.median(ticks_of), statistics.median(steps_of), same)
+
+
+def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
+    """A session that has not begun, logs for `SECONDS` of it, and how many ticks that is."""
+    session = make()
+    n = round(SECONDS / session.servo.plant.period)
+    return session, *make_logs(session.servo, n), n
+
+
+def timed(session: Session, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> float:
+    """Processor time of this thread for n ticks [s]."""
+    begin = time.thread_time()
+    run_block(session.servo, 0, n, replay, ticks, frames)
+    return time.thread_time() - begin

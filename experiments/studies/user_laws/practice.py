@@ -1,0 +1,98 @@
+"""What repetition and effort do: learning of a force that comes again with every lap, and how long a force is held."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from controllers.state import Array
+from experiments.studies.user_laws.bare_device import PERIOD, trial
+from experiments.studies.user_laws.law import Law, Study
+from sim.users.person import Person
+from sim.users.wishes import Wishes, following
+
+LAPS, LAP, RADIUS, PUSH = 24, 2.0, 0.04, 1.5  # of tracing; [s], [m], and the force that comes with every lap [N]
+LEARNING = 0.15  # share of an error that is learned a repetition, of people who do learn
+LOADS = (0.25, 0.4, 0.6, 0.8)  # of her strength: published models are of 10 to 90 %
+FATIGUE, STRENGTH = 0.6, 6.0  # [1/min] of grip; [N], so that the device can load her
+BEGUN = 2.0  # [s] in which she takes the load up
+SLIPPED = 0.02  # [m] that a hand is moved which cannot hold any more
+_SAMPLING = 0.01  # [s] between wishes
+
+
+def practice(people: Sequence[Person], seed: int) -> Study:
+    """Error of a lap over repetitions, while the device pushes in the same way in every lap.
+
+    Individual curves of practice are exponential, e = a + b exp(-c n), rather than a power of n (Heathcote, Brown &
+    Mewhort 2000: 475 people, all sets of data that are not averaged).
+    """
+    t = np.arange(0.0, (LAPS + 1) * LAP, _SAMPLING)
+    angle, n = 2.0 * np.pi * t / LAP, round(LAPS * LAP / PERIOD)
+    points = RADIUS * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    phase = 2.0 * np.pi * PERIOD * np.arange(n) / LAP
+    pushes = np.asarray(PUSH * np.stack([np.cos(2.0 * phase), np.sin(2.0 * phase), 0.0 * phase], axis=1), np.float64)
+    wanted = RADIUS * np.stack([np.cos(phase), np.sin(phase), 0.0 * phase], axis=1)
+    curves = list[Array]()
+    for i, person in enumerate(people):
+        learner = replace(person, learning=LEARNING, entrainment=0.0)
+        trace = trial(learner, Wishes(following(points), _SAMPLING, LAP), LAPS * LAP, seed + i, points[0], pushes)
+        off = np.linalg.norm(trace.p - wanted, axis=1).reshape(LAPS, -1)
+        curves.append(np.sqrt(np.mean(off**2, axis=1))[1:])
+    number = np.arange(1.0, LAPS)
+    fits = [(_fitted(number, curve, _exponential), _fitted(number, curve, _power)) for curve in curves]
+    rate = float(np.median([one[0][2] for one, _ in fits]))
+    worse = float(np.median([other[1] / one[1] for one, other in fits]))
+    return Study(
+        "practice", "Practice: error of a lap while the device pushes the same way in every lap",
+        (
+            Law("Practice: share learned a repetition", rate, 0.05, 0.4, "", "Thoroughman & Shadmehr 2000 (m)", True),
+            Law("Practice: misfit of a power law over that of an exponential", worse, 1.0, 100.0, "",
+                "Heathcote et al. 2000: individual curves are exponential"),
+        ),
+        number, np.mean(curves, axis=0), ("repetition", "RMS error [m]"), joined=True,
+    )  # fmt: skip
+
+
+def endurance(people: Sequence[Person], seed: int) -> Study:
+    """How long a hand holds against a force of the device, over that force as a share of its strength.
+
+    Of one person: strength and fatigue are set, and what else differs between people matters little.
+    """
+    times, person = list[float](), people[0]
+    weak = replace(person, strength=STRENGTH, fatigue=FATIGUE, tremor=0.0)
+    for load in LOADS:
+        seconds = 1.3 * 60.0 / FATIGUE * (1.0 - load) / load
+        pushes = np.zeros((round(seconds / PERIOD), 3))
+        pushes[:, 0] = load * STRENGTH * np.minimum(1.0, PERIOD * np.arange(len(pushes)))
+        trace = trial(weak, Wishes(following(np.zeros((2, 3)))), seconds, seed, np.zeros(3), pushes)
+        slipped = (np.linalg.norm(trace.p, axis=1) > SLIPPED) & (trace.t > BEGUN)
+        times.append(float(trace.t[np.argmax(slipped)]) if np.any(slipped) else np.nan)
+    x, y = np.array(LOADS), np.array(times)
+    slope, intercept = np.polyfit(np.log(x), np.log(y), 1)
+    half = float(np.exp(intercept + slope * np.log(0.5)))
+    return Study(
+        "endurance", "Endurance: time that a force is held, over its share of the strength",
+        (
+            Law("Endurance: time at half the strength", half, 50.0, 150.0, "s",
+                "Frey Law & Avin 2010: a power of the load, by joint; grip: some 100 s (m)", True),
+            Law("Endurance: exponent", -float(slope), 1.5, 2.4, "",
+                "Frey Law & Avin 2010: 1.6 grip, 2.2 elbow (m)", True),
+        ),
+        x, y, ("force over strength", "time [s]"), (float(slope), float(intercept)), log=True,
+    )  # fmt: skip
+
+
+def _exponential(n: Array, a: float, b: float, c: float) -> Array:
+    return a + b * np.exp(-c * n)
+
+
+def _power(n: Array, a: float, b: float, c: float) -> Array:
+    return a + b * n**-c
+
+
+def _fitted(n: Array, errors: Array, law: Callable[..., Array]) -> tuple[Array, float]:
+    """Numbers of a law of practice, and the sum of squares that it leaves."""
+    start = (float(errors[-1]), float(errors[0] - errors[-1]), 0.3)
+    found = np.asarray(curve_fit(law, n, errors, start, bounds=((0.0, 0.0, 0.0), (1.0, 1.0, 5.0)))[0], dtype=np.float64)
+    return found, float(np.sum((errors - law(n, *found)) ** 2))

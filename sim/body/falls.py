@@ -1,0 +1,173 @@
+r"""A figure that falls lies where it fell for a second, and is then set back onto the animation.
+
+It has fallen when trunk, head or legs meet the floor where the reference has them well above it, or when it touches
+the floor half a metre from the reference. From then on its motors are off: it is caught by its body. When it has lain
+for `LIES`, what it follows for `RISES` goes over from the pose (p₀, R₀) in which it lay to the reference (p, R): its
+root goes from one place to the other, and each rotation is the reference's, from which it still differs less and less,
+
+.. math:: p(u) = p_0 + S(u)\,(p - p_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad
+          R(u) = R\,\exp((1 - S(u))\,\log(R^T R_0)|_{u=0}) , \qquad 0 \le u \le 1 ,
+
+with the smooth step S and the height h by which its feet clear the floor meanwhile. What carries it then is a wrench
+at the root without bounds, recorded as the residual, and no measure of the figure is taken of it.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from controllers.easing import smooth_step
+from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT
+from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+UP, DOWN, SET_BACK = 0.0, 1.0, 2.0
+FALLEN = 0.5  # [m] of the root from the reference's, beyond which a figure will not come back
+LIES, RISES = 1.0, 1.0  # [s] on the floor, and until it is back on the animation
+_TOUCHES = 2e-3  # [m] over the floor within which a body bears on it: MuJoCo's contacts are as soft
+_HELD_ABOVE = 0.05  # [m] over the floor, of a body of the reference that is not to touch it; a standing shank's 0.058
+_CLEARANCE = 0.25  # [m] h at the default stature; feet go 0.15 m below the straight way from lying to standing
+_MODE, _SINCE, _FALLS = 0, 1, 2
+_ARMS = ("clavicle", "arm", "forearm", "hand")  # whoever puts a hand out has not fallen
+_SPHERE, _CAPSULE = int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE)
+
+
+class FallState(NamedTuple):
+    """What is looked at to see whether the figure has fallen, and how it is set back.
+
+    Attributes
+    ----------
+    period : float
+        Between two updates of the control [s].
+    clearance : float
+        h [m].
+    geoms, twin_geoms : IntArray
+        Of trunk, head and legs, in the world and in the figure alone, shape (n,).
+    kinds, sizes : IntArray, Array
+        Their types, shape (n,), and sizes [m], shape (n, 3).
+    pos, mat, twin_pos, twin_mat : Array
+        Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the figure alone.
+    state : Array
+        `UP`, `DOWN` or `SET_BACK`; how long it has lain or been set back [s]; number of falls; shape (3,).
+    lying, way : Array
+        p₀ (3,), and the pose in which it lay less the reference's then, in tangent coordinates (57).
+    target, before, velocity, still : Array
+        The pose that is followed and the one a period ago (75), its velocity, and no acceleration (57).
+    """
+
+    period: float
+    clearance: float
+    geoms: IntArray
+    twin_geoms: IntArray
+    kinds: IntArray
+    sizes: Array
+    pos: Array
+    mat: Array
+    twin_pos: Array
+    twin_mat: Array
+    state: Array
+    lying: Array
+    way: Array
+    target: Array
+    before: Array
+    velocity: Array
+    still: Array
+
+
+@njit
+def _lowest(kind: int, size: Array, pos: Array, mat: Array) -> float:
+    """Least height of a sphere, capsule or ellipsoid: z − r, z − r − ℓ|d_z|, z − ‖s d‖ with d the vertical in it."""
+    if kind == _SPHERE:
+        return pos[2] - size[0]
+    if kind == _CAPSULE:
+        return pos[2] - size[0] - size[1] * abs(mat[8])
+    return pos[2] - np.sqrt((size[0] * mat[6]) ** 2 + (size[1] * mat[7]) ** 2 + (size[2] * mat[8]) ** 2)
+
+
+@njit
+def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
+    """Whether the figure is up, lies or is being set back in this period.
+
+    Parameters
+    ----------
+    model : int
+        Address of the figure alone.
+    fall : FallState
+        Updated; the figure alone is in the reference pose.
+    pose, q_r : Array
+        Of the figure and of the reference, shape (75,).
+    sole : float
+        Height of the figure's lowest contact point [m].
+    """
+    state, lowest, fallen = fall.state, sole, False
+    if state[_MODE] == SET_BACK:
+        state[_SINCE] += fall.period
+        if state[_SINCE] > RISES:
+            state[_MODE] = UP
+        return state[_MODE]
+    for k in range(fall.geoms.shape[0]):
+        kind, size, geom, twin = fall.kinds[k], fall.sizes[k], fall.geoms[k], fall.twin_geoms[k]
+        height = _lowest(kind, size, fall.pos[geom], fall.mat[geom])
+        lowest = min(lowest, height)
+        if height < 0.0 and _lowest(kind, size, fall.twin_pos[twin], fall.twin_mat[twin]) > _HELD_ABOVE:
+            fallen = True
+    touches = lowest < _TOUCHES
+    if state[_MODE] == UP:
+        away = np.sqrt((pose[0] - q_r[0]) ** 2 + (pose[1] - q_r[1]) ** 2 + (pose[2] - q_r[2]) ** 2)
+        if fallen or (touches and away > FALLEN):
+            state[_MODE], state[_SINCE] = DOWN, 0.0
+            state[_FALLS] += 1.0
+        return state[_MODE]
+    if touches:
+        state[_SINCE] += fall.period
+    if state[_SINCE] > LIES:
+        state[_MODE], state[_SINCE] = SET_BACK, 0.0
+        fall.lying[:] = pose[:3]
+        fall.before[:] = pose
+        mj_differentiate_pos(model, fall.way.ctypes, 1.0, q_r.ctypes, pose.ctypes)
+    return state[_MODE]
+
+
+@njit
+def follow_back(model: int, fall: FallState, q_r: Array) -> None:
+    """Pose and velocity that a figure follows which is set back, into `target` and `velocity`.
+
+    `model` is the address of the figure alone.
+    """
+    u = fall.state[_SINCE] / RISES
+    share = smooth_step(u)
+    fall.target[:] = q_r
+    mj_integrate_pos(model, fall.target.ctypes, fall.way.ctypes, 1.0 - share)
+    for i in range(3):
+        fall.target[i] = fall.lying[i] + share * (q_r[i] - fall.lying[i])
+    fall.target[2] += 16.0 * (u * (1.0 - u)) ** 2 * fall.clearance
+    mj_differentiate_pos(model, fall.velocity.ctypes, fall.period, fall.before.ctypes, fall.target.ctypes)
+    fall.before[:] = fall.target
+
+
+def fall_state(
+    model: mujoco.MjModel, data: mujoco.MjData, twin: mujoco.MjModel, twin_data: mujoco.MjData, prefix: str,
+    period: float, stature: float,
+) -> FallState:  # fmt: skip
+    """The state of a figure that stands; arguments as of `sim.body.figure.Figure`, whose geoms the twin has too."""
+    own = [
+        geom
+        for geom in range(twin.ngeom)
+        if twin.geom_conaffinity[geom]
+        and twin.geom(geom).name not in FOOT_CONTACTS + HAND_CONTACTS
+        and not twin.body(twin.geom_bodyid[geom]).name.endswith(_ARMS)
+    ]
+    first = int(model.body_geomadr[model.body(prefix + twin.body(1).name).id]) - int(twin.body_geomadr[1])
+    geoms = np.array(own, dtype=np.int64)
+    return FallState(
+        period=period, clearance=_CLEARANCE * stature / DEFAULT_STATURE, geoms=geoms + first, twin_geoms=geoms,
+        kinds=twin.geom_type[geoms].astype(np.int64), sizes=twin.geom_size[geoms].copy(), pos=data.geom_xpos,
+        mat=data.geom_xmat, twin_pos=twin_data.geom_xpos, twin_mat=twin_data.geom_xmat, state=np.zeros(3),
+        lying=np.zeros(3), way=np.zeros(N_TANGENT), target=np.zeros(N_POSE), before=np.zeros(N_POSE),
+        velocity=np.zeros(N_TANGENT), still=np.zeros(N_TANGENT),
+    )  # fmt: skip

@@ -1,0 +1,82 @@
+r"""The residual of a physical figure beside what is asked of simulations of movement.
+
+Hicks et al. (2015, "Is my model good enough?", J. Biomech. Eng. 137, 020905, section 3.1.3) recommend residual forces
+of at most 5 %, peak and RMS, of the measured net external force, and residual moments of at most 1 % of the height of
+the centre of mass times that force. The net external force of a figure whose feet are on the floor is its weight W on
+average and more at its peaks, so W in its place is the stricter bound: ‖f‖ ≤ 0.05 W and ‖m‖ ≤ 0.01 W h.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+FORCE, MOMENT = 0.05, 0.01
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Residual force, as a share of body weight, and moment, of weight × height of the centre of mass, over some time.
+
+    Attributes
+    ----------
+    seconds : float
+        How long [s].
+    force_rms, force_max, moment_rms, moment_max : float
+    """
+
+    seconds: float
+    force_rms: float
+    force_max: float
+    moment_rms: float
+    moment_max: float
+
+    def brief(self) -> str:
+        """The figures in percent, RMS and peak."""
+        return (
+            f"force {100 * self.force_rms:.1f} % and {100 * self.force_max:.0f} % of weight, moment "
+            f"{100 * self.moment_rms:.1f} % and {100 * self.moment_max:.0f} % of weight × height of the centre of mass"
+        )
+
+    def missed(self) -> tuple[str, ...]:
+        """Which of the bounds of Hicks et al. it does not keep."""
+        kept = {
+            "RMS force": self.force_rms <= FORCE,
+            "peak force": self.force_max <= FORCE,
+            "RMS moment": self.moment_rms <= MOMENT,
+            "peak moment": self.moment_max <= MOMENT,
+        }
+        return tuple(name for name, is_kept in kept.items() if not is_kept)
+
+    def verdict(self) -> str:
+        """Which of the bounds are met, in words."""
+        missed = self.missed()
+        bounds = f"bounds of Hicks et al. 2015 ({100 * FORCE:g} %, {100 * MOMENT:g} %)"
+        return f"{bounds}: all met" if not missed else f"{bounds} missed by {', '.join(missed)}"
+
+
+class ResidualMeasure:
+    """`Residual` of wrenches that come in blocks, `period` [s] apart, of a figure of a weight [N] and height [m]."""
+
+    def __init__(self, weight: float, com_height: float, period: float):
+        self._scale = np.array([weight, weight * com_height])
+        self._period = period
+        self._squares, self._largest, self._count = np.zeros(2), np.zeros(2), 0
+
+    def add(self, wrenches: Array) -> None:
+        """Take forces [N] and moments [N m], shape (n, 6)."""
+        sizes = np.linalg.norm(wrenches.reshape(-1, 2, 3), axis=2) / self._scale
+        self._squares += np.sum(sizes**2, axis=0)
+        self._largest = np.maximum(self._largest, sizes.max(axis=0, initial=0.0))
+        self._count += len(wrenches)
+
+    def summary(self) -> Residual:
+        """What was taken so far; zero of nothing."""
+        (force, moment), n = self._squares, max(self._count, 1)
+        most = self._largest.tolist()
+        return Residual(
+            self._count * self._period, math.sqrt(force / n), most[0], math.sqrt(moment / n), most[1]
+        )  # fmt: skip

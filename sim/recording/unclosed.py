@@ -1,0 +1,157 @@
+"""Files that their writer did not close: told apart from damaged ones, and read without waiting for a writer.
+
+HDF5 reads a file that is marked as being written with up to 100 attempts at every structure, each after twice the time
+of the last: on one that is torn it waits for ever. So a file is opened that way only while its writer lives, which
+holds a shared lock on it. One whose writer is gone, or that is shorter than it says, is read as if it had been closed
+where it ends: what is missing is then an error of the reading, at once.
+
+Superblock of versions 2 and 3 (HDF5 File Format Specification 3.0, II.A), little-endian::
+
+    0 signature (8)   8 version   9 size of offsets   10 size of lengths   11 flags
+    12 base (8)   20 extension (8)   28 end of file (8)   36 root (8)   44 checksum (4): lookup3 of bytes 0 to 43
+"""
+
+import fcntl
+import io
+import os
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_SIZE, _WRITING, _CHECKED = 48, 0b101, 44  # flags: opened for writing, and as a single writer beside readers
+_END = 28
+
+
+class Superblock(NamedTuple):
+    """The head of a file.
+
+    Attributes
+    ----------
+    head : bytes
+        Its 48 bytes.
+    end : int
+        Where the file says that it ends [bytes].
+    size : int
+        Where it ends [bytes].
+    """
+
+    head: bytes
+    end: int
+    size: int
+
+    @property
+    def being_written(self) -> bool:
+        """Whether its writer has not closed it."""
+        return bool(self.head[11] & _WRITING)
+
+    @property
+    def whole(self) -> bool:
+        """Whether it was closed, and has all its bytes."""
+        return not self.being_written and self.size >= self.end
+
+    @property
+    def sound(self) -> bool:
+        """Whether the head is whole."""
+        return lookup3(self.head[:_CHECKED]) == int.from_bytes(self.head[_CHECKED:], "little")
+
+    @property
+    def closed(self) -> bytes:
+        """The head of the same file, closed as it is."""
+        head = bytearray(self.head)
+        head[11] &= ~_WRITING
+        struct.pack_into("<Q", head, _END, self.size)
+        return bytes(head[:_CHECKED]) + lookup3(bytes(head[:_CHECKED])).to_bytes(4, "little")
+
+
+def superblock(path: Path) -> Superblock | None:
+    """The head of a file; None if it is no HDF5 file of these versions. Raises OSError if it cannot be read."""
+    with path.open("rb") as file:
+        head, size = file.read(_SIZE), os.fstat(file.fileno()).st_size
+    if len(head) < _SIZE or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):
+        return None
+    return Superblock(head, struct.unpack_from("<Q", head, _END)[0], size)
+
+
+def held(path: Path) -> int:
+    """Mark a file as one that a living process writes; gives a descriptor that holds the mark until it is closed."""
+    descriptor = os.open(path, os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_SH)
+    return descriptor
+
+
+def has_writer(path: Path) -> bool:
+    """Whether a living process writes a file."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+class AsClosed(io.RawIOBase):
+    """A file with another head, for reading: HDF5 takes it as a Python file."""
+
+    def __init__(self, path: Path, head: bytes):
+        self._file, self._head = path.open("rb"), head
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def seekable(self) -> bool:
+        """It is."""
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """As of any file."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """As of any file."""
+        return self._file.tell()
+
+    def readinto(self, buffer: bytearray) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """As of any file, but for the head."""
+        at = self._file.tell()
+        n = self._file.readinto(buffer)
+        if at < _SIZE:
+            part = self._head[at : at + n]
+            memoryview(buffer).cast("B")[: len(part)] = part
+        return n
+
+    def close(self) -> None:
+        """As of any file."""
+        self._file.close()
+        super().close()
+
+
+def lookup3(data: bytes) -> int:
+    """Bob Jenkins' hash lookup3 (``hashlittle``, 2006, public domain) with the initial value 0, as HDF5 takes it."""
+
+    def rotated(x: int, k: int) -> int:
+        return ((x << k) | (x >> (32 - k))) & _WORD
+
+    a = b = c = (0xDEADBEEF + len(data)) & _WORD
+    blocks = max(0, -(-len(data) // 12) - 1)
+    for i in range(blocks):
+        x, y, z = struct.unpack_from("<III", data, 12 * i)
+        a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
+        for k in (4, 6, 8, 16, 19, 4):
+            a = ((a - c) & _WORD) ^ rotated(c, k)
+            c = (c + b) & _WORD
+            a, b, c = b, c, a
+    if not data:
+        return c
+    x, y, z = struct.unpack("<III", data[12 * blocks :].ljust(12, b"\0"))
+    a, b, c = (a + x) & _WORD, (b + y) & _WORD, (c + z) & _WORD
+    for k in (14, 11, 25, 16, 4, 14, 24):
+        c = ((c ^ b) - rotated(b, k)) & _WORD
+        a, b, c = b, c, a
+    return b
+
+
+_WORD = 0xFFFFFFFF

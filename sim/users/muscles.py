@@ -1,0 +1,83 @@
+r"""Muscles, arm and fingers of a person at a physics step; see `sim.users.body` for her arm.
+
+Fatigue is that of a three-compartment model of muscle (Frey-Law, Looft & Heitsman 2012, J. Biomech. 45: 1803-1808): of
+the force f that she exerts, over her strength, the share F f of what is able tires, and R of what is tired recovers:
+
+.. math:: \dot C = R (1 - C) - F f, \qquad f \le C
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sim.users.person_state import (
+    CAPACITY,
+    DRIVEN_A,
+    DRIVEN_P,
+    DRIVEN_V,
+    ENGAGED_SHARE,
+    FATIGUE,
+    GRIP_DAMPING,
+    GRIP_STIFFNESS,
+    HAND_P,
+    HAND_V,
+    REFLEX,
+    REFLEX_GAIN,
+    SKILL,
+    STIFFER,
+    STRENGTH,
+    TREMOR,
+    UNSTEADY,
+    WANTED_FORCE,
+    PersonState,
+)
+
+Array = npt.NDArray[np.float64]
+
+SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
+RECOVERY = 0.04  # [1/min] of muscle that is tired: grip of the three-compartment model (Frey-Law et al. 2012, m)
+RESTED, RESTING = 15.0, 0.05  # times as fast at rest (Looft et al. 2018, m); share of strength that is rest
+
+
+@njit
+def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> None:
+    """Muscles, arm and fingers for a physics step (semi-implicit Euler); see `sim.users.body`."""
+    n, m, V = person.numbers, person.memory, person.vectors
+    engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
+    spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
+    damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
+    muscle, size, held = np.empty(3), 0.0, 0.0
+    for k in range(3):
+        pull = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
+        for j in range(3):
+            pull += spring * person.stiffness[k, j] * (V[DRIVEN_P, j] - V[HAND_P, j])
+            pull += damper * person.damping[k, j] * (V[DRIVEN_V, j] - V[HAND_V, j])
+            pull += person.inertia[k, j] * (n[SKILL] * V[DRIVEN_A, j] + V[TREMOR, j])
+        muscle[k] = pull
+        size += pull * pull
+    size = math.sqrt(size)
+    for k in range(3):
+        muscle[k] += size * V[UNSTEADY, k]
+    most = n[STRENGTH] * m[CAPACITY]
+    scale = min(1.0, most / max(size, 1e-12))
+    for k in range(3):
+        muscle[k] *= scale
+        force[k] = stiffer * (n[GRIP_STIFFNESS] * (V[HAND_P, k] - p[k]) + n[GRIP_DAMPING] * (V[HAND_V, k] - v[k]))
+        held += force[k] * force[k]
+    held = math.sqrt(held)
+    if held > n[STRENGTH]:  # the stylus slips between the fingers
+        for k in range(3):
+            force[k] *= n[STRENGTH] / held
+    for k in range(3):
+        acceleration = 0.0
+        for j in range(3):
+            acceleration += person.mobility[k, j] * (muscle[j] - force[j])
+        V[HAND_V, k] += dt * acceleration
+    for k in range(3):
+        V[HAND_P, k] += dt * V[HAND_V, k]
+    if n[FATIGUE] > 0.0:
+        load = min(size, most) / n[STRENGTH]
+        recovery = RECOVERY * (RESTED if load < RESTING else 1.0)
+        m[CAPACITY] += dt / 60.0 * (recovery * (1.0 - m[CAPACITY]) - n[FATIGUE] * load)

@@ -1,0 +1,115 @@
+"""What a person feels and sees, late and with noise, and where she believes her hand to be.
+
+Her belief is what she feels, corrected by what she sees when that arrives, and carried on by what she intended since
+(a forward model: Miall et al. 1993, J. Mot. Behav. 25: 203-216).
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sim.users.chance import normal
+from sim.users.eye import seen_place
+from sim.users.person_state import (
+    BELIEF,
+    BLUR,
+    DEVIATING,
+    DEVIATION,
+    DRIFT,
+    DRIVEN_P,
+    DRIVEN_V,
+    FELT_FORCE,
+    FELT_NOISE,
+    FORCE_NOISE,
+    HAND_P,
+    HAND_V,
+    INTENDED,
+    INTENT,
+    LOOK_TICKS,
+    OFFSET,
+    PERIOD,
+    PRESSED,
+    REFLEX,
+    REFLEX_GAIN,
+    REFLEX_TICKS,
+    SEEN,
+    SEEN_NOISE,
+    SEEN_TICKS,
+    SENSED,
+    SHOWN,
+    TICKS,
+    TREMOR,
+    TREMOR_A,
+    TREMOR_B,
+    TREMOR_BEFORE,
+    TREMOR_GAIN,
+    UNSTEADY,
+    PersonState,
+)
+
+Array = npt.NDArray[np.float64]
+
+DRIFT_TIME = 60.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
+BLUR_TIME = 0.2  # [s] of what is seen: a fixation
+CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
+DOUBTED = 0.005  # [m], and three times the noise of what is felt: what is seen further away is not believed
+UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 2002, m)
+
+
+@njit
+def sense(person: PersonState, p: Array, force: Array) -> None:
+    """Note what is felt and seen, and make of what arrives now where the hand is believed to be."""
+    n, m, V, past = person.numbers, person.memory, person.vectors, person.past
+    _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
+    _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
+    _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
+    size = past.shape[0]
+    tick = int(m[TICKS])
+    now = past[tick % size]
+    felt, seen = past[(tick - int(n[REFLEX_TICKS])) % size], past[(tick - int(n[SEEN_TICKS])) % size]
+    _look(person, p)
+    kept = math.exp(-n[PERIOD] / CALIBRATION_TIME)
+    for k in range(3):
+        now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k], V[SHOWN, k] + V[BLUR, k]
+        now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
+        now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
+        now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
+        V[OFFSET, k] = kept * V[OFFSET, k] + (1.0 - kept) * (seen[SEEN + k] - seen[SENSED + k])
+        V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
+        V[FELT_FORCE, k] = felt[PRESSED + k]
+    for k in range(3):
+        V[REFLEX, k] = 0.0
+        for j in range(3):
+            V[REFLEX, k] += person.stiffness[k, j] * felt[DEVIATION + j] + person.damping[k, j] * felt[DEVIATING + j]
+        V[REFLEX, k] *= n[REFLEX_GAIN]
+    wave = n[TREMOR_GAIN]
+    for k in range(3):
+        fresh = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + wave * normal(person.chance)
+        V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], fresh
+    m[TICKS] += 1.0
+
+
+@njit
+def _noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
+    """A step of a noise whose standard deviation and correlation time are given (an Ornstein–Uhlenbeck process)."""
+    kept = math.exp(-person.numbers[PERIOD] / seconds)
+    fresh = deviation * math.sqrt(1.0 - kept * kept)
+    for k in range(3):
+        person.vectors[which, k] = kept * person.vectors[which, k] + fresh * normal(person.chance)
+
+
+@njit
+def _look(person: PersonState, p: Array) -> None:
+    """Look at the figure, or at the stylus (p) where there is none."""
+    m, V, eye = person.memory, person.vectors, person.eye
+    if eye.pose.shape[0] == 0:
+        V[SHOWN] = p
+    elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
+        felt, away = V[HAND_P] + V[DRIFT], 0.0
+        seen_place(eye, felt, np.empty(eye.inverses.shape[2]), V[SHOWN])
+        for k in range(3):
+            away += (V[SHOWN, k] - felt[k]) ** 2
+        if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # she takes it for another pose
+            V[SHOWN] = felt

@@ -1,0 +1,48 @@
+"""An audit of figures of speed: each keeps to a ratio, says so, and counts."""
+
+import json
+
+import pytest
+
+from experiments.studies.bench_figures import Figure, tell
+from experiments.studies.tick_cost import MODES
+
+FIGURES = (
+    Figure("a tick", 1.4, "mj_steps", at_most=1.5),
+    Figure("threads", 0.8, at_least=0.9),
+    Figure("told", 3.0),
+)
+
+
+def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_does_not(capsys) -> None:
+    assert [figure.passes for figure in FIGURES] == [True, False, None]
+    assert tell(FIGURES, False, True) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "pass  a tick: 1.4 mj_steps (≤ 1.5)"
+    assert lines[1] == "FAIL  threads: 0.8 (≥ 0.9)"
+    assert lines[2] == "      told: 3"
+    assert lines[3] == "1 of 3 figures fail: threads"
+    assert tell(FIGURES, False, False) == 0
+    assert tell((FIGURES[0], FIGURES[2]), False, True) == 0
+
+
+def test_what_is_not_a_number_passes_nothing() -> None:
+    assert Figure("nothing", float("nan"), at_most=1.0).passes is False
+    assert Figure("nothing", float("nan"), at_least=1.0).passes is False
+
+
+def test_json_has_values_bounds_and_verdicts(capsys) -> None:
+    assert tell(FIGURES, True, True) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert [one["passes"] for one in told] == [True, False, None]
+    assert told[0] == {
+        "name": "a tick", "value": 1.4, "unit": "mj_steps", "at_most": 1.5, "at_least": None, "passes": True,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MODES)
+def test_every_mode_that_is_benched_steps_once_a_tick_and_has_its_figure_at_500_hz(name: str) -> None:
+    config = MODES[name]()
+    assert config.scene.substeps() == 1
+    assert config.figure.figure_ticks * config.clock.servo_period == pytest.approx(2e-3)
+    assert config.figure.kind == "physical"

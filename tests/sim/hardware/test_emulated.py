@@ -1,0 +1,34 @@
+"""The device that is real to the software: its hand, and what it does when commands stay out."""
+
+import numpy as np
+
+from models.phantom.kinematics import forward_kinematics
+from models.scene import SceneConfig
+from sim.devices.exchange import READING_SIZE, READING_THETA
+from sim.hardware.emulated import EmulatedPhantom
+from tests.sim.bare_servos import START
+
+PERIOD = 1e-3
+
+
+def tip(device: EmulatedPhantom) -> np.ndarray:
+    reading = np.zeros(READING_SIZE)
+    device.read(reading, 0.0)
+    return np.array(forward_kinematics(tuple(reading[READING_THETA : READING_THETA + 3])))
+
+
+def test_a_hand_takes_the_stylus_where_it_is_when_the_motors_go_off() -> None:
+    device = EmulatedPhantom(SceneConfig(servo_period=PERIOD, physics_step=PERIOD), START, holds=0.01)
+    begin = tip(device)
+    for _ in range(150):
+        device.write(np.array([0.06, 0.0, 0.0]), True)
+    let_go = tip(device)
+    assert np.linalg.norm(let_go - begin) > 0.02
+    places = []
+    for _ in range(300):
+        device.write(np.zeros(3), False)
+        places.append(tip(device))
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / PERIOD
+    assert speeds[:50].max() < 0.7
+    assert speeds[-50:].max() < 0.1
+    assert np.linalg.norm(places[-1] - let_go) < 2e-3

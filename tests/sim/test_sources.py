@@ -1,0 +1,46 @@
+"""Hash of what a module is made of: other after a change of code that it reaches, and after no other."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sim.compilation import sources
+from sim.compilation.sources import sources_hash
+
+MODULE = "controllers.haptic_map.cylindrical"
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    root = Path(sources.__file__).parents[2]
+    for package in ("models", "controllers"):
+        shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("*.bvh", "__pycache__"))
+    monkeypatch.setattr(sources, "_ROOT", tmp_path)
+    yield tmp_path
+    sources_hash.cache_clear()
+
+
+def hashed() -> str:
+    sources_hash.cache_clear()
+    return sources_hash(MODULE)
+
+
+def edited(tree: Path, name: str, text: str) -> str:
+    with (tree / name).open("a", encoding="utf-8") as file:
+        file.write(text)
+    return hashed()
+
+
+def test_a_change_in_what_a_module_imports_however_far_is_another_hash(tree: Path) -> None:
+    before = hashed()
+    own = edited(tree, "controllers/haptic_map/cylindrical.py", "\nAGAIN = 1\n")
+    assert own != before
+    assert edited(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != own
+
+
+def test_a_comment_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
+    before = hashed()
+    assert edited(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
+    assert edited(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
