@@ -31,8 +31,8 @@ Mask = npt.NDArray[np.bool_]
 _MARGIN = 0.02  # to the joints' limits [rad]
 _STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
 _KNOT, _STEP = 0.05, 0.0125  # of the change and of the instants [s]; 80 and 20 ms cost half, and a run falls
-_TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
-_GOOD, _SURE = 0.25, 1e-2  # share of the promised decrease, and damping, at which a step may be the last
+_TOLERANCE, _LAST = 0.01, 3  # share of the cost by which the last iterations lower it together, and how many
+_GOOD = 0.25  # share of the promised decrease, below which the next step is damped more
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
 _N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
@@ -198,7 +198,7 @@ class _Problem:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from no change, until the cost falls by less than `_TOLERANCE`."""
+        """Levenberg–Marquardt from no change, until `_LAST` steps lower the cost by less than `_TOLERANCE`."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
         costs = [self.cost(self.errors(x, False), x)]
@@ -213,11 +213,11 @@ class _Problem:
                 break
             # Half of what the linearisation promises at most; where contacts change, it holds only nearby.
             good = costs[-1] - cost > _GOOD * (g @ step)
+            damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
             x = x - step
             costs.append(cost)
-            if good and damping < _SURE and costs[-2] - cost < _TOLERANCE * cost:
+            if len(costs) > _LAST and costs[-1 - _LAST] - cost < _TOLERANCE * cost:
                 break
-            damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
         return x, costs
 
     def _linearised(self, x: Array) -> tuple[Normal, Array]:
