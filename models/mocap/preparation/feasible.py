@@ -31,7 +31,8 @@ Mask = npt.NDArray[np.bool_]
 _MARGIN = 0.02  # to the joints' limits [rad]
 _STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
 _KNOT, _STEP = 0.05, 0.0125  # of the change and of the instants [s]; 80 and 20 ms cost half, and a run falls
-_TOLERANCE = 0.003  # share of the cost by which the last iteration lowers it
+_TOLERANCE, _LAST = 0.01, 3  # share of the cost by which the last iterations lower it together, and how many
+_GOOD = 0.25  # share of the promised decrease, below which the next step is damped more
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
 _N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
@@ -103,6 +104,14 @@ class Feasible(NamedTuple):
         RMS of the change of the root's place [m].
     turned : float
         RMS over joints and time of the change of rotations [rad].
+    furthest : float
+        Largest change of the root's place [m].
+    most_turned : float
+        Largest change of a joint's rotation [rad] ...
+    joint : str
+        ... which joint's ...
+    when : float
+        ... and when [s].
     costs : tuple of float
         Before and after every iteration.
     """
@@ -111,6 +120,10 @@ class Feasible(NamedTuple):
     residual: float
     moved: float
     turned: float
+    furthest: float
+    most_turned: float
+    joint: str
+    when: float
     costs: tuple[float, ...]
 
 
@@ -123,7 +136,7 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 16, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
+    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
 ) -> Feasible:
     """The nearest motion with these contacts that needs no help.
 
@@ -143,16 +156,20 @@ def feasible(
     change = Change(clip, _KNOT, _STEP)
     problem = _Problem(change, schedule, weights)
     x, costs = problem.solve(iterations)
-    sizes = change.size(x.reshape(-1, N_TANGENT))
-    errors = problem.errors(x, False)
-    force = np.linalg.norm(errors.residual[:, :3], axis=1) / problem.floor.body_weight
+    points = x.reshape(-1, N_TANGENT)
+    sizes = change.size(points)
+    places = np.linalg.norm(sizes[:, :3], axis=1)
+    turns = np.linalg.norm(sizes[:, 6:].reshape(len(sizes), -1, 3), axis=2)
+    instant, joint = np.unravel_index(int(np.argmax(turns)), turns.shape)
+    force = np.linalg.norm(problem.errors(x, False).residual[:, :3], axis=1) / problem.floor.body_weight
     return Feasible(
-        change.changed(x.reshape(-1, N_TANGENT), fps),
-        float(np.sqrt(np.mean(force**2))),
-        float(np.sqrt(np.mean(np.sum(sizes[:, :3] ** 2, axis=1)))),
-        float(np.sqrt(np.mean(np.sum(sizes[:, 6:].reshape(len(sizes), -1, 3) ** 2, axis=2)))),
-        tuple(costs),
-    )
+        change.changed(points, fps), _rms(force), _rms(places), _rms(turns), float(places.max()), float(turns.max()),
+        JOINTS[joint], float(change.times[instant]), tuple(costs),
+    )  # fmt: skip
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 class _Problem:
@@ -181,22 +198,25 @@ class _Problem:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from no change, until the cost falls by less than `_TOLERANCE`."""
+        """Levenberg–Marquardt from no change, until `_LAST` steps lower the cost by less than `_TOLERANCE`."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
         costs = [self.cost(self.errors(x, False), x)]
         for _ in range(iterations):
             system, g = self._linearised(x)
             for _ in range(12):
-                trial = x - system.solve(g, damping)
-                if (cost := self.cost(self.errors(trial, False), trial)) < costs[-1]:
+                step = system.solve(g, damping)
+                if (cost := self.cost(self.errors(x - step, False), x - step)) < costs[-1]:
                     break
                 damping = max(8.0 * damping, 1e-4)
             else:
                 break
-            x, damping = trial, max(damping / 8.0, 1e-8)
+            # Half of what the linearisation promises at most; where contacts change, it holds only nearby.
+            good = costs[-1] - cost > _GOOD * (g @ step)
+            damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
+            x = x - step
             costs.append(cost)
-            if costs[-2] - cost < _TOLERANCE * cost:
+            if len(costs) > _LAST and costs[-1 - _LAST] - cost < _TOLERANCE * cost:
                 break
         return x, costs
 
@@ -222,12 +242,12 @@ class _Problem:
         jacobian, weighted = errors.jacobian[here], errors.weighted[here]
         basis = np.stack([self.change.basis[order][instants[here]] for order in range(3)], axis=1)
         moving = jacobian[:, :, :_W]  # places and limits do not depend on velocities
-        inner = np.einsum("kofn,kpfm->kopnm", moving, moving, optimize=True)
+        inner = moving.transpose(0, 1, 3, 2)[:, :, None] @ moving[:, None]
         inner[:, 0, 0] += jacobian[:, 0, _W:].transpose(0, 2, 1) @ jacobian[:, 0, _W:]
         pairs = np.einsum("koa,kpb->abkop", basis, basis).reshape((DEGREE + 1) ** 2, -1)
         block = (pairs @ inner.reshape(-1, N_TANGENT**2)).reshape(DEGREE + 1, DEGREE + 1, N_TANGENT, N_TANGENT)
         size = (DEGREE + 1) * N_TANGENT
-        slopes = np.einsum("kofn,kf->kon", jacobian, weighted)
+        slopes = (weighted[:, None, None] @ jacobian)[:, :, 0]
         return block.transpose(0, 2, 1, 3).reshape(size, size), np.einsum("koa,kon->an", basis, slopes).ravel()
 
     def errors(self, x: Array, with_jacobian: bool, instants: npt.NDArray[np.intp] | slice = _ALL) -> _Errors:
@@ -283,4 +303,4 @@ def contact_residual(clip: Clip, schedule: Stances) -> float:
     change = Change(clip, _KNOT, _STEP)
     problem = _Problem(change, schedule, _WEIGHTS)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
-    return float(np.sqrt(np.mean(np.sum(errors.residual[:, :3] ** 2, axis=1)))) / problem.floor.body_weight
+    return _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / problem.floor.body_weight

@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from models.errors import ModelError
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.laps import lap_of, likeness
-from models.mocap.preparation.poses import inverse, plus
+from models.mocap.preparation.poses import inverse, plus, sole_points
 
 Array = npt.NDArray[np.float64]
 
@@ -29,7 +30,8 @@ _SHARE = 0.3  # of the clip, the least that a cycle in place lasts: less is a tr
 _FADE = 0.25  # over which the ends are brought together [s]
 _BACK = (0.6, 1.0)  # a way back lasts so long, and so much longer for each radian of the largest joint [s]
 _STEP, _YAW = 0.10, np.deg2rad(15.0)  # feet of a gesture end within this of where they began
-_REST = 0.35  # in which a motion that ends dies away [s]
+_REST = 0.35  # in which the limbs of a motion that ends come to rest [s]; its root has 0.2 s more for each m/s
+_REST_LONGER, _REST_LONGEST = 0.2, 0.8
 _FRAMES = 500  # compared with each other
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
@@ -231,24 +233,33 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
 
 
 def _rested(clip: Clip) -> Looped:
-    """The clip with its first and last velocities dying away, in poses before and after it."""
-    n = round(_REST * clip.fps)
-    if clip.n_frames < 2 or n < 2:
+    """The clip with its first and last velocities dying away, in poses before and after it that end on the floor."""
+    if clip.n_frames < 2 or clip.fps * _REST < 2.0:
         return Looped(clip, "open", 0.0, clip.duration, 0.0)
     velocities = clip.velocities()
-    x = np.arange(1, n + 1)[:, None] / n
-    # The velocity falls from 1 to 0 as (1 − x)² (1 + 2x); this is its integral.
-    path = (x - x**3 + x**4 / 2.0) * _REST
-    after = plus(np.repeat(clip.poses[-1:], n, axis=0), path * velocities[-1])
-    before = plus(np.repeat(clip.poses[:1], n, axis=0), -path * velocities[0])[::-1]
+    before = _dying(clip.poses[0], -velocities[0], clip.fps)[::-1]
+    after = _dying(clip.poses[-1], velocities[-1], clip.fps)
     poses = np.vstack((before, clip.poses, after))
     return Looped(Clip(poses, clip.fps, clip.name), "open", 0.0, clip.duration, 0.0)
 
 
+def _dying(pose: Array, velocity: Array, fps: float) -> Array:
+    """Poses in which a velocity dies away as (1 − x)² (1 + 2x), while the lowest part of the soles comes to the floor.
+
+    The root has longer for it the faster it is, x = t/T; limbs would go past their limits if they had.
+    """
+    times = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST), _REST
+    n = round(times[0] * fps)
+    x = np.minimum(np.arange(1, n + 1)[:, None] / (fps * np.array(times)), 1.0)
+    path = (x - x**3 + x**4 / 2.0) * times
+    poses = plus(np.repeat(pose[None], n, axis=0), path[:, np.repeat((0, 1), (3, len(velocity) - 3))] * velocity)
+    low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
+    poses[:, 2] -= x[:, 0] ** 3 * (10.0 - 15.0 * x[:, 0] + 6.0 * x[:, 0] ** 2) * low
+    return poses
+
+
 def mirrored(clip: Clip) -> Clip:
     """The motion in a mirror: left and right exchanged."""
-    from models.humanoid.skeleton import BODIES
-
     twins = [
         BODIES.index(body.replace("left_", "right_") if body.startswith("left_") else body.replace("right_", "left_"))
         for body in BODIES
