@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from sim.body.falls import UP
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 
@@ -88,7 +89,10 @@ def _plots(recording: Recording) -> list[Plot]:
     found += [Plot("forces", "N", tuple(lines))] * bool(lines)
     if "joint_error" in frames and "body_weight" in recording.arrays:
         weight = float(recording.array("body_weight"))
-        residual = 100.0 * _largest(np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
+        up = (
+            frames["down"][:] == UP if "down" in frames else np.array(1.0)
+        )  # what sets a fallen figure back is no residual
+        residual = 100.0 * _largest(up * np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
         error = np.rad2deg(_largest(frames["joint_error"][:]))
         found.append(Plot("residual force at the root", "% body weight", (Line("residual", CURVE, residual),)))
         found.append(Plot("joints, RMS angle to the animation", "°", (Line("angle", CURVE, error),)))

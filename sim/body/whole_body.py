@@ -61,6 +61,9 @@ def _set_back(s: FigureState, q_r: Array) -> None:
     for k in range(0, s.fall.velocity.shape[0], 3):
         shorten(s.fall.velocity[k : k + 3], _SET_BACK_SPEED)  # where the reference jumps
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
+    rate = s.gains.root_rate
+    for i in range(3):  # without the bound on the root's pull: the animation may have gone far
+        s.acceleration[i] = 2.0 * rate * (s.fall.velocity[i] - s.qvel[i]) + rate**2 * (s.fall.target[i] - s.qpos[i])
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
     for plan in range(_PLANS):

@@ -109,7 +109,7 @@ def test_a_figure_thrown_anyhow_is_back_on_a_moving_animation_and_nothing_blows_
     start[2], start[3:7] = 1.0, Rotation.random(None, rng).as_quat(scalar_first=True)
     model, data, figure = world(start)
     data.qvel[:] = rng.normal(scale=2.0, size=57)
-    motion = clip_motion(embedded(name), figure.period * np.arange(1300, dtype=np.float64))
+    motion = clip_motion(embedded(name), figure.period * np.arange(1800, dtype=np.float64))
     rows = [np.ascontiguousarray(r) for r in (motion.poses, motion.velocities, motion.accelerations)]
     modes, pose = list[float](), start
     for pose, velocity, acceleration in zip(*rows, strict=True):
