@@ -33,6 +33,7 @@ Array = npt.NDArray[np.float64]
 
 _LIFT = 10.0  # flown so high that nothing but gravity acts [m]
 _FINE = 480.0  # frames per second at which a flight is flown [1/s]
+_ANY_RATE = 100.0  # nobody plays a flight so fast
 _AFTER = 8  # of them after the landing, which shape the reference's spline
 
 
@@ -76,7 +77,9 @@ class ClipBallistics:
 
 
 def _in_words(rates: tuple[float, float] | None) -> str:
-    return "at no rate" if rates is None else f"at {rates[0]:.2f} to {rates[1]:.2f}"
+    if rates is None or not np.isfinite(rates[0]):
+        return "at no rate"
+    return f"at {rates[0]:.2f} or more" if rates[1] > _ANY_RATE else f"at {rates[0]:.2f} to {rates[1]:.2f}"
 
 
 class FlightTrial(NamedTuple):

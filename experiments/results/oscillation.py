@@ -11,7 +11,8 @@ from controllers.state import Array
 from sim.recording.recording import Recording
 
 _ROWS = 16_000  # of the recording, read at a time
-_SHAKEN = 0.05  # [s] of shaking that is told
+# At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; beyond the critical one it goes on.
+_SHAKEN = 0.25  # [s] of shaking without a break that is told
 _WINDOW = 0.02  # [s] of the envelope from which the growth is taken
 
 
@@ -22,7 +23,7 @@ class OscillationSummary:
     Attributes
     ----------
     since : float or None
-        When it first shook [s]; None if it did not for 50 ms in all.
+        When it began to shake for a quarter of a second or more [s]; None if it never did.
     share : float
         Of the time in which it shook.
     frequency : float or None
@@ -61,16 +62,22 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
     ticks, period = recording.groups["ticks"], 1.0 / recording.rates["ticks"]
     detector, measure = OscillationDetector(period), _Fast(period)
     memory: list[float] = detector.fresh_memory().tolist()
-    count, since, n = 0, math.nan, len(ticks["t"])
+    count, unbroken, since, n = 0, 0, math.nan, len(ticks["t"])
     for first in range(0, n, _ROWS):
         rows = slice(first, first + _ROWS)
         force = np.nan_to_num(ticks["force"][rows])
         found = shaken(detector, force, memory)
         measure.add(force, np.nan_to_num(ticks["p"][rows] - ticks["nearest"][rows]), found)
-        if found.any() and math.isnan(since):
-            since = float(ticks["t"][rows][int(found.argmax())])
         count += int(found.sum())
-    told = count * period >= _SHAKEN
+        # How long it has shaken at each tick, what came before this block included.
+        at = np.arange(len(found))
+        stopped = np.maximum.accumulate(np.where(found, -1 - unbroken, at))
+        going = np.where(found, at - stopped, 0)
+        unbroken = int(going[-1])
+        if math.isnan(since) and going.max() * period >= _SHAKEN:
+            first_told = int(np.argmax(going * period >= _SHAKEN))
+            since = float(ticks["t"][rows][first_told]) - (int(going[first_told]) - 1) * period
+    told = not math.isnan(since)
     return OscillationSummary(
         since if told else None, count / max(n, 1), measure.frequency() if told else None, measure.force.root,
         measure.force.largest, 1e3 * measure.motion.root, measure.growth(since) if told else None,

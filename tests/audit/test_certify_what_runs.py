@@ -43,7 +43,8 @@ from models.mocap.library import embedded
 CIRCLE = Trajectory.circle(0.0477, 4.0)
 STILL = Trajectory.circle(0.0477, LAP)
 DEVICE = phantom_device()
-EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+# Encoders that round would show accelerations in the path that nothing has.
+RUBBING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
 UP = np.eye(75)[2]
 
 
@@ -202,21 +203,24 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_what_is_certified_never_shakes_and_what_is_refuted_does(name):
     law, certify = LAWS[name]
-    verdict = certify().verdict
+    found = certify()
+    verdict, example = found.verdict, found.counterexample
     rng, shook = np.random.default_rng(20), 0
     for _ in range(20):
+        # Refuted is a place, the counterexample's; certified is every place.
         phase, across = rng.uniform(0.0, LAP), np.array([0.0, 0.0, 1.0])
+        phase = float(example["phase"]) * LAP / 4.0 if example else phase
         trial = LawTrial(STILL, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
         loop = trial.loop()
         inverse, state = np.linalg.inv(loop.linear.jacobian[0]), np.zeros(12)
         state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.05, size=3)
         state[6:9], state[9:12] = state[:3], state[3:6]
-        path = simulate(trial, 300.0, 400, EVERYTHING, state)
+        path = simulate(trial, 300.0, 400, RUBBING, state)
         # Acceleration of the last fifth: a hand that is carried or rests has little of it.
         fast = np.linalg.norm(np.diff(path[-80:], 2, axis=0), axis=1) / 1e-6
-        shook += len(path) < 400 or float(np.median(fast)) > 20.0
+        shook += len(path) < 400 or float(np.median(fast)) > 5.0
     assert verdict in ("certified", "refuted")
-    assert shook == 0 if verdict == "certified" else shook >= 18
+    assert shook == 0 if verdict == "certified" else shook >= 18, (verdict, shook)
 
 
 def test_the_last_phase_of_a_closed_curve_is_compared_with_the_first():

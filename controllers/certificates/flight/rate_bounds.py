@@ -143,7 +143,7 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     up_to = f"up to {rate:.2f} of" if rate < _ANY_RATE else f"more than {_ANY_RATE:g} times"
     reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
-        return Verdict("certified", reason, rate**2 - 1.0, assumptions)
+        return Verdict("certified", reason, rate**2 - 1.0 if rate < _ANY_RATE else None, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_missed_window(motion, frame, friction)}
     reason = f"{reason}, which no body on that floor follows within {1e3 * counterexample['distance']:.1f} mm"
     return Verdict("refuted", reason, rate**2 - 1.0, assumptions, counterexample)
