@@ -34,6 +34,7 @@ def lines(page: Path) -> list[str]:
 @pytest.mark.parametrize("page", [page for page in TYPED + SHOWN if lines(page)], ids=name)
 def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> None:
     shutil.copy(ROOT / "models" / "mocap" / "clips" / "walk.bvh", tmp_path / "mine.bvh")
+    shutil.copy(ROOT / "examples" / "hidden.json", tmp_path / "hidden.json")
     for line in EARLIER.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
         shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none

@@ -126,6 +126,6 @@ def _shade(axes: Axes, recording: Recording) -> None:
         if shade:
             axes.axvspan(t[first], t[min(after, len(t) - 1)], color=shade, lw=0.0, zorder=0)
     for k in np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))[:20]:
-        axes.axvline(t[k], color=AXES[1], lw=0.8)
+        axes.axvline(float(t[k]), color=AXES[1], lw=0.8)
         name = Fault(int(fault[k])).name.lower().replace("_", " ")
         axes.annotate(name, (t[k], 1.0), xycoords=("data", "axes fraction"), fontsize=7, rotation=90, va="top")

@@ -39,7 +39,7 @@ def job(path: Path) -> RecordingJob:
     return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD))
 
 
-def until(run: HardwareRun, what: Callable[[Look], bool], seconds: float = 10.0) -> Look:
+def until(run: HardwareRun, what: Callable[[Look], bool], seconds: float = 60.0) -> Look:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         look = run.poll()
@@ -158,7 +158,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
         run.recorder._target = functools.partial(limited, 1_000_000)
         run.start()
         active(run)
-        look = until(run, lambda look: look.recorded is not None and look.recorded.error != 0, 20.0)
+        look = until(run, lambda look: look.recorded is not None and look.recorded.error != 0)
         assert not look.recorded.alive
         goes_on(run)
     with Recording(path) as recording:
