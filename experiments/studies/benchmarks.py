@@ -70,7 +70,7 @@ def bench() -> None:
     trials = trial_cost()
     print(f"a study beside its trials, processor time: {100 * trials.overhead:.1f} % (≤ 5)")
     print(f"trials on two threads / twice one: {trials.scaling:.2f} (≥ 0.90)")
-    print(f"memory after 10 000 short trials / after 400: {trials.grown:.3f} (≤ 1.01)")
+    print(f"memory after 2000 short trials / after 400: {trials.grown:.3f} (≤ 1.01)")
     print(f"second start of a study to its first row: {trials.start:.1f} s (≤ 3)")
     print(f"soft walls of 17 joints: {walls_microseconds(wire(config, clips)):.1f} µs a tick (≤ 20)")
     print(f"h(p) with h_* over four clips: {map_microseconds(wire(config, clips)):.1f} µs (≤ 20)")
