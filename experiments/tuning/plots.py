@@ -16,7 +16,7 @@ _TRIED, _FRONT, _CHOSEN, _REFUSED = "#7f8ea3", "#1f5fbf", "#d9542b", "#b04040"
 
 
 def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate) -> Figure:
-    """Candidates by their first two objectives, their front joined; of one objective, how the best of them came down."""
+    """Candidates by two objectives, their front joined; of one objective, how the best of them came down."""
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     axis = figure.subplots()
     tried = [c for c in candidates if c.objectives is not None]
@@ -34,7 +34,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         figure.colorbar(drawn, label="k_r over the critical k_r (the certificate's boundary is 1)")
         ends = _front_of_two(config, tried)
         axis.plot(
-            ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of these two"
+            ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both"
         )
         place = np.array(chosen.objectives)
         axis.plot(place[:1], place[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
