@@ -12,7 +12,6 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import run_block
 from sim.world.world import FigureKind
 
-STEP = 1e-3  # [s] of the physics: one to a servo tick
 _TICKS, _BLOCKS = 1000, 6
 
 
@@ -27,7 +26,7 @@ class FigureCost(NamedTuple):
 
 def figure_cost() -> FigureCost:
     """Measure the kinds in turn, the best of some blocks after a first one."""
-    sessions = {kind: wire(run_config(figure=kind, physics_step=STEP)) for kind in get_args(FigureKind)}
+    sessions = {kind: wire(run_config(figure=kind)) for kind in get_args(FigureKind)}
     logs = {kind: make_logs(session.servo, _TICKS) for kind, session in sessions.items()}
     model, cost = sessions["none"].world.model, dict.fromkeys((*sessions, "bare_step"), np.inf)
     data = mujoco.MjData(model)

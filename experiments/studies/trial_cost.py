@@ -19,7 +19,7 @@ from experiments.trials.run_trial import SHELF, Task
 from experiments.trials.study_config import StudyConfig, study_from
 from experiments.trials.threads import Threads
 
-_THREADS, _SHORT, _MANY = 2, 0.02, 10_000  # trials at a time; [s] of a short trial, and how many of them
+_THREADS, _SHORT, _MANY = 2, 0.02, 2_000  # trials at a time; [s] of a short trial, and how many of them
 
 
 class TrialCost(NamedTuple):
@@ -32,7 +32,7 @@ class TrialCost(NamedTuple):
     scaling : float
         Trials a second of two threads over twice those of one.
     grown : float
-        Memory after 10 000 short trials, over that after the first 400.
+        Memory after 2000 short trials, over that after the first 400.
     start : float
         From the start of a process to its first row, with the code compiled before [s].
     """

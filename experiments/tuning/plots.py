@@ -16,7 +16,7 @@ _TRIED, _FRONT, _CHOSEN, _REFUSED = "#7f8ea3", "#1f5fbf", "#d9542b", "#b04040"
 
 
 def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate) -> Figure:
-    """Candidates by their first two objectives, the front joined; of one objective, how the best of them came down."""
+    """Candidates by two objectives, their front joined; of one objective, how the best of them came down."""
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     axis = figure.subplots()
     tried = [c for c in candidates if c.objectives is not None]
@@ -32,8 +32,10 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         used = np.array([np.nan if c.margin is None else 1.0 / (1.0 + c.margin) for c in tried])
         drawn = axis.scatter(costs[:, 0], costs[:, 1], c=used, s=26, cmap="viridis", label="tried")
         figure.colorbar(drawn, label="k_r over the critical k_r (the certificate's boundary is 1)")
-        ends = np.array(sorted(c.objectives for c in front(tried, config.directions) if c.objectives is not None))
-        axis.plot(ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front")
+        ends = _front_of_two(config, tried)
+        axis.plot(
+            ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both"
+        )
         place = np.array(chosen.objectives)
         axis.plot(place[:1], place[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
         axis.set_xlabel(label_of(config.objectives[0]))
@@ -41,6 +43,12 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
     axis.legend(frameon=False, fontsize=9)
     axis.grid(alpha=0.3)
     return figure
+
+
+def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
+    """Places of the front of the first two objectives, whatever the others are, by the first one, shape (n, 2)."""
+    two = [c._replace(objectives=c.objectives[:2]) for c in tried if c.objectives is not None]
+    return np.array(sorted(c.objectives for c in front(two, config.directions[:2]) if c.objectives is not None))
 
 
 def gains_figure(

@@ -45,8 +45,9 @@ def angle_gone(found: dict[str, np.ndarray], start: float, end: float) -> float:
 
 
 def test_who_relaxes_is_led() -> None:
+    """The river's damper (8 N s/m) takes along what a slack arm still resists with, some 7 N s/m."""
     found = done(hvf.intents.Relax(), 5.0, STRONG)
-    assert angle_gone(found, 1.0, 5.0) > 0.7
+    assert angle_gone(found, 1.0, 5.0) > 0.4
     assert np.median(within(found, "distance", 1.0, 5.0)) < 4e-3
     assert np.sum(within(found, "force", 1.0, 5.0) * within(found, "v", 1.0, 5.0)) > 0.0  # the river carries her
 

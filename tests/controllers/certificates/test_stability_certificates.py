@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from controllers.certificates.loop.energy import distance_bound, energy, peak_gain, terminal_speed
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance, HandRange
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW
 from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.passivity import damping_needed, passivity
-from controllers.certificates.loop.sampled_loop import SampledLoop
+from controllers.certificates.loop.sampled_loop import SampledLoop, exponentials
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import (
     River,
@@ -290,3 +291,11 @@ def test_a_curve_that_stands_still_has_no_direction():
 def test_numbers_out_of_their_intervals_are_refused(wrong):
     with pytest.raises(ParameterError):
         wrong()
+
+
+@pytest.mark.parametrize("size", [1e-9, 0.01, 0.5, 5.0, 30.0])
+def test_exponentials_of_a_stack_are_scipy_s_one_by_one(size: float) -> None:
+    matrices = size * np.random.default_rng(3).normal(size=(20, 9, 9))
+    expected = np.array([expm(one) for one in matrices])
+    off = np.abs(exponentials(matrices) - expected).max(axis=(1, 2)) / np.abs(expected).max(axis=(1, 2))
+    assert off.max() < 1e-11
