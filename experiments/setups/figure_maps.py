@@ -166,7 +166,7 @@ def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipM
 
 def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapParts:
     curve = lifted_curve(made, part.curve)
-    ends = f"the curve ends after {curve.duration:.1f} s, for its clip is open: there the hand is held, and the figure rests"
+    ends = f"the clip is open: its curve, and with it the animation, ends after {curve.duration:.1f} s"
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
