@@ -12,9 +12,7 @@ from models.mocap.preparation.poses import sole_points
 
 FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
-UPRIGHT = (
-    0.0  # least vertical component of the pelvis axis: who kicks high leans back by 61°, who turns over passes 90°
-)
+UPRIGHT = -0.5  # least vertical component of the pelvis axis: who kicks high leans by up to 97°, a cartwheel by 149°
 SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
 
 

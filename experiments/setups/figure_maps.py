@@ -189,12 +189,14 @@ def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipM
 
 def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapParts:
     curve = lifted_curve(made, part.curve)
+    ends = f"the clip is open: its curve, and with it the animation, ends after {curve.duration:.1f} s"
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
         course=lambda damping: course_of(curve, damping),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
+        remarks=() if curve.periodic else (ends,),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.blending.alignment import aligned_channels
 from controllers.errors import ParameterError
-from controllers.motion.loops import checked_clip, closed_loop, plane_exponential, turned, yawed
+from controllers.motion.loops import checked_clip, closed_loop, plane_exponential, there_and_back, turned, yawed
 
 
 def _loop(poses, fps=30.0):
@@ -73,7 +73,8 @@ def test_a_loop_put_together_again_is_the_clip_where_it_was_moved_to():
 def test_an_open_clip_is_closed_smoothly_at_its_ends_only():
     whole = swinging(6, 200)
     poses = whole[:140]
-    loop = _loop(poses)
+    # So fast that its ends are in the middle of the motion: it is not played there and back.
+    loop = closed_loop(checked_clip(poses, 240.0, "clip"), 240.0)
     assert np.degrees(loop.gap) > 5.0
     s = np.arange(139) / 139
     found = loop.channels(s, np.zeros(139))
@@ -125,3 +126,21 @@ def _angles(a, b):
 def test_what_is_no_clip_is_refused(poses, fps, says):
     with pytest.raises(ParameterError, match=says):
         checked_clip(poses, fps, "clip 2")
+
+
+def test_an_open_clip_that_rests_is_played_there_and_back():
+    t = np.linspace(0.0, 1.0, 121)
+    share = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2))[:, None]
+    poses = np.zeros((121, 11))
+    poses[:, :3] = [0.0, 0.0, 0.9] + share * [0.3, 0.1, -0.2]
+    poses[:, 3] = 1.0
+    poses[:, 7:] = np.concatenate([np.cos(0.4 * share), np.sin(0.4 * share), 0.0 * share, 0.0 * share], axis=1)
+    folded = there_and_back(poses, 60.0)
+    np.testing.assert_allclose(folded[::-1], folded, atol=1e-12)
+    np.testing.assert_allclose(folded[[0, len(folded) // 2, -1]], poses[[0, -1, 0]], atol=1e-6)
+    loop = closed_loop(folded, 60.0)
+    assert loop.gap < 1e-6
+    assert np.abs(loop.drift).max() < 1e-9
+    # What is closed, or in the middle of a motion at an end, stays as it is.
+    for clip, fps in ((folded, 60.0), (poses[:60], 240.0)):
+        np.testing.assert_array_equal(there_and_back(clip, fps), clip)

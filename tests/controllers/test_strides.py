@@ -6,7 +6,7 @@ from clips_for_maps import difference, stylus, swinging
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import in_step, strides
+from controllers.motion.strides import in_step, natural_lap, strides
 
 
 def repeated(seed, times, travel, frames=60):
@@ -56,3 +56,25 @@ def test_poses_and_stride_of_a_clip_that_was_cut_are_the_clips():
     for angle in np.linspace(0.3, 0.3 + 2 * np.pi, 60):
         pose = h_map.pose(stylus(r[1], angle, 0.0), memory)
     np.testing.assert_allclose(np.hypot(*(pose - first)[:2]), 4.0, atol=1e-6)
+
+
+def test_a_lap_plays_each_clip_as_often_as_it_fits():
+    # 2 s on the spot, a walk of two strides in 4 s, a run of three in 6 s.
+    loops = [loop(poses) for poses in (swinging(4, 60), repeated(1, 2, 1.1), repeated(2, 3, 2.0))]
+    durations = np.array([one.duration for one in loops])
+    adjusted = in_step(loops, 6.0)
+    assert adjusted[0].share == 3.0
+    # Those that travel have as many strides, here three: 1.5 laps of the walk and one of the run.
+    strides_a_lap = [adjusted[1].share * 2, adjusted[2].share * 3]
+    assert strides_a_lap[0] == strides_a_lap[1] == 3.0
+    for before, one in zip(loops, adjusted, strict=True):
+        np.testing.assert_allclose(one.drift, one.share * before.drift)
+    np.testing.assert_allclose([one.duration for one in adjusted], durations * [one.share for one in adjusted])
+
+
+def test_the_natural_lap_plays_clips_at_their_own_pace_where_that_can_be():
+    loops = [loop(swinging(seed, frames)) for seed, frames in ((4, 30), (5, 45), (6, 90))]
+    lap = natural_lap(loops)
+    paces = [one.duration / lap for one in in_step(loops, lap)]
+    np.testing.assert_allclose(paces, 1.0, atol=0.05)
+    assert 3.0 <= lap <= 6.0

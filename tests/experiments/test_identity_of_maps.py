@@ -1,0 +1,53 @@
+"""FOLLOW over one clip on a map costs the physical figure little more than the clip alone."""
+
+import numpy as np
+import pytest
+
+from experiments.config.words import run_config
+from experiments.setups.alike import motion_of
+from experiments.setups.blendable import not_blendable
+from experiments.setups.wiring import wire
+from experiments.trials.trial_log import TrialLog
+from models.mocap.library import embedded
+from sim.body.tracking import TrackingConfig, track
+from sim.loop.loop import Loop
+
+SECONDS = 6.0
+POINTS = 0.03  # [body weights] RMS that a map may add
+
+
+def residual(kind: str, name: str) -> float:
+    """RMS of the residual force in FOLLOW over copies of a clip [body weights]; a root off by 0.5 m is a fall."""
+    clip = embedded(name)
+    config = run_config(map=kind, clips=(name,), lap=clip.duration, seconds=SECONDS)
+    session = wire(config)
+    log = TrialLog(session.servo, session.world)
+    Loop(session.servo, session.world, log).run(SECONDS)
+    assert log.frames["root_error"].max() < 0.5
+    force = np.linalg.norm(log.frames["residual"][:, :3], axis=1)[log.frames["flight"] == 0.0]
+    return float(np.sqrt(np.mean(force**2))) / session.weight
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "name"), [("cylindrical", "walk"), ("cylindrical", "jump"), ("composite", "walk")])
+def test_a_map_of_one_clip_costs_at_most_three_points_over_tracking_it(kind: str, name: str) -> None:
+    assert residual(kind, name) < track(embedded(name), SECONDS, TrackingConfig()).residual_force + POINTS
+
+
+def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
+    walk, jump, flip = embedded("walk"), embedded("jump"), embedded("backflip")
+    assert not_blendable((walk, walk)) == not_blendable((flip, flip)) == ()
+    said = not_blendable((walk, flip, jump))
+    assert len(said) == 2
+    assert said[0].startswith("backflip turns over")
+    assert said[1].startswith("jump flies for 0.")
+
+
+def test_feet_of_the_authored_walk_neither_sink_nor_skate() -> None:
+    motion = motion_of(embedded("walk").poses, embedded("walk").fps, dynamics=False)
+    assert motion.lowest > -0.005
+    assert motion.skate < 0.01
+    # A walk that is carried sideways skates as far as it is carried in a stance.
+    carried = embedded("walk").poses.copy()
+    carried[:, 1] += 0.1 * np.arange(len(carried)) / embedded("walk").fps
+    assert 0.03 < motion_of(carried, embedded("walk").fps, dynamics=False).skate < 0.12
