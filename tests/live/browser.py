@@ -21,6 +21,7 @@ CHROMIUM = shutil.which("chromium")
 ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 WIDTH, HEIGHT = 900, 520
+SHARPNESS = 0.4  # pixels that are drawn of each of the screen's, along either side: there is no graphics card
 PICTURES = os.environ.get("HVF_SCREENSHOTS", "")
 """Folder in which pictures of the page are kept for who looks; none if it is empty."""
 
@@ -41,7 +42,7 @@ def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT
     """A tab that shows the page."""
     page = browser.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(1e3 * PATIENCE)
-    page.goto(address)
+    page.goto(f"{address}/?fixedDpr={SHARPNESS}")
     page.get_by_role("button", name="Pause").wait_for()
     return page
 
@@ -54,7 +55,7 @@ def kept(tab: Any, name: str) -> None:
 
 def choose(tab: Any, label: str, option: str) -> None:
     """Choose from a list."""
-    tab.get_by_label(label, exact=True).click()
+    tab.get_by_label(label, exact=True).first.click()
     tab.get_by_role("option", name=option, exact=True).click()
 
 
@@ -65,7 +66,7 @@ def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Itera
     _drawn(tab)
     tab.mouse.down()
     _drawn(tab)
-    for share in (0.25, 0.5, 0.75, 1.0):
+    for share in (0.3, 1.0):
         tab.mouse.move(start[0] + share * by[0], start[1] + share * by[1])
         _drawn(tab)
     try:
@@ -75,10 +76,8 @@ def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Itera
 
 
 def _drawn(tab: Any) -> None:
-    """Wait until the browser has drawn three more pictures."""
-    tab.evaluate(
-        "new Promise(done => { let n = 0; const f = () => ++n > 3 ? done(0) : requestAnimationFrame(f); f() })"
-    )
+    """Wait until the browser has drawn another picture."""
+    tab.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 class Served:

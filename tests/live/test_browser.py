@@ -158,7 +158,7 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     with Recording(downloaded(tab, "Recording", tmp_path / "recording.h5")) as recording:
         assert recording.duration > 1.0
     assert '"stretch"' in downloaded(tab, "Configuration", tmp_path / "config.json").read_text()
-    tab.get_by_role("button", name="Compare and mix").click()
+    tab.get_by_text("Compare and mix").click()
     tab.get_by_label("Show both").click()
     served.until(lambda: served.page._takes.compares, "both are shown")
     tab.get_by_text("take 1:").first.wait_for()
