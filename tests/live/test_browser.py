@@ -69,6 +69,7 @@ def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, se
 
 def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
     desk = served.desk
+    served.until(lambda: desk.now["distance"][0] < 0.001, "the stylus is on the curve, where it can be taken hold of")
     desk.pause(True)
     place = served.settled()["p"].copy()
     tab.keyboard.down("Shift")
