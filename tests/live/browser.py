@@ -21,7 +21,6 @@ CHROMIUM = shutil.which("chromium")
 ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 WIDTH, HEIGHT = 900, 520
-SHARPNESS = 0.4  # pixels that are drawn of each of the screen's, along either side: there is no graphics card
 PICTURES = os.environ.get("HVF_SCREENSHOTS", "")
 """Folder in which pictures of the page are kept for who looks; none if it is empty."""
 
@@ -42,7 +41,7 @@ def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT
     """A tab that shows the page."""
     page = browser.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(1e3 * PATIENCE)
-    page.goto(f"{address}/?fixedDpr={SHARPNESS}")
+    page.goto(address)
     page.get_by_role("button", name="Pause").wait_for()
     return page
 

@@ -204,9 +204,9 @@ def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any) -> None:
 
 def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: Served, tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
-    large.write_bytes(b"HIERARCHY\n" + b" " * MOST_BYTES)
+    large.write_bytes(b"HIERARCHY\n" + b" " * (MOST_BYTES + 500_000))
     upload(tab, large)
-    tab.get_by_text("large.bvh has 30 MB", exact=False).last.wait_for()
+    tab.get_by_text("large.bvh has 30.5 MB", exact=False).last.wait_for()
     assert not (served.desk.folder / "uploads" / "large.bvh").exists()
 
 
