@@ -309,7 +309,7 @@ class Desk:
             raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
         if len(content) > MOST_BYTES:
             raise SimError(
-                f"{file} has {len(content) / 1e6:.0f} MB; expected {MOST_BYTES / 1e6:.0f} MB or less; hvf prepare "
+                f"{file} has {len(content) / 1e6:.1f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB; hvf prepare "
                 "takes larger ones"
             )
         if self.preparing is not None:

@@ -10,7 +10,7 @@ Array = npt.NDArray[np.float64]
 
 FIELD_OF_VIEW = np.deg2rad(34.0)
 PANEL = 335.0  # [px] that viser's panel takes of the width of a window
-PHONE = 576.0  # [px] up to which width viser lays the panel over the lower part
+PHONE = 0.75  # width/height below which a window is taken for a phone's, where the panel lies over the lower part
 SHEET = 0.6  # of the height that it takes there
 DEFAULT_SIZE = 1400.0, 850.0  # [px] of a window that has not told its own
 
@@ -53,7 +53,7 @@ def camera_of(view: View, width: float, height: float) -> Camera:
     With m metres a pixel in the plane of the view's centre, its distance is m h/(2 tan(α/2)), and it is shifted by half
     of what the panel covers, so that the centre is in the middle of the rest.
     """
-    phone = width <= PHONE
+    phone = width < PHONE * height
     free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, 0.3 * width), height)
     metres = max(2.0 * half / pixels for half, pixels in zip(view.half, free, strict=True))
     side = np.array(view.side) / np.linalg.norm(view.side)
@@ -76,10 +76,15 @@ def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, siz
 
 
 def look_from(client: viser.ClientHandle, view: View) -> None:
-    """Let a browser show a view."""
-    look(client.camera, view, (float(client.camera.image_width), float(client.camera.image_height)))
+    """Let a browser show a view.
+
+    It tells how many pixels it draws, of which a fine screen has two or three for each of its window's: so a window is
+    taken for no wider than the default one.
+    """
+    width = min(float(client.camera.image_width), DEFAULT_SIZE[0])
+    look(client.camera, view, (width, width / client.camera.aspect))
 
 
 def is_phone(client: viser.ClientHandle) -> bool:
     """Whether a browser's window is as narrow as a phone's."""
-    return client.camera.image_width <= PHONE
+    return client.camera.aspect < PHONE

@@ -54,7 +54,7 @@ def kept(tab: Any, name: str) -> None:
 
 def choose(tab: Any, label: str, option: str) -> None:
     """Choose from a list."""
-    tab.get_by_label(label, exact=True).click()
+    tab.get_by_label(label, exact=True).first.click()
     tab.get_by_role("option", name=option, exact=True).click()
 
 
@@ -65,7 +65,7 @@ def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Itera
     _drawn(tab)
     tab.mouse.down()
     _drawn(tab)
-    for share in (0.25, 0.5, 0.75, 1.0):
+    for share in (0.3, 1.0):
         tab.mouse.move(start[0] + share * by[0], start[1] + share * by[1])
         _drawn(tab)
     try:
@@ -75,10 +75,8 @@ def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Itera
 
 
 def _drawn(tab: Any) -> None:
-    """Wait until the browser has drawn three more pictures."""
-    tab.evaluate(
-        "new Promise(done => { let n = 0; const f = () => ++n > 3 ? done(0) : requestAnimationFrame(f); f() })"
-    )
+    """Wait until the browser has drawn another picture."""
+    tab.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 class Served:

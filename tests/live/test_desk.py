@@ -119,7 +119,7 @@ def test_one_looks_back_and_goes_on_from_there(desk: Said) -> None:
 
 
 def test_motion_files_are_prepared_or_refused_in_one_line(desk: Said, tmp_path: Path) -> None:
-    with pytest.raises(SimError, match="expected 30 MB or less"):
+    with pytest.raises(SimError, match="expected at most 30 MB"):
         desk.upload("large.bvh", bytes(MOST_BYTES + 1))
     with pytest.raises(SimError, match="no motion file"):
         desk.upload("picture.png", b"")

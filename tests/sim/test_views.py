@@ -25,7 +25,7 @@ def seen(view: View, width: float, height: float) -> np.ndarray:
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_view_fills_what_the_panel_leaves_free(name: str, size: tuple[int, int]) -> None:
     width, height = size
-    free = (width, (1.0 - SHEET) * height) if width <= PHONE else (width - PANEL, height)
+    free = (width, (1.0 - SHEET) * height) if width < PHONE * height else (width - PANEL, height)
     pixels = seen(VIEWS[name], *size)
     np.testing.assert_allclose(pixels[0], [0.5 * free[0], 0.5 * free[1]], atol=1e-6)
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)
