@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all test-commands test-processes lint format docs bench gate fuzz fault-table hil-vm clean
+.PHONY: setup demo test test-all test-commands test-processes live-load lint format docs bench gate fuzz fault-table hil-vm clean
 
 setup: $(READY)
 
@@ -29,6 +29,10 @@ test-commands: $(READY)
 # Processes against the clock, browsers, device nodes (Debian: chromium, umockdev, python3-gi, gir1.2-umockdev-1.0).
 test-processes: $(READY)
 	$(BIN)/python -m pytest -m processes
+
+# The live page in a browser: what it costs the servo while it is dragged and reloaded (four minutes).
+live-load: $(READY)
+	$(BIN)/python -m tests.live.undisturbed
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -23,7 +23,6 @@ exclude_patterns = ["_build"]
 default_role = "py:obj"
 suppress_warnings = [
     "ref.python",  # `River` in a docstring may be one of three
-    "misc.highlighting_failure",  # a diagram in mermaid stands as its text
 ]
 
 autodoc_member_order = "bysource"

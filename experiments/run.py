@@ -74,8 +74,6 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     ModelError, ControllerError, SimError
         If something about the configuration or a file is wrong; the folder is then as it was.
     """
-    from experiments.results.report_of import write_report_of  # matplotlib takes long to import
-
     console = Console(stderr=True)
     check_folder(out, overwrite)
     check_length(out, config.seconds, config.clock.servo_period)
@@ -93,6 +91,8 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         summary = record(session, out, to_dict(whole), whole.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
+        from experiments.results.report_of import write_report_of  # matplotlib and viser: after the first tick
+
         write_report_of(out)
     console.print(f"Written to {out}: {REPORT} (open it in a browser), {EDITED}, {DEFAULT}, {SUMMARY}, {RECORDING}.")
     return summary

@@ -7,11 +7,14 @@ from rich.console import Console
 from experiments.compiling import compile_once
 from experiments.setups.clips import load_clips
 from models.mocap.library import embedded_names
-from sim.body.tracking import TrackingReport, track
+from sim.body.figure_state import FigureGains
+from sim.body.tracking import TrackingConfig, TrackingReport, track
 from sim.compilation.units import Unit
 
 
-def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> dict[str, TrackingReport]:
+def track_clips(
+    names: tuple[str, ...], seconds: float, raw: bool, bounds: tuple[float, float]
+) -> dict[str, TrackingReport]:
     """Track clips, and report on each by name.
 
     Parameters
@@ -22,6 +25,8 @@ def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> di
         Simulated time for each [s].
     raw : bool
         Take motion files as captured, not prepared.
+    bounds : (float, float)
+        Of the residual's force and moment (see `sim.body.figure_state.FigureGains`).
 
     Raises
     ------
@@ -37,10 +42,11 @@ def track_clips(names: tuple[str, ...], seconds: float, raw: bool = False) -> di
     def ready(units: tuple[Unit, ...]) -> None:
         compile_once(console, units)
 
+    config = TrackingConfig(gains=FigureGains(force_bound=bounds[0], moment_bound=bounds[1]))
     reports: dict[str, TrackingReport] = {}
     began = time.perf_counter()
     for k, (name, clip) in enumerate(zip(names, clips, strict=True)):
-        reports[name] = track(clip, seconds, ready=ready)
+        reports[name] = track(clip, seconds, config, ready)
         rest = (len(names) - k - 1) * (time.perf_counter() - began) / (k + 1)
         if rest > 0.0:
             console.print(f"{k + 1} of {len(names)} clips tracked, about {rest:.0f} s left", highlight=False)

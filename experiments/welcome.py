@@ -3,6 +3,7 @@
 WELCOME = """hvf: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
 
   hvf demo                            see it work: a run, and a page to open in a browser
+  hvf live                            take the stylus with the mouse, in the browser
   hvf run --clips A.bvh B.amc         the same over your own motion capture
   hvf run --mode stretch-then-follow  bend a curve, and perform it
   hvf render runs/demo                film a run

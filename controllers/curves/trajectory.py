@@ -201,9 +201,11 @@ class Trajectory:
 
     @staticmethod
     def circle(
-        radius: float, period: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0), samples: int = 96
+        radius: float, period: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0), samples: int = 96, wave: float = 0.0
     ) -> "Trajectory":
         """Circle about an axis parallel to z of H, counter-clockwise from +x, once in `period` seconds.
+
+        With a wave it also goes up and down, z = a sin 3φ, so that every joint of a Phantom turns both ways.
 
         Parameters
         ----------
@@ -215,9 +217,12 @@ class Trajectory:
             In H [m].
         samples : int
             Samples a lap; 96 keep the spline within 1e-6 of the radius.
+        wave : float
+            a [m].
         """
         angle = np.linspace(0.0, 2.0 * np.pi, samples + 1)
         ring = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        ring[:, 2] = wave * np.sin(3.0 * angle)
         ring[-1] = ring[0]
         return Trajectory(period * angle / (2.0 * np.pi), np.asarray(centre, dtype=float) + ring, periodic=True)
 

@@ -66,6 +66,21 @@ def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, h
     leave_trace(params, curve, memory, phase, distance, bunny)
 
 
+class FeltBunny(NamedTuple):
+    """Weighted form of a bunny: k_r [N/m], b_d [N s/m], δ [m]."""
+
+    k_r: float
+    b_d: float
+    delta: float
+
+
+def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> FeltBunny:
+    """The weighted form that a bunny's attraction comes to: its own, or the convolution's in closed form."""
+    if attraction != "convolution":
+        return FeltBunny(k_r, b_d, delta)
+    return FeltBunny(k_r * 2.0**-2.5, b_d * 2.0**-1.5, delta * 2.0**0.5)
+
+
 @dataclass(frozen=True, eq=False)
 class Bunny(Law):
     r"""Attractor φ(t_b) that keeps its own pace and pulls the hand near it.
@@ -73,8 +88,16 @@ class Bunny(Law):
     .. math:: L = G_\delta(p - \varphi(t_b))\,\bigl(k_r\,(\varphi(s) - p) + b_d\,(\dot\varphi(s) - \dot p)\bigr)
 
     with G_δ(x) = exp(−|x|²/2δ²). The paper writes L = F ∗ G_δ(φ(t)); we read it as the field F weighted by the
-    Gaussian about the bunny. As δ → ∞ the form "along" tends to the static field of `Follow` with ε = ∞, the form
-    "point" to a spring and damper to the moving point.
+    Gaussian about the bunny. "convolution" is the form "point", felt within δ, convolved with the normalised Gaussian:
+
+    .. math:: L = \int G_\delta(q - \varphi)\,\bigl(k_r (\varphi - q) + b_d (\dot\varphi - \dot p)\bigr)\,
+              \frac{G_\delta(p - q)}{(2\pi\delta^2)^{3/2}}\,d^3q
+              = G_{\sqrt2\delta}(p - \varphi)\,\Bigl(\tfrac{k_r}{2^{5/2}} (\varphi - p)
+              + \tfrac{b_d}{2^{3/2}} (\dot\varphi - \dot p)\Bigr)
+
+    so it is the weighted form with other gains (`felt`); the spring alone, unweighted, is its own convolution. As
+    δ → ∞ the form "along" tends to the static field of `Follow` with ε = ∞, the form "point" to a spring and damper to
+    the moving point.
 
     Parameters
     ----------
@@ -86,8 +109,9 @@ class Bunny(Law):
         Damping [N s/m].
     delta : float
         δ, how far the bunny is felt [m]; may be infinite.
-    attraction : {"point", "along"}
-        To the bunny itself (s = t_b), or along the curve by FOLLOW's own force (s = t*, the nearest phase).
+    attraction : {"point", "along", "convolution"}
+        To the bunny itself (s = t_b), or along the curve by FOLLOW's own force (s = t*, the nearest phase), or to the
+        bunny, convolved.
     pace : {"clock", "wait"}
         t_b is the hand's time; or it starts nearest to the hand and runs at the rate G_δ, thus stops for a hand
         that is held.
@@ -102,20 +126,25 @@ class Bunny(Law):
     k_r: float
     b_d: float
     delta: float
-    attraction: Literal["point", "along"] = "point"
+    attraction: Literal["point", "along", "convolution"] = "point"
     pace: Literal["clock", "wait"] = "wait"
 
     def __post_init__(self) -> None:
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("delta", self.delta, "m", least=1e-4, infinite=True)
-        one_of("attraction", self.attraction, ("point", "along"))
+        one_of("attraction", self.attraction, ("point", "along", "convolution"))
         one_of("pace", self.pace, ("clock", "wait"))
+
+    @property
+    def felt(self) -> FeltBunny:
+        """Gains of the weighted form that is executed."""
+        return felt_bunny(self.k_r, self.b_d, self.delta, self.attraction)
 
     @cached_property
     def _program(self) -> Program:
-        along, waits = float(self.attraction == "along"), float(self.pace == "wait")
-        gains = BunnyGains(self.k_r, self.b_d, self.delta**-2, along, waits)
+        along, waits, felt = float(self.attraction == "along"), float(self.pace == "wait"), self.felt
+        gains = BunnyGains(felt.k_r, felt.b_d, felt.delta**-2, along, waits)
         return Program.of(self, bunny_wrench, gains, [np.nan] * 3, self.curve)
 
     def program(self) -> Program:

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from controllers.checks import checked
+from controllers.checks import checked, one_of
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.deformation import (
     ANCHOR,
@@ -41,7 +41,7 @@ _PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1
 
 
 class StretchyGains(NamedTuple):
-    """Parameters of `stretchy_wrench`: k_f and k_s [N/m], b [N s/m], ε [m], and the end and the ease [s]."""
+    """Parameters of `stretchy_wrench`: k_f and k_s [N/m], b [N s/m], ε [m], the end and the ease [s], and p_0."""
 
     seek: float
     stretch: float
@@ -49,6 +49,7 @@ class StretchyGains(NamedTuple):
     radius: float
     until: float
     ease: float
+    at_stylus: float
 
 
 @njit
@@ -130,7 +131,7 @@ def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
 def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
     """Kernel of `StretchyTubes`: parameters `StretchyGains`; the memory holds the curve, see the module."""
     gains = StretchyGains(
-        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]
     )  # fmt: skip
     p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
     wrench[:] = 0.0
@@ -168,7 +169,8 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     if mode == HOLDING:
         carry_to(memory, record, p[0], p[1], p[2])
         stiffness = gains.stretch
-        target = (memory[record + ANCHOR], memory[record + ANCHOR + 1], memory[record + ANCHOR + 2])
+        held = slot + _PRESSED if gains.at_stylus > 0.0 else record + ANCHOR
+        target = (memory[held], memory[held + 1], memory[held + 2])
         phase = memory[record + PHASE]
     elif mode == PUSHING:
         depth, n = _push(gains.radius, memory, slot, p), slot + _NORMAL
@@ -199,7 +201,8 @@ class StretchyTubes(Law):
                                    s = \langle\varepsilon - n \cdot (p - p_0)\rangle
 
     c(p) = φ(t*) is the nearest point of the curve. A press of the switch within ε of it takes hold of p_0 = φ(t_j),
-    t_j = t*, which from then on is at the stylus, and the curve is bent with it (see
+    t_j = t* (in the paper's form p_0 is the stylus's place then, so that a held tube does not pull at once, but the
+    search that it takes the place of did), which from then on is at the stylus, and the curve is bent with it (see
     `controllers.curves.deformation`). A press farther off makes the stylus a probe: it feels nothing until it meets
     the tube of radius ε, then pushes it along the normal n of the contact, without friction. Letting go of the switch
     commits. A press on the curve that carries the stylus less than 1 mm is a click: a short one (under 0.4 s) undoes
@@ -217,6 +220,8 @@ class StretchyTubes(Law):
         Stiffness of the rubber [N/m].
     b : float
         Damping [N s/m]; the paper has none.
+    hold : {"curve", "stylus"}
+        Whether p_0 of a held tube is φ(t_j), or the stylus's place when it was taken hold of.
     epsilon : float
         ε, radius of the tube [m].
     width : float
@@ -249,6 +254,7 @@ class StretchyTubes(Law):
     then: Follow | None = None
     ease: float = 0.0
     depth: int = 64
+    hold: Literal["curve", "stylus"] = "curve"
 
     def __post_init__(self) -> None:
         checked("k_f", self.k_f, "N/m")
@@ -257,6 +263,7 @@ class StretchyTubes(Law):
         checked("epsilon", self.epsilon, "m", least=1e-4)
         checked("until", self.until, "s", infinite=True)
         checked("ease", self.ease, "s")
+        one_of("hold", self.hold, ("curve", "stylus"))
         if np.isfinite(self.until) and self.then is None:
             raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
 
@@ -269,12 +276,19 @@ class StretchyTubes(Law):
         state = np.zeros(_RECORD)
         state[_PHASE], state[_GAINS:_OFF] = np.nan, then
         memory = np.concatenate([state, record_of(self.curve, self.width, self.depth)])
-        gains = StretchyGains(self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease)
+        gains = StretchyGains(
+            self.k_f, self.k_s, self.b, self.epsilon, self.until, self.ease, float(self.hold == "stylus")
+        )
         return Program.of(self, stretchy_wrench, gains, memory)
 
     def program(self) -> Program:
         """Compiled form of the field; the curve lies in its memory, where it is bent."""
         return self._program
+
+    @staticmethod
+    def record_at(slot: int = TRACE_SIZE) -> int:
+        """Where in the memory of a run the record of the curve begins; before it lies the state of the law."""
+        return slot + _RECORD
 
     def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:
         """The curve as it is bent in the memory of a run.

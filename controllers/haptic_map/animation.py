@@ -1,11 +1,12 @@
 """What maps that blend clips have in common: clips become loops, and a lap of the hand is a lap of every clip."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
 
 from controllers.blending.blend import packed_blend
+from controllers.blending.clip_arrays import kept
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
@@ -113,6 +114,8 @@ class AnimationMap(ClipMap):
         Joints, counted from 1, whose weights are the second group's.
     limbs : sequence of Limb
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+    lap : float, optional
+        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
 
     Raises
     ------
@@ -128,19 +131,48 @@ class AnimationMap(ClipMap):
         numbers: Sequence[float] | Array,
         second_group: Sequence[int],
         limbs: Sequence[Limb],
+        lap: float | None = None,
     ) -> None:
         poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
-        self.loops: list[Loop] = in_step(loops)
+        self.loops: list[Loop] = in_step(loops, lap)
+        self.lap = lap
         limbs = [limb.allowing(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):
                 raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group wants {joint}")
             groups[joint] = 1
-        samples = int(np.clip(max(len(clip) for clip in poses) - 1, 64, 2048))
+        frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in self.loops)
+        samples = int(np.clip(np.ceil(frames), 64, 2048))
         params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
         drifts = np.stack([loop.drift for loop in self.loops])
+        self._lap_seconds = float(np.mean([loop.duration for loop in self.loops]))
         super().__init__(kind, kernel, params, clips, [str(i) for i in range(len(clips))], limbs, drifts)
+
+    @property
+    def lap_seconds(self) -> float:
+        """Time of a lap at which the clips run, on average and as often as it plays them, at their own pace [s]."""
+        return self._lap_seconds
+
+    def lap_array(self) -> dict[str, Array]:
+        """The lap that it was made for, as an array by key; none without."""
+        return {} if self.lap is None else {"lap": np.array([self.lap])}
+
+
+def kept_lap(arrays: Mapping[str, Array]) -> float | None:
+    """The lap of what `lap_array` gave.
+
+    Raises
+    ------
+    ParameterError
+        If it is no positive number.
+    """
+    if "lap" not in arrays:
+        return None
+    lap = float(kept(arrays, "lap", (1,))[0])
+    if not 0.0 < lap < np.inf:
+        raise ParameterError(f"'lap' of the map must be positive and finite, got {lap}")
+    return lap

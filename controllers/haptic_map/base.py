@@ -53,6 +53,11 @@ class HapticMap(ABC):
 
     _asked: ClassVar[Asked | None] = None
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is to be said of it before a run."""
+        return ()
+
     @abstractmethod
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""

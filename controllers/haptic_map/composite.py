@@ -9,7 +9,7 @@ from controllers.blending.blend import blend
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.curves.cylinder import blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.limbs import Limb
 from controllers.state import Array
 
@@ -47,6 +47,8 @@ class Composite(AnimationMap):
         Interval [m] over which red turns to blue; r_min > 0.
     limbs : sequence of Limb
         Limbs of the lower body that stand (see `limbs`).
+    lap : float, optional
+        As in `Cylindrical`.
 
     Raises
     ------
@@ -63,18 +65,19 @@ class Composite(AnimationMap):
         upper_joints: Sequence[int],
         r_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
+        lap: float | None = None,
     ) -> None:
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
         self.r_range, self.upper_joints = r_range, tuple(upper_joints)
         numbers = checked_interval("r_range", r_range, 1e-3)
-        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs)
+        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs, lap)
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
-        return numbers | clip_arrays(self.clips, self.names, self.limbs)
+        return numbers | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Composite":
@@ -90,4 +93,5 @@ class Composite(AnimationMap):
             raise ParameterError(f"a composite map has {_CLIPS} clips and joints, got {len(clips)} and {joints}")
         lower, red, blue = clips
         r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
-        return Composite(lower, red, blue, [int(joint) for joint in joints], (r_low, r_high), kept_limbs(arrays))
+        upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
+        return Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays))

@@ -11,7 +11,7 @@ from controllers.blending.blend import blend_corrected
 from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
 from controllers.curves.cylinder import blend_weight, checked_interval, cylinder, eased
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap
+from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.clearance import cleared
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
@@ -21,7 +21,7 @@ from controllers.state import Array
 
 CYLINDRICAL = 1
 _CLIPS = 4
-_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _TABLE_SIZE, _TABLE = range(6)
+_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _TABLE_SIZE, _TABLE = range(7)
 _NODES = 13  # of the corrections' table, across the blend each way
 _BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
 _EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
@@ -35,11 +35,13 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     radius, angle = cylinder(x, chain)
     a, a_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     b, b_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX])
-    weights, changes = np.empty((1, _CLIPS)), np.zeros((1, 3, _CLIPS))
+    last = int(params[_OWN_LEGS])
+    weights, changes = np.zeros((1 + last, _CLIPS)), np.zeros((1 + last, 3, _CLIPS))
+    weights[0, 0] = 1.0
     for i in range(_CLIPS):
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
-        weights[0, i], changes[0, 1, i], changes[0, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
+        weights[last, i], changes[last, 1, i], changes[last, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
     size = int(params[_TABLE_SIZE])
     d = np.empty((4, 0))
     if size > 0:
@@ -76,6 +78,9 @@ class Cylindrical(AnimationMap):
     are blended is told in `blending`. With limbs, in-betweens are corrected by a table (`inbetween`): ends move while
     they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
 
+    Clips that step differently have no mean that steps: a foot that one of them plants, another one lifts. With `upper`
+    joints only these are blended; root and legs are those of the first clip everywhere, and so are its feet.
+
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
     the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
     continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
@@ -92,7 +97,11 @@ class Cylindrical(AnimationMap):
     limbs : sequence of Limb
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
     corrections : Array, shape (n, k, 2 + 4 limbs), optional
-        What a map of the same clips and limbs has as its `corrections`, which then need not be found again.
+        What a map of the same clips, limbs and lap has as its `corrections`, which then need not be found again.
+    lap : float, optional
+        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+    upper : sequence of int
+        Joints that alone are blended, counted from 1; by default all.
 
     Attributes
     ----------
@@ -116,6 +125,8 @@ class Cylindrical(AnimationMap):
         z_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
         corrections: Array | None = None,
+        lap: float | None = None,
+        upper: Sequence[int] = (),
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -123,7 +134,9 @@ class Cylindrical(AnimationMap):
             )
         self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, 0.0), (), limbs)
+        self.upper = tuple(upper)
+        legs = float(len(self.upper) > 0)
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap)
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
@@ -132,7 +145,9 @@ class Cylindrical(AnimationMap):
             self._correct(self._found(limbs) if corrections is None else corrections)
 
     def _found(self, limbs: Sequence[Limb]) -> Array:
-        rows = int(np.clip(max(len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
+        if self.upper:
+            return np.zeros((_ROWS, *correction_shape(len(limbs))))
+        rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _ROWS))
         channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
         found = foot_corrections(channels, self.drifts, limbs, self.mixtures)
         share = interpolation(_NODES, np.linspace(0.0, 1.0, _BETWEEN))
@@ -144,6 +159,13 @@ class Cylindrical(AnimationMap):
         blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
         self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
         self.corrections = values
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Whether only some joints are blended."""
+        if not self.upper:
+            return ()
+        return ("the clips move differently: a mean of them is no motion, so legs and trunk are the first clip's",)
 
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
@@ -172,9 +194,11 @@ class Cylindrical(AnimationMap):
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         arrays = {"domain": np.array([self.r_range, self.z_range])}
+        if self.upper:
+            arrays["upper_joints"] = np.array(self.upper, dtype=np.float64)
         if self.limbs:
             arrays["corrections"] = self.corrections
-        return arrays | clip_arrays(self.clips, self.names, self.limbs)
+        return arrays | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Cylindrical":
@@ -189,4 +213,10 @@ class Cylindrical(AnimationMap):
         limbs, corrections = kept_limbs(arrays), None
         if limbs:
             corrections = kept(arrays, "corrections", (None, *correction_shape(len(limbs))))
-        return Cylindrical(kept_clips(arrays), (r_low, r_high), (z_low, z_high), limbs, corrections)
+        upper = kept(arrays, "upper_joints", (None,)) if "upper_joints" in arrays else np.zeros(0)
+        if not np.isfinite(upper).all():
+            raise ParameterError(f"'upper_joints' of the map must be finite, got {upper}")
+        clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
+        return Cylindrical(
+            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints
+        )  # fmt: skip

@@ -192,6 +192,8 @@ class RiverClips(AnimationMap):
         Distance from a curve [m] within which a branch is followed; beyond it the nearest point of all counts.
     limbs : sequence of Limb
         Limbs whose ends are placed: feet that stand (see `limbs`).
+    lap : float, optional
+        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
 
     Raises
     ------
@@ -206,6 +208,7 @@ class RiverClips(AnimationMap):
         clips: Sequence[tuple[Array, float]],
         tube: float,
         limbs: Sequence[Limb] = (),
+        lap: float | None = None,
     ) -> None:
         if len(clips) != len(curves) or not curves:
             raise ParameterError(
@@ -217,7 +220,7 @@ class RiverClips(AnimationMap):
         if not tube > 0.0:
             raise ParameterError(f"the tube of a map of rivers must be positive, got {tube} m")
         self.curves, self._tube = tuple(curves), tube
-        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs)
+        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs, lap)
 
     def _header(self, rests: Sequence[Array]) -> Array:
         """What the kernel reads before the blend."""

@@ -18,6 +18,9 @@ from controllers.state import Array
 _STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # a lap that ends so near to its start is meant to return
 _UPRIGHT = 0.3  # least vertical component of the pelvis axis at which its turning about the vertical counts
 _SEAM = 0.2  # share of the lap at each end that the closing of an open clip may change
+_CLOSES = 0.01  # [rad], [m] by which the ends of a closed clip may differ
+_MOVES, _GOES = 1.5, 0.6  # [rad/s] RMS of the joints, [m/s] of the root, from which an end is in the middle of a motion
+_BRAKES = 0.15  # [s] of an open clip at each end that are played ever slower, in twice the time
 
 
 def plane_exponential(twist: Array) -> tuple[Array, Array]:
@@ -190,12 +193,44 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
     return placed
 
 
+def there_and_back(poses: Array, fps: float) -> Array:
+    r"""A clip that is open and (nearly) rests at both ends, followed by itself backwards; any other one as it is.
+
+    q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with
+    the same torques and contact forces it is as feasible, its flights as ballistic, and its feet stand where they
+    stood. What still moves at an end is brought to rest there: the last 0.15 s are played at a pace that falls to 0.
+    """
+    first, last = poses[0], poses[-1]
+    signs = np.sign(np.einsum("jx,jx->j", first[3:].reshape(-1, 4), last[3:].reshape(-1, 4)))
+    turned_away = np.abs(last[7:].reshape(-1, 4) - signs[1:, None] * first[7:].reshape(-1, 4)).max(initial=0.0)
+    if turned_away < _CLOSES and abs(last[2] - first[2]) < _CLOSES:
+        return poses
+    for step in (poses[1] - first, last - poses[-2]):
+        joints = 2.0 * fps * np.linalg.norm(step[3:].reshape(-1, 4), axis=1)
+        if np.sqrt(np.mean(joints**2)) > _MOVES or fps * np.linalg.norm(step[:3]) > _GOES:
+            return poses
+    seconds = (len(poses) - 1) / fps
+    brakes = min(_BRAKES, 0.25 * seconds)
+    # Own time u of what goes on at a pace of 1 after 2 brakes of rising pace: u = t²/(4 brakes) first.
+    times = np.linspace(0.0, seconds + 2.0 * brakes, int(np.ceil((seconds + 2.0 * brakes) * fps)) + 1)
+    rest = times[-1] - times
+    own = np.where(times < 2.0 * brakes, times**2 / (4.0 * brakes), times - brakes)
+    own = np.where(rest < 2.0 * brakes, seconds - rest**2 / (4.0 * brakes), own)
+    slow = CubicSpline(np.arange(len(poses)) / fps, poses)(np.clip(own, 0.0, seconds))
+    turns = slow[:, 3:].reshape(len(slow), -1, 4)
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    slow[:, 3:] = turns.reshape(len(slow), -1)
+    return np.concatenate([slow, slow[-2::-1]])
+
+
 def closed_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip of poses (n, nq) that passed `checked_clip`, moved to the origin and facing +x on average.
 
-    A clip that does not close by itself is made to: over the first and last fifth of the lap its ends are led half
-    way to each other by quintics, so that value, slope and second derivative meet.
+    An open clip that about rests at both ends is played there and back (`there_and_back`). Another one that does not
+    close by itself is made to: over the first and last fifth of the lap its ends are led half way to each other by
+    quintics, so that value, slope and second derivative meet.
     """
+    poses = there_and_back(poses, fps)
     s = np.linspace(0.0, 1.0, len(poses))
     placed = placed_at_origin(poses, s)
     drift = drift_of(placed)

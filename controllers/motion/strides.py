@@ -1,19 +1,27 @@
-"""Travelling clips in step: each takes as many strides a lap as the first of them.
+r"""How often a lap plays each clip: travelling clips in step with each other, all near their own pace.
 
-A walk of two strides and a run of three have no phase in common but at the lap's ends. A loop that repeats itself
-exactly can be played round by any number of its repeats: it stays closed, and its drift and time are in proportion.
+A walk of two strides and a run of three have no phase in common but at the lap's ends, and a jog of 0.8 s beside a
+dance of 4 s would be played five times too slowly: its flights would ask for a 25th of gravity. A loop can be played
+round any number of times: it stays closed, and its drift and time are in proportion. So with d_i the time of a clip,
+s_i its strides and T the time of the lap, clip i is played k_i / s_i times,
+
+.. math:: k = \arg\min_k \max_i \left|\log \frac{k\,d_i}{s_i\,T}\right|
+
+over all that travel, which so take as many strides, and k_i likewise of each other clip alone (s_i = 1).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from controllers.motion.loops import Loop
-from controllers.state import IntArray
+from controllers.state import Array, IntArray
 
 _SAMPLES = 128
 _MOST = 12  # repeats looked for in a clip
 _SAME = 1e-3  # by which lengths [m] and components of rotations may differ from one repeat to the next
+_FURTHEST = 0.3  # [m] a lap that goes less far is no gait
 
 
 def strides(loop: Loop) -> int:
@@ -32,12 +40,53 @@ def strides(loop: Loop) -> int:
     return 1
 
 
-def in_step(loops: list[Loop]) -> list[Loop]:
-    """The loops, those that travel and repeat themselves with as many strides a lap as the first of those."""
+def in_step(loops: Sequence[Loop], lap: float | None = None) -> list[Loop]:
+    """The loops, each played as often as it fits a lap.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        Clips as closed loops.
+    lap : float, optional
+        T [s]. Without it clips are played once, and those that travel and repeat themselves with as many strides as the
+        first of them.
+    """
     counts = [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
-    wanted = next((count for count in counts if count > 1), 1)
-    shares = [wanted / count if count > 1 else 1.0 for count in counts]
+    if lap is None:
+        wanted = next((count for count in counts if count > 1), 1)
+        shares = [wanted / count if count > 1 else 1.0 for count in counts]
+    else:
+        travels = [float(np.hypot(*loop.drift[:2])) > _FURTHEST for loop in loops]
+        durations = np.array([loop.duration / count for loop, count in zip(loops, counts, strict=True)])
+        common = _times(durations[travels], lap) if any(travels) else 1
+        shares = [
+            common / count if goes else float(_times(np.array([loop.duration]), lap))
+            for loop, count, goes in zip(loops, counts, travels, strict=True)
+        ]
     return [
         replace(loop, drift=share * loop.drift, duration=share * loop.duration, share=share)
         for loop, share in zip(loops, shares, strict=True)
     ]
+
+
+def _times(durations: Array, lap: float) -> int:
+    """How often what lasts so long [s] (n,) fits a lap [s], the worst of them best."""
+    logs = np.log(durations / lap)
+    first = max(1, int(np.exp(-logs.max())))
+    ways = np.arange(first, int(np.exp(-logs.min())) + 2)
+    return int(ways[np.abs(np.log(ways)[:, None] + logs).max(axis=1).argmin()])
+
+
+def natural_lap(loops: Sequence[Loop], shortest: float = 3.0, longest: float = 6.0) -> float:
+    """Time of a lap [s] in which loops that are played `in_step` are all as near to their own pace as can be.
+
+    Tried are times from the shortest to the longest, or that of the longest loop, 2 % apart; of those within 2 % of
+    the best the shortest is taken. A lap of several short cycles leaves a hand the time of all of them to change the
+    blend. The first loop, whose legs may be those of the whole blend, counts thrice.
+    """
+    longest = max(longest, *(loop.duration for loop in loops))
+    laps = shortest * 1.02 ** np.arange(int(np.log(longest / shortest) / np.log(1.02)) + 1)
+    counts = np.append(3.0, np.ones(len(loops) - 1))
+    paces = np.array([[loop.duration / lap for loop in in_step(loops, float(lap))] for lap in laps])
+    worst = (counts * np.abs(np.log(paces))).max(axis=1)
+    return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

@@ -158,7 +158,8 @@ def judge_reading(
                 faults[_FRESH] = t
             if faults[_STARTED] == 0.0:
                 faults[FAULT_RAMP] = 0.0
-            if t - faults[_FRESH] > faults[_SILENCE]:
+            # In whole periods: five times one is not always five.
+            if t - faults[_FRESH] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
                 latch(faults, READING_STALE, t, t - faults[_FRESH])
             return HELD
         faults[_SEQUENCE], faults[_FRESH] = sequence, t

@@ -17,6 +17,7 @@ are counted, which needs no window and no transform.
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from controllers.errors import ParameterError
@@ -121,3 +122,26 @@ class OscillationDetector:
         memory = np.zeros(OSCILLATION_SIZE)
         memory[OSCILLATION_GAIN] = 1.0
         return memory
+
+
+def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> npt.NDArray[np.bool_]:
+    """At which of the ticks of a recorded force the detector finds a loop shaking, its gain left at 1.
+
+    Parameters
+    ----------
+    detector : OscillationDetector
+        What counts.
+    force : Array, shape (n, 3)
+        At the hand [N].
+    memory : list of float
+        `fresh_memory` as a list, written, for what comes in blocks.
+    """
+    params = detector.params()
+    params[_DOWN], params[_UP], params[_LONGEST] = 1.0, 0.0, np.inf
+    # Plain numbers: the compiled law would cost a second of compilation for a tenth of a second of work.
+    given, step = params.tolist(), oscillation_gain.py_func
+    found = np.zeros(len(force), dtype=np.bool_)
+    for k, row in enumerate(force.tolist()):
+        step(given, memory, row)
+        found[k] = memory[OSCILLATION_COUNT] > given[_MOST]
+    return found

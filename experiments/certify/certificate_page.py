@@ -2,19 +2,23 @@
 
 from collections.abc import Mapping
 from html import escape
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.certificates.flight.tolerance import GRAVITY
+from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
+from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
 
 Array = npt.NDArray[np.float64]
 
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
+_SHORT = 12  # numbers of an array that are told
 _RATES = (0.25, 4.0)  # that the picture of admissible rates shows
 
 
@@ -99,15 +103,42 @@ def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
         f"<h1>Certificate</h1><p><small>inputs {escape(certificate.inputs)}</small></p>",
     ]
     for name, verdict in certificate.verdicts.items():
-        numbers = {key: value for key, value in verdict.figures.items() if isinstance(value, float)}
-        rows = "".join(f"<tr><td>{escape(key)}</td><td>{value:.5g}</td></tr>" for key, value in numbers.items())
         margin = "" if verdict.margin is None else f" <small>margin {verdict.margin:.4g}</small>"
         parts.append(
             f"<h2>{escape(name)}: <span style='color:{_COLOURS[verdict.verdict]}'>{verdict.verdict}</span>{margin}</h2>"
             f"<p>{escape(verdict.reason)}</p><ul>{''.join(f'<li>{escape(a)}</li>' for a in verdict.assumptions)}</ul>"
-            f"<table>{rows}</table>"
+            f"{_table(verdict.figures)}"
         )
         if verdict.counterexample:
-            parts.append(f"<p>Counterexample: <code>{escape(str(dict(verdict.counterexample)))}</code></p>")
+            parts.append(f"<p>Counterexample:</p>{_table(verdict.counterexample)}")
     parts += [f"<img src='{escape(file)}' alt='{escape(shows)}'>" for file, shows in plots.items()]
     return "\n".join(parts)
+
+
+def _table(numbers: Mapping[str, object]) -> str:
+    """Numbers by what they are, with units; arrays that are long are in certificate.json only."""
+    rows: list[str] = []
+    for key, value in numbers.items():
+        name, unit = WORDS.get(key, (key.replace("_", " "), ""))
+        told = _told(value)
+        if told:
+            rows.append(f"<tr><td>{escape(name)}</td><td>{escape(told)} {escape(unit)}</td></tr>")
+    return f"<table>{''.join(rows)}</table>" if rows else ""
+
+
+def _told(value: object) -> str:
+    """A number, a short array or a hand in words; nothing of what is too long to read."""
+    if isinstance(value, bool | str | int):
+        return str(value)
+    if isinstance(value, float | np.floating):
+        return f"{float(value):.4g}" if np.isfinite(value) else "without bound"
+    if isinstance(value, HandImpedance):
+        return str(value)
+    if isinstance(value, Mapping):
+        entries = cast(Mapping[str, object], value)
+        return ", ".join(f"{name}: {_told(item)}" for name, item in entries.items())
+    if isinstance(value, np.ndarray | list | tuple):
+        array = np.asarray(cast(npt.ArrayLike, value))
+        if array.dtype.kind in "fiu" and 0 < array.size <= _SHORT:
+            return ", ".join(f"{number:.4g}" for number in array.ravel().tolist())
+    return ""

@@ -11,15 +11,22 @@ from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
 from experiments.results.folder import RECORDING, clips_of, config_of
+from experiments.results.measures import SETTLING
 from experiments.setups.clips import load_clips
 from models.mocap.clip import Clip
 from sim.recording.recording import Recording
 
+PLAYED = "as played"
+_PACE = "clips are judged at their own pace, what a run played as it was played, its first second left out"
+_FPS = 125.0  # of an animation that was played, as it is judged [1/s]
+_LONGEST = 120.0  # [s] of it
 _ORDER = ("refuted", "unknown", "certified")
 
 
 def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tuple[Clip, ...]]:
-    """Configuration and clips of a recorded run; else this configuration, and the clips of its map's file or led.
+    """Configuration and clips of a recorded run, its animation as it was played the last of them.
+
+    Else this configuration, and the clips of its map's file or those that it names.
 
     Raises
     ------
@@ -28,18 +35,31 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
     """
     if folder is not None:
         with Recording(folder / RECORDING) as recording:
-            return config_of(recording), clips_of(recording)
+            return config_of(recording), (*clips_of(recording), *played(recording))
     if isinstance(config.map, MapFile):
         return config, load_figure_map(Path(config.map.file))[1]
     return config, load_clips(config.map.clips, config.map.raw)[0]
 
 
+def played(recording: Recording) -> tuple[Clip, ...]:
+    """The animation of a recorded run, at the pace at which it was played and with all that the hand did; if any."""
+    if "reference" not in recording.groups["frames"]:
+        return ()
+    rate = recording.rates["frames"]
+    stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_LONGEST * rate)
+    poses = recording.channel("frames", "reference")[first:last:stride]
+    return (Clip(poses, rate / stride, PLAYED),) if len(poses) > 1 else ()
+
+
 def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:
-    """Verdicts ``ballistic`` and ``turns`` on clips together: the worst of them, which is named, and all in figures."""
+    """Verdicts ``ballistic`` and ``turns`` on clips together: the worst of them, and that of each by its name."""
     found = [(clip.name, clip_ballistics(clip, judging).certificate.verdicts) for clip in clips]
     told: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(((name, of[kind]) for name, of in found), key=lambda pair: _ORDER.index(pair[1].verdict))
         each = {name: of[kind].verdict for name, of in found}
-        told[kind] = replace(worst, reason=f"{name}: {worst.reason}", figures={**worst.figures, "clips": each})
+        listed = ", ".join(f"{clip} {known}" for clip, known in each.items())
+        reason = f"{name}: {worst.reason}" + (f"; each: {listed}" if len(each) > 1 else "")
+        assumptions = (*worst.assumptions, _PACE) if PLAYED not in each or len(each) > 1 else worst.assumptions
+        told[kind] = replace(worst, reason=reason, assumptions=assumptions, figures={**worst.figures, "clips": each})
     return told

@@ -44,7 +44,7 @@ def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
 def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile) -> dict[str, Trajectory]:
     from experiments.setups.pace import course_of
 
-    circle = Trajectory.circle(part.around.radius, part.around.lap)
+    circle = Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)
     return {"": circle if isinstance(config.mode, Rivers) else course_of(circle, leading_drag(config))}
 
 

@@ -79,7 +79,7 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
             verdicts["energy" + name] = energy(river, push, ceiling)
     if drag > 0.0:
         for name in verdicts:
-            if name.startswith(("energy", "region")):
+            if name.startswith(("energy", "region")) and verdicts[name].verdict != "refuted":
                 verdicts[name] = leaving_out(verdicts[name], ("the governor (--governor)",))
     return verdicts
 

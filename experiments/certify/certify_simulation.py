@@ -98,13 +98,15 @@ def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]
         assumed += ("the critical gain is one by which the whole field is scaled, laws of one's own included",)
     law, curve = parts.leading, parts.leading.curve
     if isinstance(law, Follow):
-        base, width = FOLLOW_LAW, law.epsilon
+        base, (k_r, b_d, width) = FOLLOW_LAW, (law.k_r, law.b_d, law.epsilon)
     else:
-        # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
-        base, width = (BUNNY_LAW, law.delta) if law.attraction == "point" else (FOLLOW_LAW, float("inf"))
+        base, (k_r, b_d, width) = BUNNY_LAW, law.felt
+        if law.attraction == "along":
+            # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
+            base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
     device = phantom_device(linkage_of(sim.device))
-    made = River(with_added(base, parts.added, law.k_r), law.k_r, law.b_d, width, curve, device, sampling)
+    made = River(with_added(base, parts.added, k_r), k_r, b_d, width, curve, device, sampling)
     return made, parts.drag, assumed
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from controllers.certificates.loop.executed import Seen, looked_at
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import River
@@ -14,6 +16,9 @@ from experiments.setups.parts import Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.mocap.clip import Clip
 from sim.world.world import World
+
+NEAR = 0.2  # of the map's reach: as far off the curve as pushes bring a hand
+FAST = 2.0  # times the curve's own pace: a hand that pushes on, at the edge of the map
 
 
 def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
@@ -35,14 +40,23 @@ def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, c
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
     """An unknown verdict on a program, refuted if it is unstable at some state about the curve of `main`."""
-    found = looked_at(program, main, reach, hands.hands())
+    found = looked_at(program, main, NEAR * reach, hands.hands())
+    far = looked_at(program, main, reach, hands.hands(), FAST)
     figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": found.strongest}
     if found.radius >= 1.0:
-        reason = f"unstable, by a factor of {found.radius:.4g} a period at phase {found.phase:.3g} s; {verdict.reason}"
+        speed = float(np.linalg.norm(found.v))
+        reason = (
+            f"unstable, by a factor of {found.radius:.4g} a period, for a hand at phase {found.phase:.3g} s with "
+            f"{speed:.3g} m/s; {verdict.reason}"
+        )
         return Verdict("refuted", reason, None, verdict.assumptions, _example(found), figures)
     peak = ForceLimiter(main.sampling.period).peak
     cut = f", its force up to {found.strongest:.3g} N, which the limiter cuts" if found.strongest > peak else ""
     told = f"stable at each of {found.states} states of the program that were looked at{cut}"
+    if far.radius >= 1.0:
+        off = 1e3 * float(np.linalg.norm(far.p - main.curve.point(far.phase)))
+        speed = float(np.linalg.norm(far.v))
+        told += f", but not for a hand {off:.0f} mm off the curve at phase {far.phase:.3g} s with {speed:.3g} m/s"
     return replace(verdict, reason=f"{verdict.reason}; {told}", figures=figures)
 
 

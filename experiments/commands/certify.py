@@ -80,12 +80,10 @@ class Command:
 
     def _what(self) -> tuple[RunConfig, tuple[Clip, ...]]:
         """The field, and the clips that are certified with it; gains alone have none."""
-        from experiments.setups.certified_law import governor_drag, left_out
+        from experiments.setups.certified_law import of_clips
 
         config = config_of_options(self.options)
-        # A governor and walls are made of the clips.
-        of_clips = config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
-        if self.run is None and not of_clips:
+        if self.run is None and not of_clips(config):
             return config, ()
         from experiments.certify.certified_clips import run_and_clips
 

@@ -21,5 +21,5 @@ class Command:
 
         with working("drawing the report"):
             lines = finish(self.folder)
-        print("\n".join(lines))
+        print("\n".join([*lines, f"Written: {self.folder / 'report.html'}; open it in a browser."]))
         return 0

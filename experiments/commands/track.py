@@ -4,7 +4,7 @@ from typing import Annotated
 
 from tyro.conf import Positional
 
-from experiments.config.part import above, part
+from experiments.config.part import above, at_least, part
 from experiments.saying import Json, say
 
 
@@ -18,12 +18,16 @@ class Command:
     """Simulated time for each [s]."""
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
+    residual_force: Annotated[float, at_least(0.0)] = 0.1
+    """Largest force at the root beside ground and joints, as a share of body weight."""
+    residual_moment: Annotated[float, at_least(0.0)] = 0.02
+    """Largest such moment, as a share of body weight × stature."""
     json: Json = False
 
     def __call__(self) -> int:
         """Track."""
         from experiments.track import track_clips
 
-        reports = track_clips(self.clips, self.seconds, self.raw)
+        reports = track_clips(self.clips, self.seconds, self.raw, (self.residual_force, self.residual_moment))
         say(reports, self.json, [f"{name}: {report}" for name, report in reports.items()])
         return 0

@@ -18,7 +18,7 @@ class Command:
     seed: Annotated[int, whole(0)] = 8
     """Of the population and of its noise."""
     laws: tuple[str, ...] = ()
-    """fitts, scatter, steering, power-law, tremor, step-response, grip; all by default."""
+    """fitts, scatter, steering, power-law, tremor, step-response, grip, practice, endurance; all by default."""
     overwrite: bool = False
     """Replace the table that the folder holds."""
     json: Json = False

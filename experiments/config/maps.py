@@ -17,10 +17,13 @@ class Circle:
         Time of a lap [s]; in less than a tenth of a second no hand goes round.
     radius : float
         Of the circle [m].
+    wave : float
+        How far it goes up and down, three times a lap, so that every joint of the device turns [m].
     """
 
     lap: float = at_least(0.1, default=4.0, unit="s")
     radius: float = above(0.0, default=0.0477, unit="m")
+    wave: float = at_least(0.0, default=0.0, unit="m")
 
 
 @part

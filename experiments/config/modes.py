@@ -94,8 +94,8 @@ class Bunny:
         b_d [N s/m].
     bunny_width : float
         δ of its Gaussian [m].
-    bunny_attraction : {"point", "along"}
-        To the bunny itself, or to the curve beside the hand.
+    bunny_attraction : {"point", "along", "convolution"}
+        To the bunny itself, or to the curve beside the hand; or to the bunny as the paper writes it, convolved.
     bunny_pace : {"clock", "wait"}
         Whether it keeps the clock's pace, or waits for the hand.
     orientation, governor, walls
@@ -106,7 +106,7 @@ class Bunny:
     stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)
     damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPED)
     bunny_width: float = at_least(1e-4, default=0.05, unit="m")
-    bunny_attraction: Literal["point", "along"] = "point"
+    bunny_attraction: Literal["point", "along", "convolution"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
     orientation: OrientationMoment | None = None
     governor: SpeedGovernor | None = None
@@ -154,6 +154,9 @@ class Stretch:
         k_s of a held or pushed tube [N/m].
     tube_damping : float, optional
         Of the search and of the tube [N s/m]; by default 14, and 20 on a map from a file.
+    rubber_from : {"curve", "stylus"}
+        Where a held tube pulls to: the point of the curve that was taken hold of, or, as in the paper, the place of the
+        stylus when it did so.
     rubber_tube : float
         Radius of the tube that can be held and pushed [m].
     bump : float
@@ -166,6 +169,7 @@ class Stretch:
     seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
     rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
     tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
     walls: JointWalls | None = None
@@ -177,7 +181,7 @@ class StretchThenFollow:
 
     Parameters
     ----------
-    seek, rubber, tube_damping, rubber_tube, bump
+    seek, rubber, tube_damping, rubber_from, rubber_tube, bump
         As in `Stretch`.
     stiffness, damping, tube
         Of the performance, as in `Follow`.
@@ -189,6 +193,7 @@ class StretchThenFollow:
     seek: float | None = at_least(0.0, default=None, unit="N/m", most=STIFFEST)
     rubber: float = at_least(0.0, default=150.0, unit="N/m", most=STIFFEST)
     tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPED)
+    rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
     stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=STIFFEST)

@@ -303,5 +303,5 @@ def words_of(config: RunConfig) -> dict[str, object]:
         words["map"] = config.map.file
     around = getattr(config.map, "around", None)
     if around is not None:
-        words |= {"lap": around.lap, "radius": around.radius}
+        words |= {"lap": around.lap, "radius": around.radius, "wave": around.wave}
     return words

@@ -15,13 +15,14 @@ from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.clip import Clip
 from models.mocap.library import Loaded, load
-from sim.viewer.shapes import body_shapes
+from sim.viewer.shapes import body_shapes, coarser
 
 Array = npt.NDArray[np.float64]
 
 _TO_FILE = [1, 2, 0]
-_FLOAT, _UNSIGNED_BYTE, _UNSIGNED_INT = 5126, 5121, 5125
+_FLOAT, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT = 5126, 5121, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
+_CELL = 0.003  # [m] no detail of a body is finer: half the vertices, and no difference to be seen
 
 
 class _Buffer:
@@ -30,9 +31,11 @@ class _Buffer:
     def __init__(self, library: Any, document: Any):
         self._library, self._document, self._bytes = library, document, bytearray()
 
-    def add(self, values: npt.ArrayLike, kind: str, component: int, target: int | None = None) -> int:
-        """Append rows of numbers; returns the number of their accessor."""
-        dtype = {_FLOAT: "<f4", _UNSIGNED_BYTE: "u1", _UNSIGNED_INT: "<u4"}[component]
+    def add(
+        self, values: npt.ArrayLike, kind: str, component: int, target: int | None = None, shares: bool = False
+    ) -> int:
+        """Append rows of numbers, or of shares as whole numbers of the largest one; the number of their accessor."""
+        dtype = {_FLOAT: "<f4", _UNSIGNED_BYTE: "u1", _UNSIGNED_SHORT: "<u2", _UNSIGNED_INT: "<u4"}[component]
         rows = np.ascontiguousarray(values, dtype=dtype)
         raw = rows.tobytes()
         self._document.bufferViews.append(
@@ -45,7 +48,7 @@ class _Buffer:
         self._document.accessors.append(
             self._library.Accessor(
                 bufferView=len(self._document.bufferViews) - 1, componentType=component, count=len(rows), type=kind,
-                **bounds,
+                normalized=shares, **bounds,
             )
         )  # fmt: skip
         self._bytes += raw + b"\0" * (-len(raw) % 4)
@@ -114,7 +117,7 @@ def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjMode
     """A mesh of all that is seen of the figure at rest; each vertex goes with one joint."""
     bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
     by_color: dict[tuple[float, ...], list[tuple[int, Array, npt.NDArray[np.int64]]]] = {}
-    for shape in body_shapes(model, ""):
+    for shape in coarser(body_shapes(model, ""), _CELL):
         by_color.setdefault(shape.rgba, []).append((bodies[shape.body], shape.vertices, shape.faces))
     primitives: list[Any] = []
     for color, shapes in by_color.items():
@@ -122,14 +125,15 @@ def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjMode
         points = np.concatenate([vertices + rest[joint] for joint, vertices, _ in shapes])[:, _TO_FILE]
         joints = np.zeros((len(points), 4))
         joints[:, 0] = np.concatenate([np.full(len(vertices), joint) for joint, vertices, _ in shapes])
-        weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+        weights = np.tile([255, 0, 0, 0], (len(points), 1))
         faces = np.concatenate([faces + start for (_, _, faces), start in zip(shapes, first[:-1], strict=True)])
         attributes = library.Attributes(
             POSITION=buffer.add(points, "VEC3", _FLOAT, _VERTICES),
             JOINTS_0=buffer.add(joints, "VEC4", _UNSIGNED_BYTE, _VERTICES),
-            WEIGHTS_0=buffer.add(weights, "VEC4", _FLOAT, _VERTICES),
+            WEIGHTS_0=buffer.add(weights, "VEC4", _UNSIGNED_BYTE, _VERTICES, shares=True),
         )
-        indices = buffer.add(faces.ravel(), "SCALAR", _UNSIGNED_INT, _INDICES)
+        whole = _UNSIGNED_SHORT if len(points) < 0xFFFF else _UNSIGNED_INT
+        indices = buffer.add(faces.ravel(), "SCALAR", whole, _INDICES)
         linear = [share**2.2 for share in color[:3]]  # glTF's colours are linear
         document.materials.append(
             library.Material(

@@ -14,6 +14,7 @@ from controllers.certificates.flight.ballistic import (
     ballistic_verdict,
     judge_flights,
 )
+from controllers.certificates.flight.contact import BodyContact, contact_doubts
 from controllers.certificates.flight.flight_fit import FlightFit, best_fall
 from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
@@ -24,6 +25,7 @@ from models.mocap import quaternions
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
+from models.mocap.preparation.poses import sole_points
 from sim.body.clip_motion import clip_motion
 from sim.body.tracking import TrackingConfig, tracked_motion
 
@@ -107,6 +109,22 @@ def body_motion(clip: Clip) -> BodyMotion:
     return BodyMotion(clip.fps, *moved, touched.clearance, touched.supported)
 
 
+def body_contact(clip: Clip) -> BodyContact:
+    """What of a clip touches the floor, and how."""
+    touched, points = contacts(clip), sole_points(clip.poses)
+    travelled = [0.0]
+    for part in range(points.shape[1]):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], touched.resting[:, part].astype(np.int8), [0]])))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            stance = points[start:end, part, :2]
+            travelled.append(float(np.linalg.norm(stance - np.median(stance, axis=0), axis=1).max()))
+    turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)
+    return BodyContact(
+        touched.clearance, touched.supported, touched.resting.any(axis=1), max(travelled),
+        np.linalg.norm(turns, axis=2).max(axis=1, initial=0.0),
+    )  # fmt: skip
+
+
 def clip_ballistics(
     clip: Clip,
     judging: Judging = JUDGING,
@@ -123,7 +141,8 @@ def clip_ballistics(
         first, last = int(np.argmax(motion.supported)), clip.n_frames - 1
         flights = tuple(flight for flight in flights if first <= flight.fit.start < last)
     bounds = rate_bounds(motion, flights, judging.friction)
-    verdict = ballistic_verdict(motion, flights, judging.tolerance)
+    doubts, measures = contact_doubts(body_contact(laps), motion.com, laps.fps, judging.contact)
+    verdict = ballistic_verdict(motion, flights, judging.tolerance, doubts, measures)
     if verdict.verdict == "refuted":
         verdict = _with_initial_state(verdict, laps, flights)
     verdict = replace(verdict, assumptions=(*verdict.assumptions, *assumptions))

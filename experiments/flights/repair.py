@@ -6,10 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
+from experiments.flights.conserved import with_constant_momentum
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
@@ -22,6 +24,8 @@ from sim.body.clip_motion import clip_motion
 Array = npt.NDArray[np.float64]
 
 _AROUND = 1.0  # what may change before the first refuted flight and after the last one [s]
+_SINKS = 0.01  # [m] of the floor that captures miss
+_LIFTING = 0.1  # [s] in which a lift comes and goes
 _RELEASE = 0.1  # in which a foot that leaves the floor takes over the move of the body [s]
 
 
@@ -46,12 +50,17 @@ class Repaired(NamedTuple):
     def lines(self) -> tuple[str, ...]:
         """What was done, a line each."""
         verdicts = [b.certificate.verdicts["ballistic"] for b in (self.before, self.after)]
-        if self.plan is None:
+        if self.plan is None and self.before is self.after:
             return (f"nothing to repair: {verdicts[0].verdict}; {verdicts[0].reason}",)
-        longest = 100.0 * float(np.linalg.norm(self.plan.shift, axis=1).max())
-        return (
+        lines = (
             f"before: {verdicts[0].verdict}; {verdicts[0].reason}",
             f"after: {verdicts[1].verdict}; {verdicts[1].reason}",
+        )
+        if self.plan is None:
+            return (*lines, "lifted out of the floor; no flight had to be changed")
+        longest = 100.0 * float(np.linalg.norm(self.plan.shift, axis=1).max())
+        return (
+            *lines,
             f"lasts {self.clip.duration:.2f} s instead of {self.before.seconds:.2f} s; "
             f"the body moves by up to {longest:.1f} cm; {self.plan.iterations} iterations",
         )
@@ -82,19 +91,22 @@ def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired
 
 
 def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
-    """The nearest motion whose flights fall with g, contacts kept; a clip without refuted flights stays as it is.
+    """The nearest motion over the floor whose flights fall with g and keep their angular momentum, contacts kept.
+
+    A clip without refuted flights that is nowhere below the floor stays as it is.
 
     Raises
     ------
     RepairError
         If there is no feasible motion near it.
     """
-    before = clip_ballistics(clip, judging)
+    before, lifted = clip_ballistics(clip, judging), over_the_floor(clip)
     n, closed = clip.n_frames, clip.closes()
-    spans = [(f.fit.start, f.fit.end) for f in before.flights if f.verdict != "unknown" and f.fit.end < n]
-    refuted = [f.fit for f in before.flights if f.verdict == "refuted" and f.fit.end < n]
+    found, clip = before if lifted is clip else clip_ballistics(lifted, judging), lifted
+    spans = [(f.fit.start, f.fit.end) for f in found.flights if f.verdict != "unknown" and f.fit.end < n]
+    refuted = [f.fit for f in found.flights if f.verdict == "refuted" and f.fit.end < n]
     if not refuted:
-        return Repaired(clip, before, before, None)
+        return Repaired(clip, before, found, None)
     around = round(_AROUND * clip.fps)
     first = max(0, min(fit.start for fit in refuted) - around)
     last = min(n - 1, max(fit.end for fit in refuted) + around)
@@ -110,7 +122,7 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
             standing=touching.standing[window], leg_length=leg, held=(closed or first > 0, closed or last < n - 1),
         )
     )  # fmt: skip
-    done = _carried_out(clip, plan, first, touched, touching.standing)
+    done = over_the_floor(_carried_out(clip, plan, first, touched, touching.standing))
     return Repaired(done, before, clip_ballistics(done, judging), plan)
 
 
@@ -142,7 +154,31 @@ def _carried_out(
             for edge, side in ((flying[0], slice(None, flying[0])), (flying[-1], slice(flying[-1] + 1, None))):
                 missed[side] = missed[edge] * _faded(np.abs(frames[side] - frames[edge]))[:, None]
             shifts = shifts + missed
-    return Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
+    done = Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
+    within = [np.flatnonzero((frames >= times[start]) & (frames <= times[end])) for start, end in flights]
+    return with_constant_momentum(done, [(int(flying[0]), int(flying[-1])) for flying in within if len(flying) > 2])
+
+
+def over_the_floor(clip: Clip) -> Clip:
+    """The clip lifted as a whole, smoothly in time, by as much as its lowest point is below the floor.
+
+    Penetration of less than `_SINKS` is left; what is lifted ends on the floor.
+    """
+    below = np.maximum(0.0, -contacts(clip).clearance)
+    if below.max() <= _SINKS:
+        return clip
+    if clip.closes():
+        # A lap goes on with the next one.
+        below = np.concatenate([below[:-1], below[:-1], below])
+    width = max(1, round(_LIFTING * clip.fps))
+    # The greatest within twice the kernel's reach, so that the mean of it is nowhere below what is needed.
+    needed = maximum_filter1d(below, 4 * width + 1, mode="nearest")
+    lift = uniform_filter1d(uniform_filter1d(needed, 2 * width + 1, mode="nearest"), 2 * width + 1, mode="nearest")
+    if clip.closes():
+        lift = lift[clip.n_frames - 1 : 2 * clip.n_frames - 1]
+    poses = clip.poses.copy()
+    poses[:, 2] += lift
+    return Clip(poses, clip.fps, clip.name)
 
 
 def _planted(times: Array, standing: npt.NDArray[np.bool_]) -> Array:

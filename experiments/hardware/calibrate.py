@@ -61,6 +61,7 @@ def still_readings(driver: Driver, seconds: float) -> Array:
         If none come, or the joints turn.
     """
     reading, found = np.zeros(READING_SIZE), list[Array]()
+    driver.write(np.zeros(3), False)  # an emulated device may be compiled first
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         driver.write(np.zeros(3), False)

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sim.devices.dhd import find_dhd
+from sim.devices.dhd import DHD
 from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, Driver
 from sim.devices.exchange import READING_SIZE
 from sim.devices.hardware_list import RULES_FILE, FoundDevice
-from sim.devices.hdapi import find_hdapi
+from sim.devices.hdapi import HDAPI
 
 Array = npt.NDArray[np.float64]
 
@@ -99,8 +99,8 @@ def _libraries() -> list[Finding]:
     except PackageNotFoundError:
         found.append(Finding("hidapi", MISSING, "the package is not installed", "pip install hidapi"))
     for name, path, install in (
-        ("OpenHaptics (HD)", find_hdapi(), "install 3D Systems' OpenHaptics and device driver, for a Touch or Phantom"),
-        ("Force Dimension (dhd)", find_dhd(), "install the Force Dimension SDK, for an omega, delta, sigma or Falcon"),
+        ("OpenHaptics (HD)", HDAPI.find(), "install 3D Systems' OpenHaptics and device driver, for a Touch or Phantom"),
+        ("Force Dimension (dhd)", DHD.find(), "install the Force Dimension SDK, for an omega, delta, sigma or Falcon"),
     ):
         found.append(
             Finding(name, OK, path) if path else Finding(name, MISSING, "the library is not installed", install)

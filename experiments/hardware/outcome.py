@@ -103,12 +103,19 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -
     if ended is not None:
         compute, lateness = ended.compute[:3], ended.lateness[:3]
     return Outcome(
-        ready.identity.name, ready.identity.transport,
-        "" if last.fault is Fault.NONE else last.fault.words(last.value), ended is None,
-        ended.broken if ended else "", ended.ticks if ended else int(last.row["tick"]),
-        ended.missed if ended else int(last.row["missed"]), compute, lateness,
-        ended.memory_growth if ended else 0.0, ended.descriptors if ended else 0, **found,
-    )  # fmt: skip
+        device=ready.identity.name,
+        transport=ready.identity.transport,
+        fault="" if last.fault is Fault.NONE else last.fault.words(last.value),
+        silent=ended is None,
+        broken=ended.broken if ended else "",
+        ticks=ended.ticks if ended else int(last.row["tick"]),
+        missed=ended.missed if ended else int(last.row["missed"]),
+        compute=compute,
+        lateness=lateness,
+        memory_growth=ended.memory_growth if ended else 0.0,
+        descriptors=ended.descriptors if ended else 0,
+        **found,
+    )
 
 
 def _recorded(path: Path) -> dict[str, Any]:

@@ -11,9 +11,10 @@ from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
-from experiments.setups.wiring import wire
+from experiments.setups.wiring import Ready, wire
 from models.scene import P_WH
 from sim.hardware.gated_servo import ROW_SIZE, columns
+from sim.hardware.recorder_process import TOLD_FORCE, TOLD_SIZE
 from sim.hardware.shared import SharedNumbers
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
@@ -24,28 +25,35 @@ from sim.world.shown_phantom import show_angles, shown_phantom
 _PAUSE = 1.0 / 60.0  # [s] between two looks: half a picture's time
 
 
-def show_status(config: RunConfig, status: SharedNumbers) -> None:
+def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Session:
+    """What the page shows: the kinematic figure, or the device alone where the figure is led; see `wire`."""
+    if config.map.kind == "led":
+        return session_of(served(config), ready)
+    return wire(replace(config, figure=replace(config.figure, kind="kinematic")), ready=ready)
+
+
+def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -> None:
     """Show a run until whoever started this is gone; the target of a process. Nobody waits for it.
 
-    The figure is the animation h(p) itself; one that is led has a walker that lives in the servo, and is not shown.
+    The force of the hand is what the twin tells (`told`, of the recorder). The figure is the animation h(p) itself; one
+    that is led has a walker that lives in the servo, and is not shown.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    led = config.map.kind == "led"
-    session = (
-        session_of(served(config)) if led else wire(replace(config, figure=replace(config.figure, kind="kinematic")))
-    )
+    led, session = config.map.kind == "led", page_session(config)
     world = session.world
     static = session.static()
     page = LivePage(world.full_model(), courses(static), float(np.asarray(static["tube_radius"])), P_WH, world.kind)
-    linkage, row, parent = shown_phantom(world.model, world.data), np.zeros(ROW_SIZE), os.getppid()
+    linkage, parent = shown_phantom(world.model, world.data), os.getppid()
+    row, twin = np.zeros(ROW_SIZE), np.zeros(TOLD_SIZE)
     while os.getppid() == parent:
         if status.read(row):
             tick = {name: channel[0] for name, channel in columns(row[None]).items()}
             show_angles(linkage, tuple(tick["theta"]), tuple(tick["gimbal"]))
             pose = np.zeros(0) if led else _pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
             qpos = np.concatenate([world.data.qpos, pose])
-            none = np.zeros(3)  # who holds the stylus is not known
-            page.show(Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], none, np.full(3, np.nan)))
+            told.read(twin)
+            hand = twin[TOLD_FORCE : TOLD_FORCE + 3].copy()
+            page.show(Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan)))
         time.sleep(_PAUSE)
 
 

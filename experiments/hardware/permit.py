@@ -9,6 +9,7 @@ from experiments.certify.certified_field import certificate_inputs, certified_op
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
+from experiments.setups.certified_law import of_clips
 from models.mocap.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -45,7 +46,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
             "here and in hvf certify"
         )
     clips: tuple[Clip, ...] = ()
-    if config.map.kind in ("led", "file"):
+    if of_clips(config):
         config, clips = run_and_clips(None, config)
     try:
         found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))

@@ -21,11 +21,11 @@ from experiments.config.run_config import RunConfig
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.outcome import Outcome, outcome_of
-from experiments.hardware.page import show_status
+from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.permit import check_device, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import CONFIG, DEVICE, RECORDING, SUMMARY, check_folder, clear_folder
+from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
 from experiments.setups.defaults import resolved
 from models.scene import SceneConfig
 from sim.errors import SimError
@@ -34,6 +34,7 @@ from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
+from sim.recording.recording import Recording
 
 _POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 
@@ -67,6 +68,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     _permit(config, options, console)
     serving = served(config)
     session = session_of(serving, ready=lambda units: compile_once(console, units))
+    if options.view:
+        page_session(config, ready=lambda units: compile_once(console, units))  # before anybody waits for the page
     for remark in session.remarks:
         console.print(remark, highlight=False)
     period = config.clock.servo_period
@@ -143,7 +146,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 @contextlib.contextmanager
 def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
-    page = context.Process(target=show_status, args=(config, run.status), name="page", daemon=True)
+    page = context.Process(target=show_status, args=(config, run.status, run.told), name="page", daemon=True)
     page.start()
     try:
         yield
@@ -208,4 +211,11 @@ def _write(outcome: Outcome, out: Path, console: Console) -> None:
     for line in outcome.lines():
         print(line)
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
-    console.print(f"Written to {out}: {SUMMARY}, {RECORDING}.", highlight=False)
+    written = [SUMMARY, RECORDING]
+    if outcome.recorded:
+        from experiments.results.hardware_report import write_hardware_report  # brings plots with it
+
+        with Recording(out / RECORDING) as recording:
+            write_hardware_report(out, recording, outcome.lines())
+        written.insert(0, REPORT)
+    console.print(f"Written to {out}: {', '.join(written)}.", highlight=False)

@@ -8,9 +8,8 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
-from controllers.fields.stretchy_tubes import StretchyTubes
+from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
 from controllers.state import HAND_SWITCH, Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
@@ -27,7 +26,6 @@ STRONGEST = 8.0  # [N] about what the motors can give for a moment; a person pul
 FASTEST = 0.6  # [m/s] of the hand: a quick reach over the Phantom's workspace
 HAND_TIME = 0.03  # [s] in which the hand comes to where the mouse is: two or three pictures of the page
 KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be gone back to, and how many there are
-_UNTIL = 4  # of the parameters of `stretchy_wrench`: when stretching ends
 
 
 class Drag(NamedTuple):
@@ -122,16 +120,16 @@ class Engine:
             arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
             self._intended = end
         device = self._device._replace(user=self._device.user._replace(arm=arm))
-        begin = time.perf_counter()
+        begin = time.thread_time()  # what is computed, not what other programs take of the processor meanwhile
         run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
-        self._costs.append((time.perf_counter() - begin) / self._block)
+        self._costs.append((time.thread_time() - begin) / self._block)
         self.tick += self._block
         if self.time >= self._kept[-1].tick * self.period + KEPT_EVERY:
             self._kept.append(kept_state(self._servo, self.world, self.tick))
         return self.logs
 
     def cost(self) -> tuple[float, float]:
-        """Median and 99th percentile of the time that a tick has taken of late [s], and zeros before the first."""
+        """Median and 99th percentile of the processor time of a tick of late [s], and zeros before the first."""
         if not self._costs:
             return 0.0, 0.0
         middle, most = np.percentile(self._costs, (50.0, 99.0))
@@ -150,7 +148,7 @@ class Engine:
         if not np.array_equal(new.ops, old.ops) or len(new.params) != len(old.params):
             raise ParameterError("another field than the one that runs; expected other gains of the same mode and map")
         field.params[:] = new.params
-        state = slice(0, TRACE_SIZE + 14) if self.tubes is not None else slice(0, len(old.memory))
+        state = slice(0, len(old.memory) if self.tubes is None else self._record)
         before, after = self._initial[state], new.memory[state]
         changed = (before != after) & ~(np.isnan(before) & np.isnan(after))
         field.memory[state][changed] = after[changed]
@@ -218,8 +216,8 @@ class Engine:
         laws = program.ops[program.ops[:, 0] >= 0]
         for row, law in zip(laws.tolist(), program.laws, strict=True):
             if law is self.tubes:
-                self._record = row[2] + 14
-                return row[1] + _UNTIL
+                self._record = law.record_at(row[2])
+                return row[1] + StretchyGains._fields.index("until")
         return 0
 
 

@@ -6,18 +6,19 @@ from typing import Any
 
 from experiments.config.run_config import RunConfig
 
+COURSE_POINTS = 241  # of the curve as it is bent
+SLICE_SIDE = 9  # points of the field's slice along either side
+
 SHOWN = {
     "t": 1, "cost": 2, "pace": 1, "fault": 1, "bends": 1, "performs": 1, "recording": 1, "curve": 1, "qpos": 256,
     "ghost": 75, "reference": 75, "p": 3, "v": 3, "force": 3, "user": 3, "target": 3, "switch": 1, "distance": 1,
-    "phase": 1, "residual": 1, "course": 723, "slice": 486,
+    "phase": 1, "residual": 1, "course": 3 * COURSE_POINTS,
+    "slice": 6 * SLICE_SIDE**2,
 }  # fmt: skip
 """Board of the engine: what it shows, and how many numbers each is; ``curve`` counts changes of ``course``."""
 
 HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1, "slice": 1}
 """Board of the page: how it holds the stylus and the clock; ``steps`` counts steps that were asked for."""
-
-COURSE_POINTS = 241
-SLICE_SIDE = 9
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,9 @@ from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
-from sim.viewer.live_stage import NARROW, VIEWS, LiveStage, light, set_view
+from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
+from sim.viewer.views import DEFAULT_SIZE, VIEWS, is_phone, look, look_from
 from sim.world.world import World
 
 FASTEST = 1.0 / 60.0  # [s] between two pictures
@@ -65,7 +66,7 @@ class Page:
         with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
-        set_view(self.server.initial_camera, VIEWS["both"])
+        look(self.server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
         self.stage: LiveStage | None = None
         self._ball: HandBall | None = None
         self._builds, self._curve, self._moment = 0, -1.0, (-1.0, -1.0)
@@ -144,7 +145,7 @@ class Page:
         @views.on_click
         def _(event: Any) -> None:
             if event.client is not None:
-                set_view(event.client.camera, VIEWS[views.value])
+                look_from(event.client, VIEWS[views.value])
 
         @drive.on_click
         def _(event: Any) -> None:
@@ -272,6 +273,5 @@ class Page:
 
 
 def _looks(client: viser.ClientHandle) -> None:
-    """Let a browser that is higher than wide look at the workspace."""
-    if client.camera.aspect < 1.0:
-        set_view(client.camera, NARROW)
+    """Let a browser that comes look at both sides; a phone at the workspace, above the panel."""
+    look_from(client, VIEWS["workspace" if is_phone(client) else "both"])

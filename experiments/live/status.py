@@ -9,10 +9,10 @@ FIRST_STEPS = """
 - **Drag the orange ball**: it is your hand on the stylus. The stylus lags behind it as a hand feels the field: the
   green arrow is the force on you, the orange one yours. Let go, and the stylus finds its way back to the curve.
 - The **figure** moves as the stylus does; the translucent one shows the animation that nobody touches.
-- To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag the
-  curve, and *Perform the bent curve*.
+- To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag
+  the curve, and *Perform the bent curve*.
 - **Keys**: I J K L and U O move the hand (H lets go), space pauses, N steps, Z and Y undo and redo, R resets.
-- *Gains* shows whether the loop is stable; *Takes* records what you do, and downloads it; *Clips* takes your own motion.
+- *Gains* shows whether the loop is stable; *Takes* records what you do, and downloads it; *Clips* takes your motion.
 - Turn the view by dragging beside the ball, zoom with the wheel, move it with the right button.
 """
 
@@ -25,7 +25,7 @@ def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Des
     if going:
         said.append(html.escape(going))
     elif driver is None:
-        said.append("<b>Drag the orange ball</b>, or move it with the keys I J K L, U O")
+        said.append("<b>Drag the orange ball</b> (keys: I J K L U O)")
     else:
         said.append(f"browser {driver} drives")
     if desk.records:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from experiments.files.html_page import html_page
 from experiments.paper_figures.crossing import crossing_rivers
 from experiments.paper_figures.curves_and_fields import field_and_map, trajectory_and_vectors, v_plus_u
 from experiments.paper_figures.cylinder import four_motion_cylinder, red_and_blue_inputs
@@ -140,33 +141,17 @@ def _page() -> str:
     parts = [
         f'<figure id="figure-{d.number}"><a href="figure-{d.number}.pdf"><img alt="{html.escape(d.title)}" '
         f'src="figure-{d.number}.png"></a><figcaption><b>Figure {d.number}. {html.escape(d.title)}.</b> '
-        f"{html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
+        f"<br><i>Here:</i> {html.escape(d.shows)} <small>Run: {', '.join(d.runs)}.</small></figcaption></figure>"
         for d in DRAWINGS
     ]
-    return _FRAME.format(figures="\n".join(parts))
+    return html_page("Figures 1 to 8 of the paper, from runs of this program", _ABOUT + "\n".join(parts), _STYLE)
 
 
-_FRAME = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>The paper's figures</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 860px; padding: 1.5rem; }}
-h1 {{ font-size: 1.5rem; margin: 0 0 .5rem; }}
-figure {{ margin: 2.5rem 0; }}
-img {{ width: 100%; }}
-figcaption {{ font-size: .95rem; color: #566072; }}
-figcaption b {{ color: #222a38; }}
-</style>
-</head>
-<body>
-<h1>Figures 1 to 8 of the paper, from runs of this program</h1>
-<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. What each of its figures is
-of, drawn from recordings; a click gives the PDF.</p>
-{figures}
-</body>
-</html>
+_STYLE = """figure { margin: 2.5rem 0; }
+img { width: 100%; }
+figcaption { font-size: .95rem; color: #566072; }
+figcaption b { color: #222a38; }"""
+_ABOUT = """<p>Donald &amp; Henle, “Using Haptic Vector Fields for Animation Motion Control”, ICRA 2000. In bold, in our
+words, what the paper's figure of that number shows (its captions are not repeated); then what is drawn here, from
+recordings. A click gives the PDF.</p>
 """

@@ -1,12 +1,11 @@
 """``hvf prepare``: a capture made well-formed, with a line in the terminal and a page that shows what was done."""
 
-from base64 import b64encode
 from html import escape
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
+from experiments.files.html_page import html_page, image
 from experiments.preparation.filmstrip import filmstrip
 from models.errors import ModelError
 from models.mocap.preparation.prepare import Prepared, prepared
@@ -79,8 +78,7 @@ def summary(made: Prepared, measures: WellFormed) -> str:
 def page(made: Prepared) -> str:
     """The report as a self-contained page: before and after, what was done, and both as rows of pictures."""
     before, after = well_formed(made.captured), well_formed(made.clip)
-    picture = BytesIO()
-    filmstrip({"as captured": made.captured, "prepared": made.clip}).savefig(picture, format="png", dpi=110)
+    picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     rows = "".join(
         f"<tr><td>{name}</td><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
         for name, was, now in zip(
@@ -88,11 +86,10 @@ def page(made: Prepared) -> str:
         )
     )
     said = [*(made.report.lines() if made.report else ()), summary(made, after)]
-    return (
-        f'<!doctype html><meta charset="utf-8"><title>{escape(made.clip.name)} prepared</title>'
-        "<style>body{font:15px system-ui;margin:2em;max-width:80em}td{padding:.3em 1em .3em 0;vertical-align:top}"
-        "img{max-width:100%}</style>"
-        f"<h1>{escape(made.clip.name)}</h1><table><tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table>"
-        f'<img alt="stick figures" src="data:image/png;base64,{b64encode(picture.getvalue()).decode()}">'
+    body = (
+        f'<div class="wide"><table><tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>'
+        + picture
         + "".join(f"<p>{escape(line)}</p>" for line in said)
     )
+    style = "th, td { text-align: left; vertical-align: top; }"
+    return html_page(f"{made.clip.name}, prepared", body, style)

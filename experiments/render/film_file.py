@@ -9,11 +9,16 @@ import numpy as np
 
 from experiments.render.graphics import Image
 from sim.errors import SimError
+from sim.viewer.palette import FIELD, TUBE, USER
 
 SUFFIXES = (".mp4", ".gif")
 _QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
-# One palette for all frames, chosen for what changes between them.
-_PALETTE = "split[a][b];[a]palettegen=stats_mode=diff:max_colors=160[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"
+# One palette for all frames; for its choice the colours that mean something are painted over a corner, so that thin
+# arrows keep them.
+_MEANT = "".join(
+    f"drawbox=x={k}*iw/6:y=0:w=iw/6:h=ih/6:color=0x{color[1:]}:t=fill," for k, color in enumerate((FIELD, USER, TUBE))
+)
+_PALETTE = f"split[a][b];[a]{_MEANT}palettegen=max_colors=160[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"
 
 
 def check_target(target: Path, overwrite: bool) -> None:

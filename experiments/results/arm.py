@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from controllers.state import Array
 from experiments.config.run_config import ArmConfig
+from experiments.results.oscillation import OscillationSummary, oscillation_summary
 from models.robot_arm.spec import ARM_JOINTS, TOOL, arm_limits
 from models.scene import PEDESTAL, ROBOT
 from sim.body.robot import REPORT_SATURATED
@@ -38,6 +39,8 @@ class ArmSummary:
     nearest_limit_deg : float
         Least distance of a joint from its limit.
     real_time_factor : float
+    oscillation : OscillationSummary
+        Stability of the loop as it was measured.
     """
 
     laps: float
@@ -48,10 +51,12 @@ class ArmSummary:
     torque_share: float
     nearest_limit_deg: float
     real_time_factor: float
+    oscillation: OscillationSummary
 
     def lines(self) -> list[str]:
         """What happened, a sentence each."""
         return [
+            *self.oscillation.lines(),
             f"The stylus ran {self.laps:.2f} laps, {self.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
             f"The tool was {self.tool_rms_mm:.2f} mm RMS, at most {self.tool_max_mm:.2f} mm, from where the stylus "
             f"leads it; the joints {self.joints_rms_deg:.3f}° RMS from h.",
@@ -129,6 +134,7 @@ def arm_summary(recording: Recording, arm: mujoco.MjModel, config: ArmConfig, sp
         torque_share=float((torque / arm.actuator_ctrlrange[:, 1]).max()),
         nearest_limit_deg=float(np.degrees(room.min())),
         real_time_factor=speed,
+        oscillation=oscillation_summary(recording),
     )
 
 

@@ -10,6 +10,7 @@ from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
 from experiments.results.figure_measure import FigureMeasure, MeanSquare
 from experiments.results.folder import scene_of
+from experiments.results.oscillation import oscillation_summary
 from experiments.results.soles import Soles
 from experiments.results.summary import RunSummary
 from experiments.results.summary_parts import (
@@ -63,8 +64,9 @@ def summarise(
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
-        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording)
-    )
+        path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
+        oscillation=oscillation_summary(recording),
+    )  # fmt: skip
 
 
 def measured(

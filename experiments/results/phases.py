@@ -138,9 +138,5 @@ def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
 
 
 def _residual(figure: FigureSummary | None) -> str:
-    """What is said of the residual, unless the figure fell: that is said of the whole run."""
-    return (
-        ""
-        if figure is None or figure.fell_at is not None
-        else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"
-    )
+    """What is said of the residual; falls are told of the whole run."""
+    return "" if figure is None else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"

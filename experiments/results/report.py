@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mujoco
 
-from experiments.results.html_page import document, image
+from experiments.files.html_page import html_page, image
 from experiments.results.plots import plots_html
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
@@ -84,7 +84,7 @@ def write_report(
         versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),
         seed=recording.seed,
     )
-    path.write_text(document(title, body, _STYLE), encoding="utf-8")
+    path.write_text(html_page(title, body, _STYLE), encoding="utf-8")
 
 
 def _curves(recording: Recording, tube: str) -> str:

@@ -7,6 +7,7 @@ from typing import cast
 from experiments.files.curve_files import CURVE_FILE
 from experiments.results.figures import draw_figures
 from experiments.results.folder import FIGURES, RECORDING, REPORT, SUMMARY, world_of
+from experiments.results.hardware_report import write_hardware_report
 from experiments.results.lead_figure import draw_lead
 from experiments.results.report import write_report
 from experiments.results.stretch_figure import draw_stretch
@@ -16,6 +17,13 @@ from sim.recording.recording import Recording
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording."""
     with Recording(folder / RECORDING) as recording:
+        if "frames" not in recording.groups:  # of a device: no figure was in the loop
+            told = folder / SUMMARY
+            lines = (
+                json.loads(told.read_text(encoding="utf-8"))["lines"] if told.exists() else lines_of(recording, folder)
+            )
+            write_hardware_report(folder, recording, lines)
+            return
         figures = draw_figures(recording, folder / FIGURES)
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")

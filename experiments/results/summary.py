@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from experiments.results.changes import RiverChange
 from experiments.results.lead_measures import LeadSummary
+from experiments.results.oscillation import OscillationSummary
 from experiments.results.phases import EditingSummary, PerformanceSummary
 from experiments.results.stretch_summary import StretchSummary
 from experiments.results.summary_parts import (
@@ -39,6 +40,8 @@ class RunSummary:
         Where a figure was led.
     trace : TraceSummary or None
         Where the hand traced the curve by itself.
+    oscillation : OscillationSummary or None
+        Stability of the loop as it was measured.
     """
 
     path: PathSummary
@@ -54,6 +57,7 @@ class RunSummary:
     editing: EditingSummary | None = None
     performance: PerformanceSummary | None = None
     trace: TraceSummary | None = None
+    oscillation: OscillationSummary | None = None
 
     def lines(self) -> list[str]:
         """What happened, a sentence each."""
@@ -65,6 +69,7 @@ class RunSummary:
         return [
             *self.faults,
             *([fell] if figure is not None and (fell := figure.fall_line()) else []),
+            *([] if self.oscillation is None else self.oscillation.lines()),
             *bent,
             *changed,
             *([held] if self.tank.scaled_ticks else []),

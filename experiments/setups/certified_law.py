@@ -6,6 +6,7 @@ Light to import, as what certificates are checked by is.
 from collections.abc import Callable
 from typing import NamedTuple
 
+from controllers.fields.bunny import felt_bunny
 from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.defaults import resolved, river_gains, tube_gains
@@ -54,6 +55,11 @@ def governor_drag(config: RunConfig) -> float:
     return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
 
 
+def of_clips(config: RunConfig) -> bool:
+    """Whether the certificate of a field is of clips, too: a figure that is led, a map's file, a governor or walls."""
+    return config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
+
+
 def left_out(config: RunConfig) -> tuple[str, ...]:
     """What a run executes besides its certified laws, and no certificate covers; in words."""
     mode = config.mode
@@ -72,8 +78,8 @@ def _follow(mode: Follow | StretchThenFollow) -> Laws:
 def _bunny(mode: Bunny) -> Laws:
     """Near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
     along = mode.bunny_attraction == "along"
-    width = _ANY if along else mode.bunny_width
-    return {"": CertifiedLaw("follow" if along else "bunny", mode.stiffness, mode.damping, width)}
+    k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
+    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _ANY if along else width)}
 
 
 def _rivers(mode: Rivers) -> Laws:

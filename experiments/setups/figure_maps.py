@@ -25,7 +25,9 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
+from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
 from experiments.setups.balance import balanced
+from experiments.setups.blendable import not_blendable, off_pace
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -33,7 +35,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.rivers import default_choice
-from models.humanoid.skeleton import BODIES, N_POSE
+from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
@@ -74,8 +76,13 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         If there are none, or more than four, or they do not fit together.
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
-    made = _cylinder(motions, (place.radius - reach, place.radius + reach), (-reach, reach), figure_legs(figure))
-    return replace(_about_circle(place, made, clips), refined=lambda: balanced(made, figure, place.curve.duration))
+    radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
+    made = _cylinder(motions, radii, (-reach, reach), legs, lap)
+
+    def refined() -> CylindricalMap:
+        return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
+
+    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
 
 
 def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
@@ -88,8 +95,19 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     """
     lower, red, blue = _motions(clips, 3, "composite")
     legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
-    upper = set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs))
-    return _about_circle(place, CompositeMap(lower, red, blue, sorted(upper), radii, legs), clips)
+    lap = place.curve.duration
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap)
+
+    def refined() -> CompositeMap:
+        return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+
+    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
+
+
+def _warnings(clips: tuple[Clip, ...], made: CylindricalMap | CompositeMap, lap: float) -> tuple[str, ...]:
+    """What of different clips will not go well, and why, a line each."""
+    played = [clips[i % len(clips)] for i in range(len(made.loops))]
+    return (*not_blendable(clips), *off_pace(played, made.loops, lap))
 
 
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
@@ -129,7 +147,7 @@ def _river_clips_parts(
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
     curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
-    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure))
+    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
     parts = _about_circle(place, made, clips)
     return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
 
@@ -189,7 +207,7 @@ def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array,
 
 def _place(part: AnyMap) -> Place:
     around = part.around
-    curve = reached(Trajectory.circle(around.radius, around.lap))
+    curve = reached(Trajectory.circle(around.radius, around.lap, wave=around.wave))
     return Place(curve, around.radius, part.reach, part.expressive)
 
 
@@ -207,15 +225,16 @@ def reached(curve: Trajectory) -> Trajectory:
 
 
 def _cylinder(
-    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...]
-) -> CylindricalMap:
+    clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...],
+    lap: float,
+) -> CylindricalMap:  # fmt: skip
     """The map of four clips; its corrections, once found, are kept beside the compiled code."""
 
     def find() -> Array:
-        return CylindricalMap(clips, radii, heights, legs).corrections
+        return CylindricalMap(clips, radii, heights, legs, None, lap).corrections
 
     # Where the clips blend is not among what they depend on.
-    made_of = clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values()
+    made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
     folder = kept_folder(CylindricalMap.__module__)
     corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
-    return CylindricalMap(clips, radii, heights, legs, corrections)
+    return CylindricalMap(clips, radii, heights, legs, corrections, lap)

@@ -131,7 +131,10 @@ class MapParts(Generic[Map]):
 
     def refine(self) -> Self:
         """The same with the improved map; needs compiled code."""
-        return self if self.refined is None else replace(self, haptic_map=self.refined())
+        if self.refined is None:
+            return self
+        made = self.refined()
+        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks)
 
 
 @dataclass(frozen=True, kw_only=True)

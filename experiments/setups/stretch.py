@@ -97,6 +97,7 @@ def _parts(
     tubes = StretchyTubes(
         course, seek, mode.rubber, damping,
         epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE,
+        hold=mode.rubber_from,
     )  # fmt: skip
     pushed = first_pushed_lap(maps.curve, user.grabs)
     if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:

@@ -104,11 +104,12 @@ def figures() -> Iterator[Figure]:
     trials = trial_cost()
     yield Figure("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
     yield Figure("trials on two threads / twice one", trials.scaling, at_least=0.9)
-    yield Figure("memory after 400 short trials more / before", trials.grown, at_most=1.01)
+    yield Figure("memory after 10 000 short trials / after 400", trials.grown, at_most=1.01)
     start = libraries_seconds()
     yield Figure(
         "second start of hvf to its first tick", second_start_seconds() / start, "× its libraries", at_most=3.0
     )
+    yield Figure("second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0)
     yield Figure("hvf --help", _seconds_of("--help") / start, "× its libraries", at_most=1.5)
     made, verified = certificate_seconds()
     yield in_steps("certificate of the demo", 1e6 * made, 300_000)

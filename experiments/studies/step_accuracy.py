@@ -18,7 +18,7 @@ from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
 from experiments.compiling import compile_once
-from experiments.config.run_config import ArmConfig, Clock, RunConfig
+from experiments.config.run_config import ArmConfig, RunConfig
 from experiments.config.words import run_config
 from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
@@ -79,7 +79,7 @@ class Course(NamedTuple):
 
 def course(config: RunConfig | ArmConfig, step: float) -> Course:
     """Run a configuration at a step of the physics [s]."""
-    clock = Clock(config.clock.servo_period, step)
+    clock = replace(config.clock, physics_step=step)
 
     def ready(units: tuple[Unit, ...]) -> None:
         compile_once(Console(stderr=True), units)

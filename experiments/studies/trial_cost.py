@@ -1,5 +1,7 @@
-"""What a study costs beside its trials' own time, how trials scale over threads, and whether memory grows."""
+"""What a study costs beside its trials: overhead, threads, memory, and how soon a batch begins."""
 
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -9,14 +11,15 @@ from typing import NamedTuple
 import psutil
 from rich.console import Console
 
+from experiments.config.part import to_json
 from experiments.trials.database import Database
 from experiments.trials.drive import run_missing, warm
 from experiments.trials.plan import Trial, planned
-from experiments.trials.run_trial import SHELF
+from experiments.trials.run_trial import SHELF, Task
 from experiments.trials.study_config import StudyConfig, study_from
 from experiments.trials.threads import Threads
 
-_THREADS = 2
+_THREADS, _SHORT, _MANY = 2, 0.02, 10_000  # trials at a time; [s] of a short trial, and how many of them
 
 
 class TrialCost(NamedTuple):
@@ -29,12 +32,15 @@ class TrialCost(NamedTuple):
     scaling : float
         Trials a second of two threads over twice those of one.
     grown : float
-        Memory after 400 short trials more, over that before.
+        Memory after 10 000 short trials, over that after the first 400.
+    start : float
+        From the start of a process to its first row, with the code compiled before [s].
     """
 
     overhead: float
     scaling: float
     grown: float
+    start: float
 
 
 def trial_cost() -> TrialCost:
@@ -45,10 +51,27 @@ def trial_cost() -> TrialCost:
     own, one = _run(_study(6, 5.0), 1, quiet)
     overhead = (time.process_time() - begin) / own - 1.0
     _, two = _run(_study(6, 5.0), _THREADS, quiet)
-    _run(_study(25, 0.05), 1, quiet)
+    _run(_study(100, _SHORT), 1, quiet)
     before = psutil.Process().memory_info().rss
-    _run(_study(100, 0.05), 1, quiet)
-    return TrialCost(overhead, one / (_THREADS * two), psutil.Process().memory_info().rss / before)
+    _run(_study(_MANY // 4, _SHORT), 1, quiet)
+    grown = psutil.Process().memory_info().rss / before
+    return TrialCost(overhead, one / (_THREADS * two), grown, start_seconds())
+
+
+def start_seconds() -> float:
+    """Seconds from the start of a new process to the first row of its study."""
+    code = "from experiments.studies.trial_cost import first_row; first_row()"
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return float(told.stdout)
+
+
+def first_row() -> None:
+    """Run the first trial of a study, and print how old this process is then [s]."""
+    study = _study(1, _SHORT)
+    trial = planned(study)[0]
+    warm([trial.config], SHELF, Console(stderr=True, quiet=True))
+    next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))])))
+    print(time.time() - psutil.Process().create_time())
 
 
 def _study(users: int, seconds: float) -> StudyConfig:

@@ -14,6 +14,7 @@ from experiments.trials.run_trial import Row, Task, perform
 
 AHEAD = 3  # tasks that wait for each thread of a worker: one more than a thread's, for the way there and back
 DEATHS = 50  # of workers with the same trial on them, after which the trial is taken to be the cause
+_BUSY = "120s"  # for what is on this machine: one that does much else may leave it waiting
 _WAIT = "30s"  # for a scheduler, and for a first worker
 
 
@@ -96,7 +97,10 @@ def local_cluster(workers: int) -> Generator[Cluster]:
     distributed = _distributed()
     import dask
 
-    settings = {"distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.memory.terminate": False}
+    settings = {
+        "distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.memory.terminate": False,
+        "distributed.comm.timeouts.connect": _BUSY, "distributed.comm.timeouts.tcp": _BUSY,
+    }  # fmt: skip
     with (
         dask.config.set(settings),  # pyright: ignore[reportPrivateImportUsage]
         distributed.LocalCluster(

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from experiments.results.html_page import document, image, sentences, short
+from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
 from experiments.tuning.contenders import Contender
 from experiments.tuning.tune_config import TuneConfig, label_of
 
@@ -15,13 +15,13 @@ _BODY = """{sentences}
 <h2>Candidates</h2>
 {plots}
 <h2>On {users} users who took no part in the tuning</h2>
-<table>{contenders}</table>
+<div class="wide"><table>{contenders}</table></div>
 <p class="note">Gain: by how much the tuned one is better, with its 95 % BCa bootstrap interval over users. The search
 with the same budget simulates as many candidates, under the same certificate. Half the critical gain: the proportional
 rule of Ziegler and Nichols, at the default damping.</p>
 {importances}
 <h2>The certificate of what was chosen</h2>
-<table>{verdicts}</table>
+<div class="wide"><table>{verdicts}</table></div>
 <h2>The tuning</h2>
 <pre>{text}</pre>
 """
@@ -43,7 +43,7 @@ def tuning_page(
         ),
         text=html.escape(text),
     )
-    return document(config.name, body)
+    return html_page(config.name, body, NUMBERS)
 
 
 def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Sequence[Any]) -> str:

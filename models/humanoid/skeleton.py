@@ -225,7 +225,7 @@ def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
     """
     angle = float(np.linalg.norm(np.abs(segment.limit).max(axis=1)))
     if angle < _NEARLY_HALF_TURN:
-        joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [0.0, angle]
+        joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.array([0.0, angle])
 
 
 def figure_model(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> mujoco.MjModel:

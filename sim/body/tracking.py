@@ -154,7 +154,8 @@ class TrackingReport:
             + f"joints {self.joint_error:.2f}° RMS, root {100 * self.root_error:.1f} cm RMS "
             f"(largest {100 * self.root_error_max:.1f}), {self.flight_seconds:.2f} s of flight, feet on the ground "
             f"{100 * self.grounded:.0f} % of stance; residual in stance, RMS and peak: {stance.brief()} "
-            f"({stance.verdict()}); without ground force, {lost.seconds:.2f} s: {lost.brief()}"
+            f"({stance.verdict()})"
+            + (f"; without ground force, {lost.seconds:.2f} s: {lost.brief()}" if lost.seconds > 0.0 else "")
         )
 
 

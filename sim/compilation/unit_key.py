@@ -168,6 +168,7 @@ def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
     chain: tuple[str, ...] = ()
     for instruction in dis.get_instructions(code):
         if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            found |= {chain} if chain else set()
             chain = (instruction.argval,)
         elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD") and chain:
             chain = (*chain, instruction.argval)
@@ -282,7 +283,7 @@ def _overloads(function: Function) -> Iterator[Any]:
     """Templates by which numba compiles calls of a plain Python function."""
     context = cpu_target.typing_context
     context.refresh()
-    for template in getattr(context._globals.get(function), "templates", ()):
+    for template in getattr(context._lookup_global(function), "templates", ()):
         if hasattr(template, "_overload_func"):
             yield template
 

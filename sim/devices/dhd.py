@@ -6,7 +6,6 @@ are those of the SDK's ``dhdc.h``.
 """
 
 import ctypes
-import ctypes.util
 import math
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from models.phantom.kinematics import R_HP
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.hid import WATCHDOG
+from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import tip_force, write_pose
 from sim.errors import SimError
 
@@ -51,33 +51,10 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
 }  # fmt: skip
 
 
-def find_dhd() -> str | None:
-    """Where the library is; None if it is not installed."""
-    return ctypes.util.find_library("dhd") or ctypes.util.find_library("dhd64")
-
-
-def load_dhd(path: str | None = None) -> ctypes.CDLL:
-    """The library with its signatures, from a path or from where it is installed.
-
-    Raises
-    ------
-    SimError
-        If it is not there, or is another library.
-    """
-    path = path or find_dhd()
-    if path is None:
-        raise SimError(
-            "Force Dimension's library dhd is not installed; install the Force Dimension SDK, so that libdhd.so "
-            "(dhd64.dll) is found"
-        )
-    try:
-        library = ctypes.CDLL(path)
-        for name, (result, arguments) in _SIGNATURES.items():
-            function = getattr(library, name)
-            function.restype, function.argtypes = result, arguments
-    except (OSError, AttributeError) as error:
-        raise SimError(f"{path} is not Force Dimension's dhd library: {error}") from None
-    return library
+DHD = VendorLibrary(
+    "Force Dimension's library dhd", ("dhd", "dhd64.dll"),
+    "install the Force Dimension SDK, so that libdhd.so (dhd64.dll) is found", _SIGNATURES,
+)  # fmt: skip
 
 
 class DhdDevice:
@@ -86,7 +63,7 @@ class DhdDevice:
     Parameters
     ----------
     library : ctypes.CDLL
-        From `load_dhd`.
+        `DHD`, loaded.
     clock : callable
         Seconds, which the readings carry.
 
@@ -106,7 +83,7 @@ class DhdDevice:
         library.dhdGetSerialNumber(ctypes.byref(serial), self._id)
         watchdog = library.dhdSetWatchdog(round(WATCHDOG / _WATCHDOG_UNIT), self._id) == 0
         name = (library.dhdGetSystemName(self._id) or b"").decode(errors="replace")
-        self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True)
+        self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True, own_weight=True)
         self.telemetry = fresh_telemetry()
         self._theta, self._taken, self._enabled = np.zeros(3), 0, False
 

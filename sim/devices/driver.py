@@ -53,6 +53,8 @@ class DeviceIdentity(NamedTuple):
     power_up : int
         Another number after each power-up, where the device tells one, and else 0: encoders that count from where they
         wake up have lost their zero then.
+    own_weight : bool
+        Whether it carries its own weight: its driver takes the Phantom's off the torques again.
     """
 
     name: str
@@ -63,6 +65,7 @@ class DeviceIdentity(NamedTuple):
     watchdog: bool
     calibrated: bool
     power_up: int = 0
+    own_weight: bool = False
 
 
 TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, JITTER, STALENESS, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7, 8, 9

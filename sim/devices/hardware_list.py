@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from sim.devices import hid_protocol as protocol
-from sim.devices.dhd import DhdDevice, find_dhd, load_dhd
+from sim.devices.dhd import DHD, DhdDevice
 from sim.devices.driver import Driver
-from sim.devices.hdapi import HdapiDevice, find_hdapi, load_hdapi
+from sim.devices.hdapi import HDAPI, HdapiDevice
 from sim.devices.hid import HidHandle, HidPhantom
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
@@ -93,8 +93,8 @@ def found_devices() -> list[FoundDevice]:
     """Every device that the machine sees; nothing is sent to any of them, and none is opened."""
     found = [_hid_device(row) for row in hid_backend().enumerate()]
     for name, transport, find, product in (
-        ("hdapi", "HDAPI", find_hdapi, "3D Systems Touch or Phantom"),
-        ("dhd", "DHD", find_dhd, "Force Dimension omega, delta, sigma or Novint Falcon"),
+        ("hdapi", "HDAPI", HDAPI.find, "3D Systems Touch or Phantom"),
+        ("dhd", "DHD", DHD.find, "Force Dimension omega, delta, sigma or Novint Falcon"),
     ):
         path = find()
         if path is not None:
@@ -155,7 +155,7 @@ def open_device(name: str) -> Driver:
     kind, _, rest = name.partition(":")
     opens: dict[str, Callable[[str], Driver]] = {
         "hid": _open_phantom, "hidraw": _open_phantom, "spacemouse": _open_spacemouse,
-        "hdapi": lambda which: HdapiDevice(load_hdapi(), which), "dhd": lambda _: DhdDevice(load_dhd()),
+        "hdapi": lambda which: HdapiDevice(HDAPI.load(), which), "dhd": lambda _: DhdDevice(DHD.load()),
     }  # fmt: skip
     if kind not in opens or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
         raise SimError(f"no device is called {name!r}; {_what_there_is()}")

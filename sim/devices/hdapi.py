@@ -10,8 +10,6 @@ Constants and signatures are those of OpenHaptics 3.4's ``hd.h``, ``hdDefines.h`
 """
 
 import ctypes
-import ctypes.util
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -24,6 +22,7 @@ from controllers.safety.faults import Fault
 from models.phantom.kinematics import R_HP
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
+from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import tip_force, write_pose
 from sim.errors import SimError
 
@@ -89,33 +88,11 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
 }
 
 
-def find_hdapi() -> str | None:
-    """Where the library is; None if it is not installed."""
-    return ctypes.util.find_library("HD") if sys.platform != "win32" else ctypes.util.find_library("HD.dll")
-
-
-def load_hdapi(path: str | None = None) -> ctypes.CDLL:
-    """The library with its signatures, from a path or from where it is installed.
-
-    Raises
-    ------
-    SimError
-        If it is not there, or is another library.
-    """
-    path = path or find_hdapi()
-    if path is None:
-        raise SimError(
-            "OpenHaptics' library HD is not installed; install 3D Systems' OpenHaptics and the Touch (or Phantom) "
-            "device driver, so that libHD.so (HD.dll) is found"
-        )
-    try:
-        library = ctypes.CDLL(path)
-        for name, (result, arguments) in _SIGNATURES.items():
-            function = getattr(library, name)
-            function.restype, function.argtypes = result, arguments
-    except (OSError, AttributeError) as error:
-        raise SimError(f"{path} is not OpenHaptics' HD library: {error}") from None
-    return library
+HDAPI = VendorLibrary(
+    "OpenHaptics' library HD", ("HD", "HD.dll"),
+    "install 3D Systems' OpenHaptics and the Touch (or Phantom) device driver, so that libHD.so (HD.dll) is found",
+    _SIGNATURES,
+)  # fmt: skip
 
 
 class HdapiDevice:
@@ -124,7 +101,7 @@ class HdapiDevice:
     Parameters
     ----------
     library : ctypes.CDLL
-        From `load_hdapi`.
+        `HDAPI`, loaded.
     name : str
         The device's name in the vendor's set-up; the default device where it is empty.
     clock : callable
@@ -195,8 +172,9 @@ class HdapiDevice:
         name, serial = (self._hd.hdGetString(which) or b"" for which in (_MODEL, _SERIAL))
         # The library documents no watchdog of the device: one without, then.
         return DeviceIdentity(
-            name.decode(errors="replace"), "HDAPI", serial.decode(errors="replace"), "", True, False, calibrated
-        )
+            name.decode(errors="replace"), "HDAPI", serial.decode(errors="replace"), "", True, False, calibrated,
+            own_weight=True,
+        )  # fmt: skip
 
     def _serve(self, _: int | None) -> int:
         """What the vendor's scheduler calls: state in, force out."""

@@ -23,6 +23,7 @@ from sim.hardware.recorder_process import (
     TOLD_DROPPED,
     TOLD_ERROR,
     TOLD_FORCE,
+    TOLD_READY,
     TOLD_ROWS,
     TOLD_SIZE,
     RecordingJob,
@@ -122,6 +123,8 @@ class HardwareRun:
         The recorder's.
     status : SharedNumbers
         The servo's last row, for any other process that is to show it.
+    told : SharedNumbers
+        What the recorder tells, likewise.
     """
 
     def __init__(
@@ -130,14 +133,14 @@ class HardwareRun:
         context = multiprocessing.get_context("spawn")
         self._orders, self.status = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE)
         self._rows = Ring(round(RING_SECONDS / period), ROW_SIZE)
-        self._until, self._told = SharedNumbers(1), SharedNumbers(TOLD_SIZE)
+        self._until, self.told = SharedNumbers(1), SharedNumbers(TOLD_SIZE)
         self._said, told = context.Pipe(duplex=False)
         self._order, self._row, self._heard = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
         channels = Channels(self._orders, self.status, self._rows, told)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
         self.recorder: BaseProcess | None = None
         if job is not None:
-            arguments = job, self._rows, self._until, self._told
+            arguments = job, self._rows, self._until, self.told
             self.recorder = context.Process(target=record_rows, args=arguments, name="recorder", daemon=True)
         self._their_end: Connection = told
         self._ended: Ended | None = None
@@ -147,7 +150,7 @@ class HardwareRun:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        for shared in (self._orders, self.status, self._rows, self._until, self._told):
+        for shared in (self._orders, self.status, self._rows, self._until, self.told):
             shared.close()
 
     def start(self) -> Ready:
@@ -158,15 +161,23 @@ class HardwareRun:
         SimError
             If the servo could not begin; the message says why.
         """
-        self.servo.start()
-        self._their_end.close()
         if self.recorder is not None:
             self.recorder.start()
+            self._wait_for(self.recorder)
+        self.servo.start()
+        self._their_end.close()
         said = self._hear(_START)
         if isinstance(said, Ready):
             self.poll()
             return said
         raise SimError(said.why if isinstance(said, Refused) else "the servo's process ended before it began")
+
+    def _wait_for(self, recorder: BaseProcess) -> None:
+        """Wait until the recorder is ready, or could not begin, which a look at it tells."""
+        told, end = np.zeros(TOLD_SIZE), time.monotonic() + _START
+        while recorder.is_alive() and told[TOLD_READY] == 0.0 and time.monotonic() < end:
+            time.sleep(0.01)
+            self.told.read(told)
 
     def _hear(self, timeout: float) -> Ready | Refused | Ended | None:
         try:
@@ -197,7 +208,7 @@ class HardwareRun:
         if self.recorder is None:
             return None
         told = np.zeros(TOLD_SIZE)
-        self._told.read(told)
+        self.told.read(told)
         error = int(told[TOLD_ERROR])
         force = told[TOLD_FORCE : TOLD_FORCE + 3]
         alive = self.recorder.is_alive() and error == 0

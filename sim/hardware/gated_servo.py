@@ -89,7 +89,7 @@ class Ticker:
         if not isinstance(parts.servo.device, Exchange):
             raise SimError(f"the servo's device is a {type(parts.servo.device).__name__}; expected an Exchange")
         self.parts, self._device = parts, parts.servo.device
-        self.gated = GateMemory.of(parts.gate)
+        self.gated = GateMemory.of(parts.gate, parts.driver.identity.own_weight)
         self._ticks, self._frames = make_logs(parts.servo, 1)
         self._timeout = READ_SHARE * parts.gate.period
         self.row = np.zeros(ROW_SIZE)

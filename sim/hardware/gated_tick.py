@@ -44,6 +44,8 @@ class GateMemory(NamedTuple):
         What gets through [N], and is commanded to the motors [N m], shape (3,).
     cooling : float
         ``1 − exp(−T/τ)`` of the winding.
+    own_weight : bool
+        Of the device (`sim.devices.driver.DeviceIdentity`).
     """
 
     params: Array
@@ -55,13 +57,14 @@ class GateMemory(NamedTuple):
     force: Array
     torque: Array
     cooling: float
+    own_weight: bool
 
     @classmethod
-    def of(cls, gate: Gate) -> "GateMemory":
+    def of(cls, gate: Gate, own_weight: bool = False) -> "GateMemory":
         """Memory of a gate before its first tick; its motors are cold."""
         return cls(
             gate.params(), gate.detector.params(), gate.fresh_memory(), gate.detector.fresh_memory(), np.zeros(3),
-            np.zeros(1), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME),
+            np.zeros(1), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME), own_weight,
         )  # fmt: skip
 
     @property
@@ -75,7 +78,7 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     """From the force that the loop commands to the torques of the motors; zero in every state without force.
 
     Limiter and tank are told what force the hand really gets. The linkage's weight is balanced in the share in which
-    the force is ramped in.
+    the force is ramped in; that of a device which carries its own is added last, for its driver to take off again.
 
     Parameters
     ----------
@@ -93,13 +96,16 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     force, torque, faults = gated.force, gated.torque, device.faults
     force[:] = asked
     pass_gate(gated.params, gated.shaking, gated.gate, gated.shaken, faults, device.hand, request, force)
-    memory, held_back = device.memory, 1.0 - gated.gate[GATE_SHARE]
+    memory, held_back = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
     motor_torques(faults, memory, device.hand[0], force, torque)
     # J(θ)ᵀF is ramped in with F, the weight is not yet.
     weight = gravity_torques((memory[0], memory[1], memory[2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
     gated.told[0] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
+    if gated.own_weight:
+        for i in range(3):
+            torque[i] += weight[i]
     if gated.told[0] > HOT:
         latch(faults, MOTORS_HOT, device.hand[0], gated.told[0])
     if faults[FAULT_CODE] != 0.0 or not pushes(int(gated.gate[GATE_STATE])):

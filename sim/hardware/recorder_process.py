@@ -15,15 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from models.scene import SceneConfig
-from sim.hardware.gated_servo import CHANNELS, columns
+from sim.hardware.gated_servo import CHANNELS, ROW_SIZE, columns
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
 from sim.recording.recorder import Group, Recorder
 
 Array = npt.NDArray[np.float64]
 
-TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_SIZE = 0, 1, 2, 3, 6, 7
-"""What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m]."""
+TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_READY, TOLD_SIZE = 0, 1, 2, 3, 6, 7, 8
+"""What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m], and
+whether it is ready, which takes longer than rows are kept where the twin is to be compiled."""
 
 RING_SECONDS = 5.0
 """How long a recorder may stand still before rows are lost."""
@@ -68,8 +69,11 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: Shar
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     status, order, parent = np.zeros(TOLD_SIZE), np.zeros(1), os.getppid()
     twin = Twin(job.scene)
+    twin.follow(columns(np.zeros((0, ROW_SIZE))))
     try:
         with Recorder(job.path, job.config, job.seed, hardware_groups(job.scene.servo_period), job.static) as recorder:
+            status[TOLD_READY] = 1.0
+            told.write(status)
             while True:
                 orders.read(order)
                 last = order[0] > 0.0 or os.getppid() != parent

@@ -4,10 +4,11 @@ A fading memory (Morrison 1969, *Introduction to Sequential Smoothing and Predic
 acceleration over the period T, then correct by the residual r with 1 − θ³, 3/2 (1 − θ)² (1 + θ)/T and (1 − θ)³/T².
 What moves, or turns about a fixed axis, with constant acceleration is followed without lag.
 
-A hand on a lap does neither: its acceleration turns with it. Along a circle at the rate Ω that has the jerk −Ω² ṗ, which a
-filter without it pays for with a velocity that is 1.6 % short on the default circle in 2.2 s, and a figure with a reference
-that does not move as fast as its velocity says. So the prediction is that of a coordinated turn (Bar-Shalom, Li and
-Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order in T:
+A hand on a lap does neither: its acceleration turns with it. Along a circle at the rate Ω that has the jerk −Ω² ṗ,
+which a filter without it pays for with a velocity that is 1.6 % short on the default circle in 2.2 s, and a figure
+with a reference that does not move as fast as its velocity says. So the prediction is that of a coordinated turn
+(Bar-Shalom, Li and Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order
+in T:
 
 .. math:: j = -\Omega^2 \dot p, \qquad \Omega = |\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2)
 """

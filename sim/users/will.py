@@ -42,6 +42,7 @@ Array = npt.NDArray[np.float64]
 
 ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own
+RETAINED = 0.99  # A, share of what is learned that lasts to the next repetition: slow process of Smith et al. 2006 (m)
 BEND = 0.1  # [s] before and after which she looks at a way to see how it bends: a third of a submovement
 
 
@@ -123,15 +124,26 @@ def _yield(person: PersonState) -> None:
 
 @njit
 def _learn(person: PersonState, wanted: Array) -> None:
-    """Learn the force that keeps the hand where it is wanted, for each part of a lap (Thoroughman & Shadmehr 2000)."""
+    r"""Learn the force that keeps the hand where it is wanted, for each part of a lap.
+
+    .. math:: f_{n+1} = A f_n + B K (p_d - p)
+
+    a repetition (Thoroughman & Shadmehr 2000); it is begun as much earlier as muscles take to be activated.
+    """
     n, m, V = person.numbers, person.memory, person.vectors
     if n[LEARNING] == 0.0 or n[LAP] == 0.0:
         return
-    part = int(LEARNED_PARTS * (m[CLOCK] / n[LAP] - math.floor(m[CLOCK] / n[LAP]))) % LEARNED_PARTS
-    share = n[LEARNING] * n[PERIOD] * LEARNED_PARTS / n[LAP]
+    part, ready = _part(m[CLOCK] / n[LAP]), _part((m[CLOCK] + ENGAGING_TIME) / n[LAP])
+    share = n[PERIOD] * LEARNED_PARTS / n[LAP]
     for k in range(3):
         pull = 0.0
         for j in range(3):
             pull += person.stiffness[k, j] * (wanted[0, j] - V[BELIEF, j])
-        person.learned[part, k] += share * pull
-        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[part, k]
+        person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETAINED) * person.learned[part, k])
+        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[ready, k]
+
+
+@njit
+def _part(laps: float) -> int:
+    """Part of a lap, of so many laps."""
+    return int(LEARNED_PARTS * (laps - math.floor(laps))) % LEARNED_PARTS

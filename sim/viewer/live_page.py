@@ -10,8 +10,9 @@ import numpy.typing as npt
 import viser
 
 from sim.viewer.courses import Course
-from sim.viewer.live_stage import VIEWS, LiveStage, set_view
+from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
+from sim.viewer.views import DEFAULT_SIZE, VIEWS, look, look_from
 
 Array = npt.NDArray[np.float64]
 
@@ -49,13 +50,16 @@ class LivePage:
         name = "physical figure" if figure == "physical" else "animation h(p)"
         self._stage = LiveStage(self._server.scene, model, drawn, radius, p_WH, name, ghost)
         self._stage.draw_slice(np.zeros((0, 3)), np.zeros((0, 3)))
-        set_view(self._server.initial_camera, VIEWS["both"])
+        light(self._server.scene)
+        look(self._server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
         self._shown = 0.0
 
         @views.on_click
         def _(event: Any) -> None:
             if event.client is not None:
-                set_view(event.client.camera, VIEWS[views.value])
+                look_from(event.client, VIEWS[views.value])
+
+        self._server.on_client_connect(lambda client: look_from(client, VIEWS["both"]))
 
     def show(self, shown: Shown) -> None:
         """Show a moment, unless the last one was shown less than a thirtieth of a second ago."""

@@ -5,7 +5,7 @@ beside the figures, their axes are the world's. A figure that travels is followe
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -31,24 +31,6 @@ FOLLOWS = 0.5  # [s] by which the view is behind a figure that travels
 TRAVELS = 1.5  # [m] from where it began, beyond which a figure is followed
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] what is drawn is no finer: a phone draws it, too
 LEAPS = 3.0  # [m] a figure that is so far from where the view has it was put there
-
-
-class View(NamedTuple):
-    """Where a camera stands, and what it looks at [m]."""
-
-    position: tuple[float, float, float]
-    look_at: tuple[float, float, float]
-
-
-VIEWS = {
-    "both": View((1.45, -4.9, 2.9), (1.1, 0.0, 0.95)),
-    "workspace": View((1.75, -3.3, 2.2), (1.75, -0.4, 1.2)),
-    "stage": View((0.7, -4.4, 1.7), (0.05, 0.0, 0.9)),
-}
-"""By what they show; a little to the right of it, for the panel covers a fifth of the page."""
-NARROW = View((1.45, -5.6, 2.6), (1.45, 0.0, 0.2))
-"""Where a phone looks that is held upright: at the workspace, above the panel."""
-FIELD_OF_VIEW = np.deg2rad(34.0)
 
 
 def drawn_at(p_H: Array) -> Array:
@@ -213,8 +195,3 @@ def light(scene: viser.SceneApi, shadows: bool = True) -> None:
     sky, front = (1.6, 1.0) if shadows else (2.2, 2.6)
     scene.add_light_hemisphere("/lights/sky", sky_color=(255, 255, 255), ground_color=(190, 196, 210), intensity=sky)
     scene.add_light_directional("/lights/front", intensity=front, position=(1.0, -4.0, 4.0))
-
-
-def set_view(camera: viser.InitialCameraConfig | viser.CameraHandle, view: View) -> None:
-    """Put a camera where a view has it."""
-    camera.position, camera.look_at, camera.fov = view.position, view.look_at, FIELD_OF_VIEW

@@ -1,13 +1,18 @@
 """An audit of measures of the physical figure: each test would have caught what was wrong."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from experiments.config.words import run_config
 from experiments.results.measures import PathMeasure
 from experiments.run import run
 from models.humanoid.skeleton import FOOT_CONTACTS, JOINTS, figure_model, joint_range, rest_pose, standing_com
+from models.mocap.library import embedded
+from sim.body.clip_motion import clip_motion
 from sim.body.falls import DOWN, LIES, RISES, SET_BACK, UP
 from sim.body.figure import Figure
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_SUPPORT, FigureGains
@@ -56,7 +61,7 @@ def test_a_figure_that_lost_the_floor_is_not_in_flight_unless_its_reference_is()
 
 
 @pytest.mark.slow
-def test_grounded_of_a_run_is_what_an_independent_count_of_stance_and_contact_gives(tmp_path) -> None:
+def test_grounded_of_a_run_is_what_an_independent_count_of_stance_and_contact_gives(tmp_path: Path) -> None:
     summary = run(run_config(clips=("run",), lap=2.2, seconds=4.0), tmp_path / "run", False, 0.0)
     with Recording(tmp_path / "run" / "run.h5") as recording:
         reference, ground = recording.channel("frames", "reference")[:], recording.channel("frames", "ground")[:]
@@ -94,6 +99,29 @@ def test_a_figure_that_falls_is_caught_by_its_body_and_is_back_on_the_animation_
     assert min(lows) > -0.02
     assert np.linalg.norm(data.qpos[:3] - standing()[:3]) < 0.01
     assert figure.state.fall.state[2] == 1.0
+    assert sum(warning.number for warning in data.warning) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("run", 0), ("backflip", 1), ("walk", 3), ("run", 4)])
+def test_a_figure_thrown_anyhow_is_back_on_a_moving_animation_and_nothing_blows_up(name: str, seed: int) -> None:
+    rng, start = np.random.default_rng(seed), standing()
+    start[2], start[3:7] = 1.0, Rotation.random(None, rng).as_quat(scalar_first=True)
+    model, data, figure = world(start)
+    data.qvel[:] = rng.normal(scale=2.0, size=57)
+    motion = clip_motion(embedded(name), figure.period * np.arange(1300, dtype=np.float64))
+    rows = [np.ascontiguousarray(r) for r in (motion.poses, motion.velocities, motion.accelerations)]
+    modes, pose = list[float](), start
+    for pose, velocity, acceleration in zip(*rows, strict=True):
+        figure.update(pose, velocity, acceleration)
+        modes.append(figure.state.report[REPORT_DOWN])
+        if modes[-1] == UP and SET_BACK in modes:
+            break
+        mujoco.mj_step(model, data, 4)
+    assert modes[-1] == UP
+    assert DOWN in modes
+    assert np.linalg.norm(data.qpos[:3] - pose[:3]) < 0.05
+    assert np.abs(data.qvel).max() < 50.0
     assert sum(warning.number for warning in data.warning) == 0
 
 

@@ -1,6 +1,8 @@
 """An audit of figures of speed: each keeps to a ratio, says so, and counts."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -14,7 +16,9 @@ FIGURES = (
 )
 
 
-def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_does_not(capsys) -> None:
+def test_each_figure_says_whether_it_passes_and_a_check_fails_with_one_that_fails(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert [figure.passes for figure in FIGURES] == [True, False, None]
     assert tell(FIGURES, False, True) == 1
     lines = capsys.readouterr().out.splitlines()
@@ -31,7 +35,7 @@ def test_what_is_not_a_number_passes_nothing() -> None:
     assert Figure("nothing", float("nan"), at_least=1.0).passes is False
 
 
-def test_json_has_values_bounds_and_verdicts(capsys) -> None:
+def test_json_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:
     assert tell(FIGURES, True, True) == 1
     told = json.loads(capsys.readouterr().out)
     assert [one["passes"] for one in told] == [True, False, None]
@@ -46,3 +50,13 @@ def test_every_mode_that_is_benched_steps_once_a_tick_and_has_its_figure_at_500_
     assert config.scene.substeps() == 1
     assert config.figure.figure_ticks * config.clock.servo_period == pytest.approx(2e-3)
     assert config.figure.kind == "physical"
+
+
+def test_what_draws_is_not_imported_before_the_first_tick() -> None:
+    late = ("matplotlib", "viser", "mjviser", "trimesh", "casadi", "pandas", "statsmodels", "optuna", "dask", "PIL")
+    code = (
+        "import sys, experiments.cli, experiments.run, experiments.setups.wiring; "
+        f"print([name for name in {late} if name in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert told.strip() == "[]"

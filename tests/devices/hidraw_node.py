@@ -106,8 +106,8 @@ class HidrawNode:
 class NodeFirmware:
     """The reference firmware on the linkage, behind a node."""
 
-    def __init__(self, folder: Path, arm: Arm | None = None):
-        self.firmware = Firmware(compiled(folder, ROOT / "firmware" / "hvf_hid.c"))
+    def __init__(self, folder: Path, arm: Arm | None = None, period: float = 1e-3):
+        self.firmware, self.period = Firmware(compiled(folder, ROOT / "firmware" / "hvf_hid.c")), period
         self.linkage = Linkage(arm)
         self.node = HidrawNode(self.firmware.descriptor(), 0x16C0, 0x0486, "Reference", "HVF-0001")
         self._features()
@@ -118,15 +118,22 @@ class NodeFirmware:
 
     def tell(self) -> None:
         self.firmware.turn_to(self.linkage.angles())
-        self.node.post(self.firmware.tick())
+        self.node.post(self.firmware.tick(self.period))
 
-    def hear(self) -> None:
-        for report in self.node.written():
+    def hear(self) -> bool:
+        """Take what was written; whether there was anything."""
+        reports = self.node.written()
+        for report in reports:
             self.firmware.take(report)
+        return bool(reports)
 
     def move(self) -> None:
         self.hear()
         self.linkage.turn(self.firmware.joint_torque)
+
+    def power_up(self, calibrated: bool) -> None:
+        self.firmware.power_up(calibrated)
+        self._features()
 
 
 class NodeRig(Rig):

@@ -1,18 +1,26 @@
 """Run by `test_hidraw_nodes.py`, with umockdev loaded: hidapi as it comes, on a /dev/hidraw0."""
 
+import contextlib
+import json
+import threading
 import time
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from controllers.curves.trajectory import Trajectory
 from controllers.safety.faults import Fault
 from experiments.cli import main
+from experiments.files.device_files import calibration_from, read_device_file
+from experiments.hardware.permit import check_device
 from sim.devices.driver import READ, ROUND_TRIP, DriverFault
 from sim.devices.hardware_list import found_devices, hid_backend, open_device
 from sim.errors import SimError
 from tests.devices.follow import LAP, device_follow, gated_follow, rms, simulated_follow
 from tests.devices.hidraw_node import SPACEMOUSE_DESCRIPTOR, HidrawNode, NodeFirmware, NodeRig
-from tests.devices.rig import LockStep
+from tests.devices.rig import HeldLinkage, LockStep
 
 MOUSE = bytes.fromhex("05010902a1010901a10005091901290315002501950375018102c0c0")
 
@@ -147,8 +155,6 @@ def test_a_node_that_may_not_be_opened_has_its_udev_rule_printed(phantom, capsys
 
 
 def test_the_doctor_measures_how_a_device_answers_with_its_motors_off(phantom, capsys) -> None:
-    import threading
-
     done = threading.Event()
 
     def live() -> None:
@@ -170,3 +176,87 @@ def test_the_doctor_measures_how_a_device_answers_with_its_motors_off(phantom, c
     assert "round trip" in said
     assert "not told" not in said
     assert not phantom.firmware.motors.on
+
+
+PERIOD = 4e-3
+RATES = "--servo-period", "0.004", "--physics-step", "0.0005"
+
+
+@pytest.fixture
+def held(tmp_path):
+    """A device in a hand that holds it on the run's curve, lets go once the motors are on, and presses the switch."""
+    made = NodeFirmware(tmp_path, period=PERIOD)
+    made.linkage = HeldLinkage(np.array(Trajectory.circle(0.0477, 4.0).point(0.0)), PERIOD)
+    made.firmware.sensors.pressed = 1
+    yield made
+    made.node.close()
+
+
+@contextlib.contextmanager
+def playing(device: NodeFirmware) -> Iterator[None]:
+    """The device goes on by a period with each command, and by itself while none comes."""
+    done = threading.Event()
+
+    def live() -> None:
+        last = 0.0
+        while not done.is_set():
+            if device.hear() or time.monotonic() - last > 10.0 * PERIOD:
+                device.linkage.turn(device.firmware.joint_torque)
+                device.tell()
+                last = time.monotonic()
+            else:
+                time.sleep(2e-4)
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
+def hardware(*arguments: str) -> int:
+    return main(["hardware", *arguments])
+
+
+def test_a_device_is_calibrated_certified_run_and_reported_from_the_command_line(held, tmp_path, capsys) -> None:
+    """With a real certificate, through hidapi and its node, in processes of its own."""
+    field = ("--mode", "follow", *RATES)
+    assert main(["certify", *field, "--out", str(tmp_path / "certificate")]) == 0
+    run = ("run", "--device", "hid", "--arm", "--late", "5", "--seconds", "4", "--out", str(tmp_path / "run"))
+    armed = (*run, "--certificate", str(tmp_path / "certificate"))
+    assert hardware(*run, *field) == 2
+    assert "expected --certificate" in capsys.readouterr().err
+    assert hardware(*armed, *field, "--stiffness", "400") == 2
+    assert "stiffness 300.0 (here 400.0)" in capsys.readouterr().err
+    with playing(held):
+        for _ in range(3):  # a machine that is too busy for the device is no failure of ours
+            code = hardware(*armed, *field, "--overwrite")
+            said = capsys.readouterr().out
+            if "no new reading" not in said:
+                break
+    assert code == 0, said
+    told = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (told["device"], told["transport"]) == ("Reference", "/dev/hidraw0")
+    assert told["active"] > 1.0
+    assert told["distance"] < 3e-3
+    assert told["recorded"] == told["ticks"]
+    held.hear()
+    assert not held.firmware.motors.on
+    assert main(["report", str(tmp_path / "run")]) == 0
+
+
+def test_a_device_that_forgot_its_zero_is_armed_with_a_calibration_of_this_power_up_only(held, tmp_path) -> None:
+    held.power_up(calibrated=False)
+    file = str(tmp_path / "device.json")
+    with playing(held):
+        theta = held.linkage.angles()[:3]
+        assert hardware("calibrate", "--device", "hid", "--pose", *map(str, theta), "--out", file) == 0
+    told = read_device_file(Path(file))
+    assert np.abs(told["offset"]["value"]).max() < 5e-3  # a hand sags
+    calibration = calibration_from(told)
+    assert check_device(open_device("hid").identity, calibration) == []
+    held.power_up(calibrated=False)
+    with pytest.raises(SimError, match="calibrated before the device was switched off"):
+        check_device(open_device("hid").identity, calibration)

@@ -1,5 +1,6 @@
 """Vendor libraries built from C, and what stands behind them."""
 
+import abc
 import ctypes
 from pathlib import Path
 
@@ -8,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, stylus_orientation
-from sim.devices.dhd import load_dhd
-from sim.devices.hdapi import load_hdapi
+from sim.devices.dhd import DHD
+from sim.devices.hdapi import HDAPI
 from tests.devices.firmware import compiled
 from tests.devices.rig import Linkage
 
@@ -20,7 +21,7 @@ R_HD = np.diag([-1.0, -1.0, 1.0])
 
 def mock_hd(folder: Path) -> ctypes.CDLL:
     path = compiled(folder, HERE / "mock_hd.c")
-    library = load_hdapi(str(path))
+    library = HDAPI.load(str(path))
     library.mock_velocity.argtypes = [ctypes.c_double] * 3
     library.mock_temperature.argtypes = [ctypes.c_double]
     library.mock_frames.restype = ctypes.c_ulong
@@ -29,7 +30,7 @@ def mock_hd(folder: Path) -> ctypes.CDLL:
 
 
 def mock_dhd(folder: Path) -> ctypes.CDLL:
-    library = load_dhd(str(compiled(folder, HERE / "mock_dhd.c")))
+    library = DHD.load(str(compiled(folder, HERE / "mock_dhd.c")))
     library.mock_reset()
     return library
 
@@ -46,14 +47,19 @@ def pose_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(forward_kinematics(angles[:3])), Rotation.from_quat(q, scalar_first=True).as_matrix()
 
 
-class BehindVendor:
+class BehindVendor(abc.ABC):
     """A linkage whose pose a library tells, and that its force pulls; such a device carries its own weight."""
 
     def __init__(self, library: ctypes.CDLL, linkage: Linkage):
         self.library, self.linkage = library, linkage
 
+    @abc.abstractmethod
+    def tell(self) -> None:
+        """Give the library the linkage's pose."""
+
+    @abc.abstractmethod
     def force_P(self) -> np.ndarray:
-        raise NotImplementedError
+        """What the library was told to pull with [N], in P."""
 
     def move(self) -> None:
         theta = tuple(self.linkage.angles()[:3])

@@ -6,8 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from controllers.safety.faults import FAULT_CODE, latch
+from models.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity, Driver, DriverFault
-from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, Exchange
+from sim.devices.exchange import COMMAND_FAULT, COMMAND_TORQUE, READING_SIZE, READING_THETA, Exchange
+from sim.hardware.emulated import EmulatedPhantom
 from sim.users.arm import Arm
 from sim.world.plant import make_plant
 from tests.devices.firmware import Firmware, FirmwareHandle
@@ -33,6 +35,21 @@ class Linkage:
         self.plant.ctrl[list(self.phantom.port.motor)] = torque
         pass_period(self.plant, self.phantom.port, self.phantom.user, self.ticks * self.plant.period, self._applied)
         self.ticks += 1
+
+
+class HeldLinkage:
+    """A linkage whose hand holds the stylus until the motors have been on for a while (`EmulatedPhantom`)."""
+
+    def __init__(self, start: np.ndarray, period: float):
+        self._device = EmulatedPhantom(SceneConfig(servo_period=period), start)
+
+    def angles(self) -> np.ndarray:
+        reading = np.zeros(READING_SIZE)
+        self._device.read(reading, 0.0)
+        return reading[READING_THETA:]
+
+    def turn(self, torque: np.ndarray) -> None:
+        self._device.write(torque, bool(torque.any()))
 
 
 class Behind(Protocol):

@@ -8,7 +8,7 @@ import pytest
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
-from sim.devices.dhd import LARGEST, DhdDevice, load_dhd
+from sim.devices.dhd import DHD, LARGEST, DhdDevice
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from tests.devices.mocks import mock_dhd, three
@@ -31,7 +31,7 @@ def pose(dhd, p) -> None:
 
 def test_who_it_is_and_that_its_watchdog_of_ten_milliseconds_is_set(dhd) -> None:
     device = DhdDevice(dhd)
-    assert device.identity == ("mock omega.6", "DHD", "321", "", True, True, True)
+    assert device.identity == ("mock omega.6", "DHD", "321", "", True, True, True, 0, True)
     assert dhd.mock_watchdog() * 125e-6 == pytest.approx(0.01)
 
 
@@ -85,6 +85,6 @@ def test_no_device_and_no_library_are_lines(dhd, monkeypatch) -> None:
     dhd.mock_missing(1)
     with pytest.raises(SimError, match="DHD opens no device: mock error"):
         DhdDevice(dhd)
-    monkeypatch.setattr("sim.devices.dhd.find_dhd", lambda: None)
+    monkeypatch.setattr("sim.devices.vendor_library.ctypes.util.find_library", lambda name: None)
     with pytest.raises(SimError, match="install the Force Dimension SDK"):
-        load_dhd()
+        DHD.load()

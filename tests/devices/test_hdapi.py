@@ -9,7 +9,7 @@ from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, joint_torques
 from sim.devices.driver import DriverFault
-from sim.devices.hdapi import ERRORS, HdapiDevice, load_hdapi
+from sim.devices.hdapi import ERRORS, HDAPI, HdapiDevice
 from sim.errors import SimError
 from tests.devices.mocks import mock_hd, three
 from tests.devices.test_hid import Clock
@@ -46,7 +46,7 @@ def told(device) -> np.ndarray:
 
 
 def test_who_it_is_that_it_has_no_watchdog_and_that_it_is_calibrated(hd) -> None:
-    assert HdapiDevice(hd).identity == ("Mock Premium", "HDAPI", "M-42", "", True, False, True)
+    assert HdapiDevice(hd).identity == ("Mock Premium", "HDAPI", "M-42", "", True, False, True, 0, True)
 
 
 @pytest.mark.parametrize(("state", "calibrated"), [(0x5000, True), (0x5001, True), (0x5002, False)])
@@ -175,12 +175,12 @@ def test_another_name_is_a_line(hd) -> None:
 
 
 def test_a_library_that_is_missing_is_a_line_with_what_to_install(monkeypatch) -> None:
-    monkeypatch.setattr("sim.devices.hdapi.find_hdapi", lambda: None)
+    monkeypatch.setattr("sim.devices.vendor_library.ctypes.util.find_library", lambda name: None)
     with pytest.raises(SimError, match="install 3D Systems' OpenHaptics"):
-        load_hdapi()
+        HDAPI.load()
 
 
 def test_a_library_that_is_another_is_a_line(tmp_path) -> None:
     (tmp_path / "libHD.so").write_text("not a library")
-    with pytest.raises(SimError, match="is not OpenHaptics' HD library"):
-        load_hdapi(str(tmp_path / "libHD.so"))
+    with pytest.raises(SimError, match="is not OpenHaptics' library HD"):
+        HDAPI.load(str(tmp_path / "libHD.so"))

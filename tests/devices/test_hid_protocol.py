@@ -11,6 +11,7 @@ from models.phantom.parameters import PREMIUM_1_5
 from sim.devices import hid_protocol as protocol
 from sim.errors import SimError
 from tests.devices.firmware import ROOT, Firmware, compiled
+from tests.devices.rig import Linkage
 
 STRUCTS = {
     "hvf_input": protocol.INPUT_REPORT, "hvf_output": protocol.OUTPUT_REPORT,
@@ -212,3 +213,43 @@ def test_a_motor_that_was_too_hot_has_to_cool_by_five_degrees_before_it_is_drive
     assert [driven(k, t) for k, t in enumerate([9900, 10_000, 9900, 9501, 9499, 9900])] == [
         True, False, False, False, True, True,
     ]  # fmt: skip
+
+
+def of_the_page(report: int) -> bytes:
+    """The example of a report in the protocol's page."""
+    page = (ROOT / "docs" / "reference" / "hid-protocol.md").read_text(encoding="utf-8")
+    (line,) = [line for line in page.splitlines() if line.startswith(f"{report:02x} ") and set(line) <= set(HEX)]
+    return bytes.fromhex(line)
+
+
+HEX = "0123456789abcdef "
+
+
+def test_the_page_s_bytes_are_those_of_the_firmware_and_of_the_driver(firmware: Firmware) -> None:
+    """Units and signs, number by number: 1, −2, 3 mN m; 1000, −2000, 3000, 0, 100, −100 counts; 30 and 31 °C."""
+    command = of_the_page(protocol.OUTPUT)
+    assert command == protocol.packed_output(True, 1, 7, 10_000, [1000, -2000, 3000], 42)
+    assert firmware.take(command)
+    np.testing.assert_allclose(firmware.joint_torque, np.array([1e-3, -2e-3, 3e-3]) * PREMIUM_1_5.capstan, rtol=1e-12)
+    firmware.sensors.encoder[:] = [1000, -2000, 3000, 0, 100, -100]
+    firmware.sensors.pressed = 1
+    told = firmware.tick()
+    assert told == of_the_page(protocol.INPUT)
+    report = protocol.unpacked_input(told)
+    assert report == (1, 3, 1, 1000, (1000, -2000, 3000, 0, 100, -100), (3000, 3100, -32768), 1, 7, 1000, 0)
+
+
+@pytest.mark.parametrize("joint", range(3))
+def test_a_positive_torque_in_the_bytes_turns_its_joint_so_that_its_encoder_counts_up(firmware, joint: int) -> None:
+    def counts(torque: int) -> np.ndarray:
+        firmware.power_up()
+        linkage, k = Linkage(), 0
+        for k in range(30):
+            shafts = [torque * (i == joint) for i in range(3)]
+            assert firmware.take(protocol.packed_output(True, firmware.boot, k + 1, 10_000, shafts, 0))
+            linkage.turn(firmware.joint_torque)
+            firmware.turn_to(linkage.angles())
+            firmware.tick()
+        return np.array(firmware.sensors.encoder[:3])
+
+    assert (counts(20_000) - counts(-20_000))[joint] > 100

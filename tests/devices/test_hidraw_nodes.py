@@ -26,11 +26,16 @@ def inside(*arguments: str, seconds: float = 240.0) -> str:
     return told.stdout
 
 
-@pytest.mark.processes
+@pytest.mark.slow
 def test_the_contract_of_a_device_holds_for_hid_and_spacemouse_through_their_nodes() -> None:
     assert "18 passed" in inside("tests/contract/test_device_contract.py", "-k", "node")
 
 
-@pytest.mark.processes
+@pytest.mark.slow
 def test_the_driver_the_list_and_the_doctor_see_a_real_node() -> None:
-    assert "13 passed" in inside("tests/devices/inside_umockdev.py")
+    assert "15 passed" in inside("tests/devices/inside_umockdev.py", "-k", "not command_line")
+
+
+@pytest.mark.processes
+def test_a_device_behind_a_real_node_is_certified_and_run_from_the_command_line() -> None:
+    assert "1 passed" in inside("tests/devices/inside_umockdev.py", "-k", "command_line", seconds=600.0)

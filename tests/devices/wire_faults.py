@@ -89,7 +89,7 @@ def inject(order: "Order", seed: int, library: Path, folder: Path) -> Injected:
     begin, evident = wire.number, order.do(wire, rng)
     off = np.array([wire.tick() for _ in range(evident + LATER)])
     faults = columns(np.array(wire.rows[begin:]))["fault"].ravel()
-    assert faults.any(), "no fault"
+    assert faults.any(), f"{order.words}, {seed}: no fault"
     assert off[-1].all(), "force to the end"
     assert wire.ticker.fault is not None
     zero, motors = (int(len(column) - np.argmin(column[::-1])) if not column.all() else 0 for column in off.T)

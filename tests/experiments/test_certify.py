@@ -10,7 +10,6 @@ import pytest
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
-from controllers.errors import ParameterError
 from experiments.certify import certified_field
 from experiments.certify.certified_field import certificate_inputs
 from experiments.certify.certify import (
@@ -25,6 +24,7 @@ from experiments.cli import main
 from experiments.config.words import run_config
 from experiments.files import certificate_files
 from experiments.files.certificate_files import read_certificate, verify_certificate
+from experiments.setups.certified_law import left_out
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 
@@ -126,8 +126,7 @@ def test_bunny_and_tubes_are_certified_by_their_own_laws_and_what_is_not_known_i
         ("", 140.0, True), ("_held", 160.0, False), ("_then", 300.0, True),
     ]  # fmt: skip
     assert certified_rivers(run_config(mode="rivers"))[""].width == run_config(mode="rivers").mode.river_tube
-    with pytest.raises(ParameterError, match="governor"):
-        certified_rivers(run_config(mode="rivers", governor=True))
+    assert left_out(run_config(mode="rivers", governor=True)) == ("the gates of the rivers (--governor)",)
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])

@@ -41,11 +41,13 @@ def test_a_jump_played_too_slowly_or_too_fast_is_refuted(pace):
     assert f"{1 / pace:.2f} of its speed" in found.reason
 
 
-@pytest.mark.parametrize("height", [-0.03, 0.03])
-def test_a_floor_that_is_missed_by_centimetres_changes_no_verdict(height):
+@pytest.mark.parametrize(
+    ("height", "expected"), [(-0.03, "unknown"), (-0.006, "certified"), (0.006, "certified"), (0.03, "unknown")]
+)
+def test_a_floor_that_is_missed_by_millimetres_changes_no_verdict_and_no_gravity_by_centimetres(height, expected):
     clip = embedded("jump")
     found = clip_ballistics(Clip(clip.poses + np.eye(75)[2] * height, clip.fps, "hovering"))
-    assert found.certificate.verdicts["ballistic"].verdict == "certified"
+    assert found.certificate.verdicts["ballistic"].verdict == expected
     assert [flight.fit.gravity for flight in found.flights] == pytest.approx([9.81], abs=0.2)
 
 
@@ -65,8 +67,8 @@ def test_the_certificate_is_of_one_clip_and_one_tolerance():
     [
         ("deepmimic/humanoid3d_backflip.txt", "certified"), ("deepmimic/humanoid3d_spinkick.txt", "certified"),
         ("deepmimic/humanoid3d_jump.txt", "certified"), ("cmu_amc/02_04.amc", "certified"),
-        ("cmu_amc/16_09.amc", "certified"), ("cmu_amc/01_01.amc", "certified"), ("cmu_amc/02_03.amc", "certified"),
-        ("deepmimic/humanoid3d_cartwheel.txt", "certified"), ("snu/cart.bvh", "certified"),
+        ("cmu_amc/16_09.amc", "certified"), ("cmu_amc/01_01.amc", "certified"), ("cmu_amc/02_03.amc", "unknown"),
+        ("deepmimic/humanoid3d_cartwheel.txt", "unknown"), ("snu/cart.bvh", "unknown"),
         ("snu/walk.bvh", "certified"), ("snu/backflip.bvh", "refuted"), ("deepmimic/humanoid3d_spin.txt", "refuted"),
         ("snu/pirouette.bvh", "unknown"),
     ],
@@ -126,10 +128,12 @@ def test_the_impossible_backflip_falls_with_g_after_repair(tmp_path):
     repair_file(SHARED / "snu" / "backflip.bvh", target)
     after = clip_ballistics(load_clip(target))
     assert max(flight.fit.gravity for flight in after.flights) == pytest.approx(9.81, abs=0.1)
-    # Where it may still be refused is its angular momentum, which the repair of its timing and place leaves: 30.2° from
-    # constant, at the bound of 30°.
+    assert {flight.verdict for flight in after.flights} == {"certified"}
+    assert max(np.rad2deg(flight.fit.drift) for flight in after.flights) < 3.0
+    # What remains is that its soles hover, which no flight mends.
     judged = after.certificate.verdicts["ballistic"]
-    assert judged.verdict == "certified" or "30° away from constant angular momentum" in judged.reason
+    assert judged.verdict == "unknown"
+    assert "from where it stands" in judged.reason
     with pytest.raises(ModelError, match="exists"):
         repair_file(SHARED / "snu" / "backflip.bvh", target)
     with pytest.raises(ModelError, match="BVH"):

@@ -9,6 +9,8 @@ from experiments.hardware.doctor import MISSING, OK, findings, measured_lateness
 from sim.devices import hardware_list
 from sim.devices.hardware_list import FoundDevice, found_devices
 
+FIND = "sim.devices.vendor_library.ctypes.util.find_library"
+
 
 @pytest.fixture(autouse=True)
 def nothing_connected(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,9 +20,7 @@ def nothing_connected(monkeypatch: pytest.MonkeyPatch) -> None:
             return []
 
     monkeypatch.setattr(hardware_list, "hid_backend", Backend)
-    for module in ("sim.devices.hardware_list", "experiments.hardware.doctor"):
-        for name in ("find_hdapi", "find_dhd"):
-            monkeypatch.setattr(f"{module}.{name}", lambda: None)
+    monkeypatch.setattr(FIND, lambda name: None)
 
 
 def test_a_list_of_nothing_says_where_to_look(capsys) -> None:
@@ -76,7 +76,7 @@ def test_hidapi_that_is_not_installed_is_a_line(monkeypatch, capsys) -> None:
 
 
 def test_a_library_that_is_installed_is_listed_and_a_node_without_permission_has_its_rule(monkeypatch) -> None:
-    monkeypatch.setattr(hardware_list, "find_hdapi", lambda: "libHD.so")
+    monkeypatch.setattr(FIND, {"HD": "libHD.so"}.get)
     (device,) = found_devices()
     assert (device.name, device.transport, device.kind) == ("hdapi", "HDAPI", "vendor")
     node = FoundDevice(

@@ -1,6 +1,7 @@
 """What a person meets who runs a device: permits, one line where something is wrong, a folder with what happened."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -196,8 +197,8 @@ def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> Non
 
 
 def test_the_diagram_of_the_documents_is_the_table() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "explanation" / "hardware-safety.md").read_text(encoding="utf-8")
-    shown = {line.strip() for line in page.split("```mermaid")[1].split("```")[0].splitlines() if "-->" in line}
+    picture = (Path(__file__).parents[2] / "docs" / "pictures" / "gate-states.svg").read_text(encoding="utf-8")
+    shown = {edge.replace("&gt;", ">") for edge in re.findall(r'data-edge="([^"]*)"', picture)}
     assert shown == {line.strip() for line in mermaid().splitlines() if "-->" in line}
     assert len(shown) == len(TRANSITIONS) + 1
 
@@ -221,3 +222,29 @@ def test_a_run_on_the_emulated_device_leaves_a_recording_and_says_what_it_was(tm
     with Recording(out / "run.h5") as recording:
         assert recording.summary is not None
         assert recording.channel("ticks", "distance")[-100:].max() < 5e-3
+
+
+@pytest.mark.processes
+def test_hidden_numbers_are_calibrated_recorded_and_identified_from_the_command_line(
+    tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hidden = {
+        "coulomb": [0.012, 0.009, 0.011], "viscous": [0.001, 0.0012, 0.0009], "inertia": [3e-4, 1e-4, 8e-5],
+        "delay": [5e-4], "offset": [0.02, -0.015, 0.01],
+    }  # fmt: skip
+    content = {"format": "hvf-device-1"} | {name: {"value": value} for name, value in hidden.items()}
+    save_device(content, Path("hidden.json"))
+    run = ("run", "--emulate", "hidden.json", "--arm", "--no-dead-man", "--wave", "0.02", "--small", "2", "--late", "9",
+           "--seconds", "14", "--overwrite")  # fmt: skip
+    assert main(["hardware", *run, "--out", "runs/4"]) == 2  # not calibrated
+    assert main(["hardware", "calibrate", "--emulate", "hidden.json", "--out", "device.json"]) == 0
+    for lap in ("4", "2.5"):
+        assert main(["hardware", *run, "--device-file", "device.json", "--lap", lap, "--out", f"runs/{lap}"]) in (0, 1)
+    assert main(["hardware", "identify", "runs/4", "runs/2.5", "--out", "found.json"]) == 0
+    told = read_device_file(Path("found.json"))
+    for name, value in hidden.items():
+        assert np.all(np.abs(np.array(told[name]["value"]) - value) <= np.array(told[name]["margin"])), name
+    linkage = linkage_from(told)
+    assert linkage_of(Phantom(device_file="found.json")) == linkage
+    assert main(["run", "--figure", "none", "--seconds", "1", "--device-file", "found.json", "--out", "runs/sim"]) == 0

@@ -22,6 +22,7 @@ from experiments.setups.parts import Parts
 from experiments.setups.setups import map_parts, parts_of
 from experiments.setups.stretch import stretch_grabs
 from models.humanoid.skeleton import figure_model
+from sim.body.residual import Residual
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.users.arm import Arm, hand_force
@@ -156,7 +157,10 @@ def test_editing_and_performing_are_told_apart() -> None:
     press = PressSummary(2.3, 1.7, "held", 0.125, 13.2, 13.3, 2.1)
     push = PushSummary(18.8, 1.2, 2.5, 8.4, 0.99)
     animation = AnimationSummary(31.0, 27.0)
-    figure = FigureSummary(None, 1.0, 0.1, 0.2, 0.124, 0.9, 0.01, 0.0, 0.0, 0.0, 1.0, 1.0)
+    residual = Residual(14.3, 0.124, 0.9, 0.01, 0.05)
+    figure = FigureSummary(
+        (), None, 14.3, 14.3, 1.0, 0.1, 0.2, 0.124, residual, residual, residual, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0
+    )
     editing = EditingSummary(14.3, 14.3, (press,), (), animation, figure)
     assert editing.lines() == [
         "Editing, 14.3 s: at 2.3 s grabbed at 12 % of the curve and dragged 13.2 mm.",

@@ -1,9 +1,11 @@
 """A live page in this process, and Debian's chromium that looks at it."""
 
+import contextlib
+import os
 import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +14,71 @@ import pytest
 
 from experiments.config.run_config import RunConfig
 from experiments.live.page import Page
-from sim.viewer.live_stage import FIELD_OF_VIEW, VIEWS, drawn_at
+from sim.viewer.live_stage import drawn_at
+from sim.viewer.views import FIELD_OF_VIEW, VIEWS, camera_of, screen_axes
 
 CHROMIUM = shutil.which("chromium")
 ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
+WIDTH, HEIGHT = 900, 520
+PICTURES = os.environ.get("HVF_SCREENSHOTS", "")
+"""Folder in which pictures of the page are kept for who looks; none if it is empty."""
 
 
-def needs_chromium() -> None:
-    """Skip where there is no browser."""
-    pytest.importorskip("playwright.sync_api", reason="needs Playwright for Python")
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """The browser; skips where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="needs Playwright for Python")
     if CHROMIUM is None:
         pytest.skip("needs Debian's chromium")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT) -> Any:
+    """A tab that shows the page."""
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.set_default_timeout(1e3 * PATIENCE)
+    page.goto(address)
+    page.get_by_role("button", name="Pause").wait_for()
+    return page
+
+
+def kept(tab: Any, name: str) -> None:
+    """Keep a picture of the page, where the environment names a folder."""
+    if PICTURES:
+        tab.screenshot(path=Path(PICTURES) / f"{name}.png")
+
+
+def choose(tab: Any, label: str, option: str) -> None:
+    """Choose from a list."""
+    tab.get_by_label(label, exact=True).click()
+    tab.get_by_role("option", name=option, exact=True).click()
+
+
+@contextlib.contextmanager
+def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Iterator[None]:
+    """The left button pressed at a place and moved by so many pixels, then let go."""
+    tab.mouse.move(*start)
+    _drawn(tab)
+    tab.mouse.down()
+    _drawn(tab)
+    for share in (0.25, 0.5, 0.75, 1.0):
+        tab.mouse.move(start[0] + share * by[0], start[1] + share * by[1])
+        _drawn(tab)
+    try:
+        yield
+    finally:
+        tab.mouse.up()
+
+
+def _drawn(tab: Any) -> None:
+    """Wait until the browser has drawn three more pictures."""
+    tab.evaluate(
+        "new Promise(done => { let n = 0; const f = () => ++n > 3 ? done(0) : requestAnimationFrame(f); f() })"
+    )
 
 
 class Served:
@@ -49,19 +104,24 @@ class Served:
             assert time.monotonic() < end, f"not so after {PATIENCE:g} s: {what}; said: {self.page._said}"
             time.sleep(step)
 
+    def settled(self) -> dict[str, np.ndarray]:
+        """What is shown once time stands still, and the browser has drawn it."""
+        self.until(lambda: self.desk.paused, "time stands still")
+        time.sleep(1.5)
+        return self.desk.now
+
     def close(self) -> None:
         self.page._closed.set()
         self.thread.join(10.0)
         self.page.close()
 
 
-def on_screen(p_H: np.ndarray, width: int, height: int, view: str = "both") -> tuple[float, float]:
-    """Where a point of the hand frame is seen, in pixels."""
-    camera = VIEWS[view]
-    eye, forward = np.array(camera.position), np.array(camera.look_at) - np.array(camera.position)
+def on_screen(p_H: np.ndarray, view: str = "both") -> tuple[float, float]:
+    """Where a point of the hand frame is seen in a tab, in pixels."""
+    camera = camera_of(VIEWS[view], WIDTH, HEIGHT)
+    forward = camera.look_at - camera.position
     forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up, way = np.cross(right, forward), drawn_at(p_H) - eye
-    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
-    return 0.5 * width + scale * (way @ right), 0.5 * height - scale * (way @ up)
+    right, up = screen_axes(forward)
+    way = drawn_at(p_H) - camera.position
+    scale = 0.5 * HEIGHT / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
+    return 0.5 * WIDTH + scale * (way @ right), 0.5 * HEIGHT - scale * (way @ up)

@@ -1,4 +1,4 @@
-"""A person in front of the live page: Debian's chromium, Playwright's mouse."""
+"""A person in front of the live page: Debian's chromium, Playwright's mouse and keyboard."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,25 +8,21 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
+from experiments.live.cap_hand import CapHand
+from experiments.live.desk import MOST_BYTES
 from experiments.live.gate import Gate
+from experiments.live.hand_keys import STEP
 from models.mocap.library import load
-from tests.live.browser import ARGUMENTS, CHROMIUM, PATIENCE, Served, needs_chromium, on_screen
+from sim.devices.spacemouse import SpaceMouse
+from sim.recording.recording import Recording
+from tests.devices.test_spacemouse import Cap
+from tests.live.browser import PATIENCE, Served, choose, chromium, drag, kept, new_tab, on_screen
 
+__all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
-WIDTH, HEIGHT = 900, 520
 TOKEN = "0123456789abcdef"
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    needs_chromium()
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
+CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "deepmimic" / "humanoid3d_kick.txt"
 
 
 @pytest.fixture(scope="module")
@@ -38,107 +34,206 @@ def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @pytest.fixture(scope="module")
 def tab(chromium: Any, served: Served) -> Iterator[Any]:
-    page = chromium.new_page(viewport={"width": WIDTH, "height": HEIGHT})
-    page.set_default_timeout(1e3 * PATIENCE)
-    page.goto(served.address)
-    page.get_by_role("button", name="Pause").wait_for()
+    page = new_tab(chromium, served.address)
     yield page
     if not page.is_closed():
         page.close()
 
 
-def kept(tab: Any, folder: Path, name: str) -> None:
-    """Keep a picture of the page for who looks."""
-    tab.screenshot(path=folder / f"{name}.png")
+@pytest.fixture(autouse=True)
+def goes_on(served: Served) -> Iterator[None]:
+    """Nobody holds the stylus and time goes on, whatever a test has left."""
+    served.desk.let_go()
+    served.desk.pause(False)
+    yield
+    served.page.say("—")
 
 
-def drawn(tab: Any, served: Served) -> None:
-    """Wait until the browser has drawn a few pictures of a scene that stands."""
-    tab.evaluate(
-        "new Promise(done => { let n = 0; const f = () => ++n > 3 ? done(0) : requestAnimationFrame(f); f() })"
-    )
-
-
-def test_the_hand_is_dragged_the_arrow_grows_and_the_curve_is_bent(tab: Any, served: Served, tmp_path: Path) -> None:
-    desk = served.desk
-    tab.get_by_text("Grab (press the switch)").wait_for()
-    desk.pause(True)
-    tab.wait_for_timeout(4000.0)
-    pose, x, y = desk.now["reference"].copy(), *on_screen(desk.now["p"], WIDTH, HEIGHT)
-    tab.mouse.move(x, y)
-    tab.keyboard.down("Shift")
-    tab.mouse.down()
-    for k in range(6):
-        tab.mouse.move(x, y - 6.0 * k)
-        drawn(tab, served)
-    served.until(lambda: desk.holds, "the stylus is held")
-    place = desk.now["p"].copy()
-    desk.pause(False)
-    served.until(lambda: desk.now["p"][2] - place[2] > 0.004, "it comes along")
-    assert np.linalg.norm(desk.now["user"]) > 0.2
-    stage = served.page.stage
+def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, served: Served) -> None:
+    desk, stage = served.desk, served.page.stage
     assert stage is not None
-    served.until(lambda: bool(stage._arrows["user"].visible), "the arrow of the hand is drawn")
-    assert np.abs(desk.now["reference"] - pose).max() > 1e-3
-    kept(tab, tmp_path, "dragged")
-    tab.mouse.up()
+    desk.pause(True)
+    drawn = served.settled()
+    pose, place = drawn["reference"].copy(), drawn["p"].copy()
+    with drag(tab, on_screen(place), (0, -60)):
+        served.until(lambda: desk.holds, "the stylus is held")
+        desk.pause(False)
+        served.until(lambda: desk.now["p"][2] - place[2] > 0.004, "it comes along")
+        served.until(lambda: bool(stage._arrows["user"].visible), "the arrow of the hand is drawn")
+        shaft = np.diff(stage._arrows["user"].points[0], axis=0)
+        assert np.linalg.norm(shaft) > 0.05
+        assert np.abs(desk.now["reference"] - pose).max() > 1e-3
+        kept(tab, "dragged")
+    served.until(lambda: not desk.holds, "it is let go")
+
+
+def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
+    desk = served.desk
+    desk.pause(True)
+    place = served.settled()["p"].copy()
+    tab.keyboard.down("Shift")
+    with drag(tab, on_screen(place), (0, -60)):
+        served.until(lambda: desk.holds, "the stylus is held")
+        desk.pause(False)
+        served.until(lambda: desk.now["p"][2] - place[2] > 0.01, "it comes along")
+        kept(tab, "bending")
     tab.keyboard.up("Shift")
     served.until(lambda: desk.now["bends"][0] == 1.0, "the curve is bent")
+    bent = desk.now["course"].copy()
     tab.get_by_role("button", name="Undo").first.click()
     served.until(lambda: desk.now["bends"][0] == 0.0, "the bend is undone")
+    served.until(lambda: float(np.abs(desk.now["course"] - bent).max()) > 0.005, "the curve is where it was")
+    tab.get_by_role("button", name="Redo").first.click()
+    served.until(lambda: desk.now["bends"][0] == 1.0, "the bend is done again")
+    tab.get_by_role("button", name="Undo").first.click()
+    served.until(lambda: desk.now["bends"][0] == 0.0, "and undone")
 
 
-def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served, tmp_path: Path) -> None:
+def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
+    desk = served.desk
+    desk.pause(True)
+    place = served.settled()["p"].copy()
+    for key in "LLLUU":
+        tab.keyboard.press(key.lower())
+    served.until(lambda: desk.holds and desk.target[2] > place[2] + 1.5 * STEP, "the keys have arrived")
+    np.testing.assert_allclose(desk.target - place, [3 * STEP, 0.0, 2 * STEP], atol=1e-9)
+    desk.pause(False)
+    served.until(lambda: float(np.linalg.norm(desk.now["user"])) > 0.2, "the hand pulls")
+    tab.keyboard.press("h")
+    served.until(lambda: not desk.holds, "it is let go")
+
+
+def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served) -> None:
+    desk, cap = served.desk, Cap()
+    served.page._cap = CapHand(SpaceMouse(cap, "SpaceNavigator", "test"))
+    cap.push(0, 0, -200)  # the cap is lifted
+    place = desk.now["p"][2]
+    served.until(lambda: desk.holds and desk.target[2] > place + 0.01, "the hand goes up")
+    cap.push(0, 0, 0)
+    served.until(lambda: not desk.holds, "it is let go")
+    cap.plugged = False
+    served.until(lambda: served.page._cap is None, "it is gone")
+    tab.get_by_text("The SpaceMouse is gone.").wait_for()
+
+
+def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served) -> None:
     tab.get_by_role("tab", name="Gains").click()
     tab.locator(".verdict-certified").first.wait_for()
+    kept(tab, "green")
     field = tab.locator("input[type=text]:visible").first
     field.fill("11000")
     field.press("Enter")
     tab.locator(".verdict-refuted").first.wait_for()
-    kept(tab, tmp_path, "red")
+    kept(tab, "red")
     assert served.desk.config.mode.seek == 11000.0
-    served.desk.undo()
+    tab.get_by_role("tab", name="Play").click()
+    tab.get_by_role("button", name="Undo").first.click()
+    served.until(lambda: served.desk.config.mode.seek < 11000.0, "the gain is back")
+    tab.get_by_role("tab", name="Gains").click()
     tab.locator(".verdict-refuted").first.wait_for(state="detached")
 
 
-def test_a_take_is_recorded_and_its_bvh_downloaded(tab: Any, served: Served, tmp_path: Path) -> None:
-    tab.get_by_role("tab", name="Takes").click()
+def record(tab: Any, served: Served, name: str, seconds: float = 1.5) -> None:
     tab.get_by_role("button", name="Record", exact=True).click()
-    served.until(lambda: served.desk.now["recording"][0] > 1.0, "it is recorded")
+    served.until(lambda: bool(served.desk.now["recording"][0] > seconds), "it is recorded")
     tab.get_by_role("button", name="Stop").click()
-    served.until(lambda: served.desk.takes() == ("take 1",), "it is kept")
-    tab.wait_for_timeout(1000.0)
+    served.until(lambda: name in served.desk.takes(), "it is kept")
+
+
+def downloaded(tab: Any, button: str, path: Path) -> Path:
     with tab.expect_download() as download:
-        tab.get_by_role("button", name="BVH", exact=True).click()
-    download.value.save_as(tmp_path / "edited.bvh")
-    assert load(tmp_path / "edited.bvh").clip.duration > 0.8
+        tab.get_by_role("button", name=button, exact=True).click()
+    download.value.save_as(path)
+    return path
 
 
-def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
+def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, served: Served, tmp_path: Path) -> None:
+    tab.get_by_role("tab", name="Takes").click()
+    record(tab, served, "take 1")
+    served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.03]), False)
+    record(tab, served, "take 2")
+    served.desk.let_go()
+    served.until(lambda: served.page._takes._list.value == "take 2", "it is chosen")
+    assert load(downloaded(tab, "BVH", tmp_path / "edited.bvh")).clip.duration > 1.0
+    with Recording(downloaded(tab, "Recording", tmp_path / "recording.h5")) as recording:
+        assert recording.duration > 1.0
+    assert '"stretch"' in downloaded(tab, "Configuration", tmp_path / "config.json").read_text()
+    tab.get_by_role("button", name="Compare and mix").click()
+    tab.get_by_label("Show both").click()
+    served.until(lambda: served.page._takes.compares, "both are shown")
+    tab.get_by_text("take 1:").first.wait_for()
+    tab.wait_for_timeout(500.0)
+    kept(tab, "compared")
+    served.page._takes._span.value = (0.2, 1.2)
+    tab.get_by_role("button", name="Take over").click()
+    tab.get_by_text("0.2 to 1.2 s from take 1").wait_for()
+    mix = load(downloaded(tab, "Download the mix as BVH", tmp_path / "mix.bvh")).clip
+    alone = load(tmp_path / "edited.bvh").clip
+    assert mix.poses.shape == alone.poses.shape
+    changed = np.abs(mix.poses - alone.poses).max(axis=1) > 1e-3
+    assert changed[35]
+    assert not changed[:10].any()
+    tab.get_by_role("button", name="Undo").last.click()
+    tab.get_by_text("no regions").wait_for()
+    tab.get_by_label("Show both").click()
+    served.until(lambda: not served.page._takes.compares, "the default animation is back")
+
+
+def test_a_mode_is_switched(tab: Any, served: Served) -> None:
+    tab.get_by_role("tab", name="Play").click()
+    choose(tab, "Mode", "follow")
+    tab.get_by_role("button", name="Run this").click()
+    served.until(lambda: served.desk.built.config.mode.kind == "follow", "it runs")
+    tab.get_by_label("Grab and bend").wait_for(state="detached")
+    kept(tab, "follow")
+
+
+def upload(tab: Any, file: Any) -> None:
     tab.get_by_role("tab", name="Clips").click()
     with tab.expect_file_chooser() as chooser:
         tab.get_by_role("button", name="Upload a motion").click()
-    chooser.value.set_files(
-        [{"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"}]
-    )
-    tab.get_by_text("broken.bvh", exact=False).last.wait_for()
-    served.until(lambda: any("broken.bvh" in line for line in served.page._said), "it is said")
+    chooser.value.set_files(file)
 
 
-def test_a_tab_that_is_closed_ends_nothing_and_another_one_drives(
-    chromium: Any, tab: Any, served: Served, tmp_path: Path
-) -> None:
+def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any) -> None:
+    upload(tab, {"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"})
+    tab.get_by_text("broken.bvh:", exact=False).last.wait_for()
+    kept(tab, "refused")
+
+
+def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: Served, tmp_path: Path) -> None:
+    large = tmp_path / "large.bvh"
+    large.write_bytes(b"HIERARCHY\n" + b" " * MOST_BYTES)
+    upload(tab, large)
+    tab.get_by_text("large.bvh has 30 MB", exact=False).last.wait_for()
+    assert not (served.desk.folder / "uploads" / "large.bvh").exists()
+
+
+@pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
+def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
+    upload(tab, CAPTURE)
+    tab.get_by_text("Preparing", exact=False).first.wait_for()
+    served.until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared")
+    tab.get_by_role("tab", name="Play").click()
+    tab.get_by_role("button", name="Run this").click()
+    served.until(lambda: CAPTURE.stem in str(served.desk.built.config.map.clips), "it runs")
+    before = float(served.desk.now["t"][0])
+    served.until(lambda: float(served.desk.now["t"][0]) > before + 0.5, "time goes on")
+    served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.02]), False)
+    served.until(lambda: float(np.linalg.norm(served.desk.now["user"])) > 0.2, "it is driven")
+    kept(tab, "own-motion")
+
+
+def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab: Any, served: Served) -> None:
     served.desk.hold(served.desk.now["p"], False)
     tab.close()
     served.until(lambda: served.page.driver.client is None, "the driver has left")
     assert not served.desk.holds
     before = float(served.desk.now["t"][0])
-    phone = chromium.new_page(viewport={"width": 390, "height": 780})
-    phone.set_default_timeout(1e3 * PATIENCE)
-    phone.goto(served.address)
-    phone.get_by_role("button", name="Reset").wait_for()
-    kept(phone, tmp_path, "phone")
+    phone = new_tab(chromium, served.address, width=390, height=780)
     served.until(lambda: float(served.desk.now["t"][0]) > before, "time went on")
+    phone.wait_for_timeout(2000.0)
+    kept(phone, "phone")
     phone.get_by_role("button", name="Reset").click()
     served.until(lambda: float(served.desk.now["t"][0]) < before, "the other one drives")
     phone.close()

@@ -157,3 +157,24 @@ def test_a_law_is_no_part_of_the_loop_and_the_loop_none_of_a_law():
     assert not any("whole_body" in name or "reference." in name for name in loop)
     follow = {f.__module__ for f in reached_functions(follow_wrench.py_func)}  # pyright: ignore
     assert all(name.startswith("controllers.") for name in follow)
+
+
+def test_what_is_chosen_by_the_type_of_a_device_is_part_of_the_loop() -> None:
+    reached = {f"{function.__module__}.{function.__qualname__}" for function in reached_functions(run_block.py_func)}
+    for kernel in ("devices.exchange.sense_exchange", "devices.simulated.advance_simulated"):
+        assert f"sim.{kernel}" in reached
+    assert "controllers.safety.faults.judge_reading" in reached
+
+
+FIRST, SECOND = 1.0, 2.0
+
+
+def test_the_first_of_two_globals_in_a_row_is_part_of_the_key() -> None:
+    def of_two(first: float) -> str:
+        def pair():
+            return max(FIRST, SECOND)
+
+        scope = {"FIRST": first, "SECOND": 2.0, "__builtins__": __builtins__, "__name__": __name__}
+        return unit_key(python_types.FunctionType(pair.__code__, scope), (), {})
+
+    assert of_two(1.0) == of_two(1.0) != of_two(1.5)

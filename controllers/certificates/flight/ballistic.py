@@ -8,7 +8,7 @@ A flight recorded under gravity ĝ falls with σ² ĝ at the rate σ. Two tolera
 The first is about the viewer, the second about a body that takes off as well as it can and then really falls.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,13 +125,26 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
             f"turns {np.rad2deg(fit.drift):.0f}° away from constant angular momentum, "
             f"more than {np.rad2deg(tolerance.drift):.0f}°"
         )
+    elif fit.yaw > tolerance.yaw:
+        why = (
+            f"turns {np.rad2deg(fit.yaw):.0f}° about the vertical away from constant angular momentum, "
+            f"more than {np.rad2deg(tolerance.yaw):.0f}°"
+        )
     else:
         verdict, why = "certified", falls
     return FlightJudgement(fit, verdict, f"flight at {fit.time:.2f} s, {fit.duration:.2f} s long, {why}", seen, done)
 
 
-def ballistic_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], tolerance: BallisticTolerance) -> Verdict:
-    """The verdict on a whole motion: its worst flight's.
+def ballistic_verdict(
+    motion: BodyMotion,
+    flights: Sequence[FlightJudgement],
+    tolerance: BallisticTolerance,
+    doubts: Sequence[str] = (),
+    measures: Mapping[str, object] | None = None,
+) -> Verdict:
+    """The verdict on a whole motion: its worst flight's, and unknown where what supports it may be no contact.
+
+    `doubts` and `measures` are those of `contact_doubts`.
 
     The margin is the distance of the rate 1 from the nearest end of what is seen as natural, over all flights:
     how much faster or slower the motion may be played; negative when refuted for its gravity.
@@ -143,13 +156,19 @@ def ballistic_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], to
         f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
         "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
         "flights are what contacts of feet, hands and other parts leave, of five frames and 0.08 s or more",
+        f"a turn about the vertical of up to {9.4 * np.rad2deg(tolerance.yaw):.0f}° that begins and ends in the air "
+        "is not noticed",
     )
+    figures: dict[str, object] = {**(measures or {})}
+    unsure = "; ".join(doubts)
     if not flights:
-        return Verdict("certified", "no flight: nothing has to fall", None, assumptions)
+        if doubts:
+            return Verdict("unknown", f"no flight, but {unsure}", None, assumptions, figures=figures)
+        return Verdict("certified", "no flight: nothing has to fall", None, assumptions, figures=figures)
     refuted = [flight for flight in flights if flight.verdict == "refuted"]
     doubtful = [flight for flight in flights if flight.verdict == "unknown"]
     margin = min(min(1.0 - flight.seen[0], flight.seen[1] - 1.0) for flight in flights)
-    figures = {"flights": [_figures(flight) for flight in flights]}
+    figures["flights"] = [_figures(flight) for flight in flights]
     if refuted:
         fit = refuted[0].fit
         com = motion.com[fit.start : fit.end + 1]
@@ -160,8 +179,9 @@ def ballistic_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], to
         }  # fmt: skip
         reason = "; ".join(flight.reason for flight in refuted)
         return Verdict("refuted", reason, margin, assumptions, counterexample, figures)
-    reasons = [flight.reason for flight in doubtful or flights]
-    return Verdict("unknown" if doubtful else "certified", "; ".join(reasons), margin, assumptions, figures=figures)
+    reasons = [*(flight.reason for flight in doubtful or flights), *doubts]
+    known = "unknown" if doubtful or doubts else "certified"
+    return Verdict(known, "; ".join(reasons), margin, assumptions, figures=figures)
 
 
 def _figures(flight: FlightJudgement) -> dict[str, object]:
@@ -171,6 +191,7 @@ def _figures(flight: FlightJudgement) -> dict[str, object]:
         "gravity": fit.gravity, "gravity_uncertainty": fit.uncertainty, "natural_rate": fit.natural_rate,
         "misfit": fit.misfit, "rise": fit.rise, "take_off": fit.take_off, "take_off_speed": fit.take_off_speed,
         "clearance": fit.clearance, "momentum": fit.momentum, "drift": fit.drift,
+        "yaw": fit.yaw,
         "rate_seen": list(flight.seen), "rate_done": None if flight.done is None else list(flight.done),
         "rate_admissible": list(flight.admissible),
     }  # fmt: skip

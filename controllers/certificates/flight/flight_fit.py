@@ -45,8 +45,9 @@ class FlightFit:
         Greatest height of the lowest point of the body over the floor [m].
     momentum : array, shape (3,)
         Mean angular momentum about the centre of mass [kg m²/s].
-    drift : float
-        How far the body turns away from where constant angular momentum would have turned it [rad].
+    drift, yaw : float
+        How far the body turns away from where constant angular momentum would have turned it, in all and about the
+        vertical [rad].
     """
 
     start: int
@@ -61,6 +62,7 @@ class FlightFit:
     clearance: float
     momentum: Array
     drift: float
+    yaw: float
 
     @property
     def likely_gravity(self) -> float:
@@ -126,13 +128,14 @@ def fit_flight(
     mean = angular[air].mean(axis=0)
     excess = np.linalg.solve(inertia[air], (angular[air] - mean)[:, :, None])[:, :, 0]
     strayed = np.cumsum(excess, axis=0) / fps
+    strayed -= strayed.mean(axis=0)
     return FlightFit(
         start=a, end=b, time=a / fps, duration=float(t[-1]), gravity=float(-2.0 * height[2]),
         uncertainty=float(uncertainty), misfit=float(np.sqrt(np.mean(np.sum(missed**2, axis=1)))),
         rise=float(max(c[:, 2].max() - c[0, 2], 0.0)),
         take_off=np.array([*level[1], height[1] + 2.0 * height[2] * middle[0]]),
         clearance=float(clearance[a : b + 1].max()), momentum=mean,
-        drift=float(np.linalg.norm(strayed - strayed.mean(axis=0), axis=1).max()),
+        drift=float(np.linalg.norm(strayed, axis=1).max()), yaw=float(np.abs(strayed[:, 2]).max()),
     )  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 r"""Energy of a river: what it injects in a lap, how fast it drives the hand, how far a bounded force moves it off.
 
 A river pushes along its tangent, so it is active by design. Of FOLLOW's force, k_r's part is a potential and b_d's
-injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: that bounds its power whatever the hand does. A relaxed hand moves at the speed at
+injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: that bounds the power of the ideal law, whatever the hand does; what sampling,
+filter and rounding add to it for a hand that vibrates is `injected`. A relaxed hand moves at the speed at
 which the force pays for friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
 
 .. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon))\bigr), \qquad
@@ -18,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.device import kinematics_function
+from controllers.certificates.loop.injected import BANDS, injection
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
@@ -129,7 +131,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
         allowed, beyond = (middle, beyond) if holds(middle) else (allowed, middle)
     distance, felt = bounds(push)
     pace, speed, friction = np.linalg.norm(moving.velocity, axis=1), terminal_speed(river, moving), drag(river, moving)
-    lap = river.curve.duration
+    lap, executed = river.curve.duration, injection(river, moving)
     figures: dict[str, object] = {
         "phases": river.phases(),
         "pace": pace,
@@ -137,6 +139,9 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
         "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
         "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
         "power_bound": river_power(river.b_d, float(np.max(pace))),
+        "passive_below": executed.passive_below,
+        **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
+        "rounding_force": executed.rounding,
         "speed_bound": float(np.max(pace)) + push / river.b_d if river.b_d > 0.0 else None,
         "peak_gain": gain.distance,
         "force_gain": gain.force,
@@ -147,6 +152,9 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
         "force_bound": felt,
     }
     assumptions = (
+        "power_bound is the ideal law's; the executed one gives a hand that vibrates with V m/s RMS at most "
+        f"{executed.rounding:.2g} N V more below {executed.passive_below:.0f} Hz, and up to {BANDS[-1]:.0f} Hz "
+        f"{executed.activity[-1]:.2g} N s/m V² besides",
         "kinematics and inertia off the curve are those on it; the hand's force is bounded and has no impedance",
         f"the limiter lets {ceiling:g} N through: the motors are not yet warm",
     )

@@ -86,15 +86,17 @@ def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v:
     return replace(linear, unit_theta=by_theta, unit_omega=by_omega)
 
 
-def looked_at(program: Program, river: River, reach: float, hands: Sequence[HandImpedance], n: int = 16) -> Seen:
-    """The worst of states on the curve, at rest, at its pace and at twice it, and off it by `reach` [m] at its pace."""
+def looked_at(
+    program: Program, river: River, reach: float, hands: Sequence[HandImpedance], pace: float = 1.0, n: int = 16
+) -> Seen:
+    """The worst of states on the curve, at rest and at a pace in units of its own, and off it by `reach` [m]."""
     phases = river.phases(n)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     tangent = velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     away = [reach * (np.cos(a) * plane[:, 0] + np.sin(a) * plane[:, 1]) for a in angles]
-    states = [*((points, pace * velocity) for pace in (0.0, 1.0, 2.0)), *((points + off, velocity) for off in away)]
+    states = [(points, 0.0 * velocity), *((points + off, pace * velocity) for off in (0.0 * points, *away))]
     plants = [(hand, river.still_at(phases, hand)) for hand in hands]
     worst, strongest = Seen(0.0, 0.0, points[0], velocity[0], hands[0], n * len(states), 0.0), 0.0
     for p, v in states:

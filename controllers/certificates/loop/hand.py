@@ -35,6 +35,12 @@ class HandImpedance:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
 
+    def __str__(self) -> str:
+        """In words, with units."""
+        if self == NO_HAND:
+            return "no hand"
+        return f"a hand of {self.mass:g} kg, {self.damping:g} N s/m, {self.stiffness:g} N/m"
+
     def numbers(self) -> Array:
         """[m, b, k]."""
         return np.array([self.mass, self.damping, self.stiffness])

@@ -98,6 +98,6 @@ def grip(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "grip", "Stiffness at the stylus over grip",
         (Law("Grip: exponent of stiffness", float(slope), 0.1, 1.0, "",
-             "Hasser & Cutkosky 2002, Hajian & Howe 1997: rises steadily, below proportionally (m)", built_in=True),),
+             "Hasser & Cutkosky 2002: rises with grip; below proportion: Hajian & Howe 1997 (m)", built_in=True),),
         x, y, ("grip [N]", "stiffness [N/m]"), (float(slope), float(intercept)), log=True,
     )  # fmt: skip

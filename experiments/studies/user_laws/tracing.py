@@ -44,7 +44,8 @@ def steering(people: Sequence[Person], seed: int) -> Study:
         (
             Law("Steering: slope", 1e3 * slope, 50.0, 200.0, "ms",
                 "Accot & Zhai 1997, 1999: 78 straight, some 150 circular (m)"),
-            Law("Steering: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "", "Accot & Zhai 1997: 0.96 up (m)"),
+            Law("Steering: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "",
+                "Accot & Zhai 1999: r above 0.98 with five devices"),
         ),
         x, y, ("length / width", "time of a lap [s]"), (float(slope), float(intercept)),
     )  # fmt: skip

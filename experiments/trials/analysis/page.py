@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from experiments.results.html_page import document, image, sentences, short
+from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
 from experiments.trials.analysis.replays import Replay
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.measures import MEASURES
@@ -26,7 +26,7 @@ corrected p is 0.05 or more. {interactions}</p>
 {remarks}
 {effects}
 <h2>Measures</h2>
-<table>{measures}</table>
+<div class="wide"><table>{measures}</table></div>
 {failures}
 {replays}
 <h2>The study</h2>
@@ -94,7 +94,7 @@ class Report:
             study=html.escape(self.text),
             made=html.escape(self.made),
         )
-        return document(self.study.name, body)
+        return html_page(self.study.name, body, NUMBERS)
 
 
 def _table(contrasts: Sequence[Contrast]) -> str:

@@ -112,7 +112,7 @@ def statistics(
     """
     found: list[Contrast] = []
     interactions: dict[str, float] = {}
-    remarks: list[str] = []
+    remarks: dict[str, list[str]] = {}
     for measure in measures:
         rows = frame[frame["state"].eq("done") & frame[measure].notna()]
         if len(rows) < 3 or not np.ptp(rows[measure].to_numpy()) > 0.0:
@@ -128,14 +128,17 @@ def statistics(
                 made = _contrast(rows, (measure, factor, level, levels[0]), factor in between, fit, rng)
                 if made is not None:
                     found.append(made)
-    return Statistics(_corrected(found), interactions, tuple(remarks))
+    told = tuple(f"{', '.join(names).replace('_', ' ')}: {remark}" for remark, names in remarks.items())
+    return Statistics(_corrected(found), interactions, told)
 
 
 _Fit = tuple[float, float, float, float]
+_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap intervals stand alone"
+_DOUBTFUL = "the mixed model did not converge well, or finds no variance between users; believe the bootstrap intervals"
 
 
 def _models(
-    rows: Any, measure: str, factors: Mapping[str, Sequence[str]], remarks: list[str]
+    rows: Any, measure: str, factors: Mapping[str, Sequence[str]], remarks: dict[str, list[str]]
 ) -> tuple[dict[tuple[str, str], _Fit], float | None]:
     """Estimate, interval and p by factor and level, and p of the interactions."""
     import statsmodels.formula.api as smf
@@ -151,12 +154,11 @@ def _models(
             model = smf.mixedlm("_y ~ " + " + ".join(terms.values()), data, groups="user").fit(reml=True)
             ends = model.conf_int(1.0 - LEVEL)
             interaction = _interaction(data, list(terms.values()), smf, chi2) if len(terms) > 1 else None
-    except (np.linalg.LinAlgError, ValueError) as error:
-        remarks.append(f"{measure}: no mixed model ({error}); the bootstrap intervals stand alone")
+    except (np.linalg.LinAlgError, ValueError):
+        remarks.setdefault(_NO_MODEL, []).append(measure)
         return {}, None
-    said = {str(warning.message).split(";")[0].strip().rstrip(".") for warning in told}
-    if said:
-        remarks.append(f"{measure}: the mixed model warns: {'; '.join(sorted(said))}")
+    if told:
+        remarks.setdefault(_DOUBTFUL, []).append(measure)
     fits: dict[tuple[str, str], _Fit] = {}
     for factor, levels in factors.items():
         for level in levels[1:]:

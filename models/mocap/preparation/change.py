@@ -1,7 +1,8 @@
 r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
 
-A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). Each instant depends on six control
-points, so the normal equations are banded; those of a closed motion have a border of the last five control points.
+A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). An open motion rests at both ends,
+and so does its change: the outer three control points are one, so that δ̇ = δ̈ = 0 there. Each instant depends on six
+control points, so the normal equations are banded; those of a closed motion have a border of the last five of them.
 """
 
 from dataclasses import dataclass
@@ -9,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline, CubicSpline
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
+from scipy.linalg.blas import dsbmv
 
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap import quaternions
@@ -20,6 +22,7 @@ Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STEP = 1e-3  # of the differences that give velocities [s]
+_HELD = 2  # control points beyond an open motion's first and last one that are the same as it
 _MARGIN = 12  # frames beyond the ends of a closed clip that shape its spline
 
 
@@ -59,7 +62,7 @@ class Change:
         each = max(2, round(seconds / self.intervals / step))
         count = self.intervals * each
         self.times = np.arange(count + (not self.closed)) * seconds / count
-        self.n_points = self.intervals if self.closed else self.intervals + DEGREE
+        self.n_points = self.intervals if self.closed else self.intervals + DEGREE - 2 * _HELD
         spacing = seconds / self.intervals
         knots = (np.arange(self.intervals + 2 * DEGREE + 1) - DEGREE) * spacing
         self._spline = BSpline(knots, np.eye(self.intervals + DEGREE), DEGREE)
@@ -86,21 +89,21 @@ class Change:
         return poses
 
     def points(self, x: Array) -> Array:
-        """All control points, those that wrap included, shape (intervals + 5, 57)."""
+        """All control points, those that wrap or are held included, shape (intervals + 5, 57)."""
         if not self.closed:
-            return x
+            return np.pad(x, ((_HELD, _HELD), (0, 0)), mode="edge")
         return np.vstack((x, x[:DEGREE] @ self.wrap.T))
 
-    def states(self, x: Array) -> State:
-        """The changed motion at the sampled instants."""
-        points = self.points(x)
-        which = self.first[:, None] + np.arange(DEGREE + 1)
-        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order], points[which]) for order in range(3))
+    def states(self, x: Array, instants: npt.NDArray[np.intp] | slice = slice(None)) -> State:
+        """The changed motion at the sampled instants, or at some of them."""
+        points, times = self.points(x), self.times[instants]
+        which = self.first[instants, None] + np.arange(DEGREE + 1)
+        d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[which]) for order in range(3))
         moments = [
-            plus(self._reference_at(self.times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
+            plus(self._reference_at(times + o * _STEP), d + o * _STEP * dd + 0.5 * _STEP**2 * o * o * ddd)
             for o in (-1.0, 0.0, 1.0)
         ]
-        m = len(self.times)
+        m = len(times)
         turns = [pose[:, 3:].reshape(m, 18, 4) for pose in moments]
 
         def between(a: Array, b: Array) -> Array:
@@ -112,8 +115,8 @@ class Change:
         v[:, 3:] = between(turns[0], turns[2]) / (2 * _STEP)
         a[:, 3:] = (between(turns[1], turns[2]) - between(turns[0], turns[1])) / _STEP**2
         if not self.closed:
-            # Before and after the clip its ends are held: differences over them tell nothing.
-            v[0], a[0], v[-1], a[-1] = v[1], a[1], v[-2], a[-2]
+            rests = (times <= 0.0) | (times >= self._end - 1e-9)
+            v[rests] = a[rests] = 0.0
         return State(moments[1], v, a)
 
     def changed(self, x: Array, fps: float) -> Clip:
@@ -146,22 +149,30 @@ class Normal:
         self._change = change
         self._inner = change.n_points * n - change.border
         self._width = (DEGREE + 1) * n
-        self.band = np.zeros((self._width, self._inner))
+        self.band = np.zeros((self._width, self._inner), order="F")
         self.side = np.zeros((self._inner, change.border))
         self.corner = np.zeros((change.border, change.border))
-        self._rows, self._columns = np.tril_indices(self._width)
 
     def copy(self) -> "Normal":
         """The same, to be added to."""
         twin = Normal(self._change)
-        twin.band, twin.side, twin.corner = self.band.copy(), self.side.copy(), self.corner.copy()
+        twin.band, twin.side, twin.corner = self.band.copy(order="K"), self.side.copy(), self.corner.copy()
         return twin
 
     def add(self, interval: int, block: Array) -> None:
         """Add a block (342, 342) that couples the six control points of a knot interval."""
         n, change = N_TANGENT, self._change
+        if not change.closed:
+            points = np.clip(np.arange(interval, interval + DEGREE + 1) - _HELD, 0, change.n_points - 1)
+            if points[0] == points[1] or points[-2] == points[-1]:
+                interval = min(int(points[0]), change.n_points - DEGREE - 1)
+                fold = np.kron(np.eye(DEGREE + 1)[points - interval], np.eye(n))
+                block = fold.T @ block @ fold
+            else:
+                interval = int(points[0])
         if not change.closed or interval + DEGREE < change.n_points - DEGREE:
-            self.band[self._rows - self._columns, interval * n + self._columns] += block[self._rows, self._columns]
+            for column in range(self._width):
+                self.band[: self._width - column, interval * n + column] += block[column, column:]
             return
         points = np.arange(interval, interval + DEGREE + 1)
         wrapped = np.flatnonzero(points >= change.n_points)
@@ -193,28 +204,43 @@ class Normal:
         if change.closed:
             total[:DEGREE] += total[change.intervals :] @ change.wrap
             total = total[: change.intervals]
+        else:
+            total[_HELD] += total[:_HELD].sum(axis=0)
+            total[-_HELD - 1] += total[-_HELD:].sum(axis=0)
+            total = total[_HELD:-_HELD]
         return total.ravel()
 
     def times(self, x: Array) -> Array:
         """H x."""
         inner, border = x[: self._inner], x[self._inner :]
-        y = self.band[0] * inner
-        for d in range(1, self._width):
-            if d < len(inner):
-                row = self.band[d, : len(inner) - d]
-                y[d:] += row * inner[:-d]
-                y[:-d] += row * inner[d:]
+        y = dsbmv(self._width - 1, 1.0, self.band, inner, lower=1)
         return np.concatenate((y + self.side @ border, self.side.T @ inner + self.corner @ border))
 
     def solve(self, g: Array, damping: float) -> Array:
         """X of (H + damping diag H) x = g."""
-        band = self.band.copy()
+        band = self.band.copy(order="K")
         band[0] = band[0] * (1.0 + damping) + 1e-9
-        factor = (cholesky_banded(band, lower=True, check_finite=False), True)
+        factor = cholesky_banded(band, lower=True, check_finite=False)
         inner, border = g[: self._inner], g[self._inner :]
         if not len(border):
-            return cho_solve_banded(factor, inner, check_finite=False)
-        done = cho_solve_banded(factor, np.column_stack((inner, self.side)), check_finite=False)
-        corner = self.corner + np.diag(damping * np.diag(self.corner) + 1e-9) - self.side.T @ done[:, 1:]
-        last = cho_solve(cho_factor(corner), border - self.side.T @ done[:, 0])
-        return np.concatenate((done[:, 0] - done[:, 1:] @ last, last))
+            return cho_solve_banded((factor, True), inner, check_finite=False)
+        first = cho_solve_banded((factor, True), inner, check_finite=False)
+        lowered = self._lowered(factor)
+        corner = self.corner + np.diag(damping * np.diag(self.corner) + 1e-9) - lowered.T @ lowered
+        last = cho_solve(cho_factor(corner), border - self.side.T @ first)
+        return np.concatenate((cho_solve_banded((factor, True), inner - self.side @ last, check_finite=False), last))
+
+    def _lowered(self, factor: Array) -> Array:
+        """L⁻¹ of the side, by blocks as large as the band is wide: one at a time LAPACK's takes three times as long."""
+        width, lowered = self._width, self.side.copy()
+        for start in range(0, self._inner, width):
+            here = slice(start, min(start + width, self._inner))
+            columns = np.arange(max(0, start - width), here.stop)
+            offsets = np.arange(start, here.stop)[:, None] - columns
+            inside = (offsets >= 0) & (offsets < width)
+            lower = np.where(inside, factor[np.where(inside, offsets, 0), columns], 0.0)
+            split = start - int(columns[0])
+            if split:
+                lowered[here] -= lower[:, :split] @ lowered[columns[0] : start]
+            lowered[here] = solve_triangular(lower[:, split:], lowered[here], lower=True, check_finite=False)
+        return lowered

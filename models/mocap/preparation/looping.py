@@ -2,7 +2,8 @@ r"""How a capture goes on: as a cycle, with a way back, or not at all; closed in
 
 Two frames are as alike as `laps` has it. A part of the clip is its cycle if its ends are alike and the rest of the clip
 only repeats it; it is closed by fading over from what led to its start, so that poses and velocities agree at the seam.
-A gesture, which ends with the feet where they were, gets a way back. Everything else rests at both ends.
+A gesture, which ends with the feet where they were, gets a way back. Half a stride of a gait, which ends as it began in
+a mirror, is gone on with by its mirror image. Everything else rests at both ends.
 """
 
 from typing import Literal, NamedTuple
@@ -10,9 +11,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from models.errors import ModelError
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.laps import lap_of, likeness
-from models.mocap.preparation.poses import inverse, plus
+from models.mocap.preparation.poses import inverse, plus, sole_points
 
 Array = npt.NDArray[np.float64]
 
@@ -20,15 +23,18 @@ _GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps
 _COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
 _LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it
+_HALF = 0.25  # of half a stride, at least [s]: sprinters take 0.22
+_FAST = 1.0  # of the root at both ends [m/s]: such a motion cannot be brought to rest in a blink
 _SHORTEST = 0.6  # of a cycle in place [s]
 _SHARE = 0.3  # of the clip, the least that a cycle in place lasts: less is a tremble
 _FADE = 0.25  # over which the ends are brought together [s]
 _BACK = (0.6, 1.0)  # a way back lasts so long, and so much longer for each radian of the largest joint [s]
 _STEP, _YAW = 0.10, np.deg2rad(15.0)  # feet of a gesture end within this of where they began
-_REST = 0.35  # in which a motion that ends dies away [s]
+_REST = 0.35  # in which the limbs of a motion that ends come to rest [s]; its root has 0.2 s more for each m/s
+_REST_LONGER, _REST_LONGEST = 0.2, 0.8
 _FRAMES = 500  # compared with each other
 
-Kind = Literal["cycle", "way back", "open"]
+Kind = Literal["cycle", "half stride", "way back", "open"]
 
 
 class Looped(NamedTuple):
@@ -38,7 +44,7 @@ class Looped(NamedTuple):
     ----------
     clip : Clip
         Closed, or at rest at both ends.
-    kind : {"cycle", "way back", "open"}
+    kind : {"cycle", "half stride", "way back", "open"}
         What was done.
     start, end : float
         The part of the capture that it is [s].
@@ -53,7 +59,7 @@ class Looped(NamedTuple):
     gap: float
 
 
-def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None) -> Looped:
+def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False) -> Looped:
     """Close a clip, or bring it to rest at both ends.
 
     Parameters
@@ -64,13 +70,22 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None) -> Looped:
         ``auto``, ``open``, or the start and end of the cycle in seconds, such as ``1.2:2.4``.
     wraps : bool or None
         What the file says of itself.
+    mirror : bool
+        Whether half a stride, or START:END, is to be gone on with by its mirror image.
 
     Raises
     ------
     ModelError
-        If the wish is none of these, or not within the clip.
+        If the wish is none of these, or not within the clip, or no half stride is in it.
     """
     whole = (0, clip.n_frames - 1)
+    if mirror:
+        half = _half_stride(clip) if wish == "auto" else (*_wished(clip, wish), np.nan)
+        if half is None:
+            raise ModelError(
+                f"{clip.name}: --mirror, but no part of it ends like its start in a mirror; expected a gait"
+            )
+        return _closed(clip, *half, half=True)
     if clip.n_frames < 8 or wish == "open":
         return _rested(clip)
     if wish != "auto":
@@ -85,12 +100,12 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None) -> Looped:
         return _closed(clip, *cycle)
     if _in_place(clip):
         return _with_way_back(clip, gap)
+    if _fast(clip) and (half := _half_stride(clip)) is not None:
+        return _closed(clip, *half, half=True)
     return _rested(clip)
 
 
 def _wished(clip: Clip, wish: str) -> tuple[int, int]:
-    from models.errors import ModelError
-
     try:
         start, end = (float(part) for part in wish.split(":"))
     except ValueError:
@@ -128,34 +143,70 @@ def _cycle(clip: Clip) -> tuple[int, int, float] | None:
     return None
 
 
+def _fast(clip: Clip) -> bool:
+    """Whether the root runs at both ends."""
+    speeds = np.linalg.norm(clip.velocities()[[0, -1], :2], axis=1)
+    return bool(speeds.min() > _FAST)
+
+
 def _in_place(clip: Clip) -> bool:
     """Whether the root ends where it began, looking where it did."""
     there = clip.displacement
     return bool(np.hypot(there.x, there.y) < _STEP and abs(there.yaw) < _YAW)
 
 
-def _closed(clip: Clip, first: int, last: int, gap: float) -> Looped:
-    """The frames from first to last, ends brought together from what leads to the first and follows the last."""
-    poses, n = clip.poses, last - first
-    there = Clip(poses[first : last + 1], clip.fps, clip.name).displacement
+def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> Looped:
+    """The frames from first to last, ends brought together from what leads to the first and follows the last.
+
+    A half stride ends like its start in a mirror, and is followed by its own image there.
+    """
+    image = mirrored if half else _same
+    opening, n = image(clip).poses, last - first
+    poses = clip.poses
+    there = Clip(np.vstack((opening[first], poses[last])), clip.fps, clip.name).displacement
     back = inverse(there)
     width = int(min(_FADE * clip.fps, n // 3))
     before, after = min(width, first), min(width, clip.n_frames - 1 - last)
     lap = poses[first : last + 1].copy()
     if before + after >= 6:
         for k in range(-before, after + 1):
-            # 0: as at the end of the lap, 1: as at its start, both seen from the start.
+            # 0: as at the end of the lap, 1: as at its start, both seen from the start's image.
             share = _smooth((k + before) / (before + after))
             end = back.moved(poses[last + k])
-            mixed = plus(end[None], share * pose_difference(end, poses[first + k])[None])[0]
+            mixed = plus(end[None], share * pose_difference(end, opening[first + k])[None])
             if k >= 0:
-                lap[k] = mixed
+                lap[k] = image(Clip(mixed, clip.fps, clip.name)).poses[0]
             if k <= 0:
-                lap[n + k] = there.moved(mixed)
-    rest = pose_difference(there.moved(lap[0]), lap[-1])
+                lap[n + k] = there.moved(mixed[0])
+    rest = pose_difference(there.moved(image(Clip(lap[:1], clip.fps, clip.name)).poses[0]), lap[-1])
     lap = plus(lap, -np.linspace(0.0, 1.0, n + 1)[:, None] * rest)
+    if half:
+        other = image(Clip(lap, clip.fps, clip.name))
+        join = Clip(np.vstack((other.poses[0], lap[-1])), clip.fps, clip.name).displacement
+        lap = np.vstack((lap, join.moved(other.poses)[1:]))
     lap[-1] = Clip(lap, clip.fps, clip.name).displacement.moved(lap[0])
-    return Looped(Clip(lap, clip.fps, clip.name), "cycle", first / clip.fps, last / clip.fps, gap)
+    kind: Kind = "half stride" if half else "cycle"
+    return Looped(Clip(lap, clip.fps, clip.name), kind, first / clip.fps, last / clip.fps, gap)
+
+
+def _same(clip: Clip) -> Clip:
+    return clip
+
+
+def _half_stride(clip: Clip) -> tuple[int, int, float] | None:
+    """Start, end and gap of the part whose end is most like its start in a mirror, if it is like it."""
+    every = -(-2 * clip.n_frames // _FRAMES)
+    frames = np.arange(0, clip.n_frames, every)
+    both = Clip(np.vstack((clip.poses, mirrored(clip).poses)), clip.fps, clip.name)
+    # The frame at the joint has no velocity of its own.
+    inner = frames[(frames > 0) & (frames < clip.n_frames - 1)]
+    apart = _distances(both, np.concatenate((inner, clip.n_frames + inner)))[: len(inner), len(inner) :]
+    long = inner[:, None] - inner[None, :] >= _HALF * clip.fps
+    if not long.any():
+        return None
+    # Rows: ends, columns: starts, in the mirror.
+    j, i = np.unravel_index(int(np.argmin(np.where(long, apart, np.inf))), apart.shape)
+    return (int(inner[i]), int(inner[j]), float(apart[j, i])) if apart[j, i] < _GAIT else None
 
 
 def _smooth(x: float) -> float:
@@ -182,24 +233,33 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
 
 
 def _rested(clip: Clip) -> Looped:
-    """The clip with its first and last velocities dying away, in poses before and after it."""
-    n = round(_REST * clip.fps)
-    if clip.n_frames < 2 or n < 2:
+    """The clip with its first and last velocities dying away, in poses before and after it that end on the floor."""
+    if clip.n_frames < 2 or clip.fps * _REST < 2.0:
         return Looped(clip, "open", 0.0, clip.duration, 0.0)
     velocities = clip.velocities()
-    x = np.arange(1, n + 1)[:, None] / n
-    # The velocity falls from 1 to 0 as (1 − x)² (1 + 2x); this is its integral.
-    path = (x - x**3 + x**4 / 2.0) * _REST
-    after = plus(np.repeat(clip.poses[-1:], n, axis=0), path * velocities[-1])
-    before = plus(np.repeat(clip.poses[:1], n, axis=0), -path * velocities[0])[::-1]
+    before = _dying(clip.poses[0], -velocities[0], clip.fps)[::-1]
+    after = _dying(clip.poses[-1], velocities[-1], clip.fps)
     poses = np.vstack((before, clip.poses, after))
     return Looped(Clip(poses, clip.fps, clip.name), "open", 0.0, clip.duration, 0.0)
 
 
+def _dying(pose: Array, velocity: Array, fps: float) -> Array:
+    """Poses in which a velocity dies away as (1 − x)² (1 + 2x), while the lowest part of the soles comes to the floor.
+
+    The root has longer for it the faster it is, x = t/T; limbs would go past their limits if they had.
+    """
+    times = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST), _REST
+    n = round(times[0] * fps)
+    x = np.minimum(np.arange(1, n + 1)[:, None] / (fps * np.array(times)), 1.0)
+    path = (x - x**3 + x**4 / 2.0) * times
+    poses = plus(np.repeat(pose[None], n, axis=0), path[:, np.repeat((0, 1), (3, len(velocity) - 3))] * velocity)
+    low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
+    poses[:, 2] -= x[:, 0] ** 3 * (10.0 - 15.0 * x[:, 0] + 6.0 * x[:, 0] ** 2) * low
+    return poses
+
+
 def mirrored(clip: Clip) -> Clip:
     """The motion in a mirror: left and right exchanged."""
-    from models.humanoid.skeleton import BODIES
-
     twins = [
         BODIES.index(body.replace("left_", "right_") if body.startswith("left_") else body.replace("right_", "left_"))
         for body in BODIES

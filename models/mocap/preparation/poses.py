@@ -79,9 +79,14 @@ def inverse(there: PlanarDisplacement) -> PlanarDisplacement:
 
 def sole_points(poses: Array) -> Array:
     """Centres of the 8 contact spheres of the feet in the world [m], shape (n, 8, 3)."""
+    return contact_points(poses, FOOT_CONTACTS)
+
+
+def contact_points(poses: Array, names: tuple[str, ...]) -> Array:
+    """Centres of named contact spheres in the world [m], shape (n, k, 3)."""
     model = figure_model()
     data = mujoco.MjData(model)
-    spheres = [int(model.geom(name).id) for name in FOOT_CONTACTS]
+    spheres = [int(model.geom(name).id) for name in names]
     points = np.empty((len(poses), len(spheres), 3))
     for k, pose in enumerate(poses):
         data.qpos = pose

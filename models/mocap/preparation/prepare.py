@@ -8,7 +8,8 @@ from models.errors import ModelError
 from models.mocap.clip import Clip
 from models.mocap.library import load
 from models.mocap.preparation.feasible import Feasible, feasible
-from models.mocap.preparation.looping import Looped, looped, mirrored
+from models.mocap.preparation.looping import Looped, looped
+from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.stances import stances
 from models.mocap.retargeting.retarget import Hints, RetargetReport
@@ -30,6 +31,8 @@ class Prepared(NamedTuple):
         As the file has it, on the figure and the floor.
     report : RetargetReport or None
         What the file was taken for; None where it is on the figure's own skeleton.
+    paced : Paced
+        At what pace.
     looped : Looped
         How it goes on, before it was made feasible.
     feasible : Feasible
@@ -44,6 +47,7 @@ class Prepared(NamedTuple):
     clip: Clip
     captured: Clip
     report: RetargetReport | None
+    paced: Paced
     looped: Looped
     feasible: Feasible
     seconds: float
@@ -60,7 +64,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     loop : str
         ``auto``, ``open``, or ``START:END`` of the cycle in seconds.
     mirror : bool
-        Exchange left and right.
+        Go on with the mirror image of half a stride, or of START:END.
     hints : Hints or None
         What a person knows of the file.
 
@@ -73,15 +77,16 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     """
     began = process_time()
     loaded = load(path, hints)
-    captured = mirrored(loaded.clip) if mirror else loaded.clip
+    captured = loaded.clip
     if not 1.0 / captured.fps <= captured.duration <= _LONGEST:
         raise ModelError(
             f"{path}: lasts {captured.duration:.2f} s; expected a motion of two frames to {_LONGEST:.0f} s"
         )
-    cycle = looped(resampled(captured, FPS), loop, loaded.loops)
+    timed = paced(resampled(captured, FPS))
+    cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
     smooth = smoothed(cycle.clip, _CORNER)
     made = feasible(smooth, stances(cycle.clip, smooth), fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED
     taken = made.clip if near else smooth
     clip = Clip(taken.poses, taken.fps, captured.name)
-    return Prepared(clip, captured, loaded.report, cycle, made, process_time() - began, near)
+    return Prepared(clip, captured, loaded.report, timed, cycle, made, process_time() - began, near)

@@ -1,8 +1,9 @@
 r"""Which parts of the soles stand when and where: the contact schedule of a capture, from its soles and its load.
 
-Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Where
-nothing stands but the centre of mass accelerates as if something did, the lowest part of the feet must bear: captures
-slide and hover.
+Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Nobody
+rests on the heels: toes at rest stand with them. Where nothing stands but the centre of mass accelerates as if
+something did, captures slide or hover: the stance next to it lasts longer, on its toes after it and on what is lower
+before it; where there is none, the lowest part of the feet bears, and slides.
 """
 
 from typing import NamedTuple
@@ -22,12 +23,16 @@ Mask = npt.NDArray[np.bool_]
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
 _REACH = 0.045  # a part of a sole that stands is lower than this [m] ...
-_SLOW = 0.55  # ... and slower [m/s]
+_SLOW, _SHARE = 0.55, 0.3  # ... and slower [m/s], or than this share of the root's speed: legs slide with their length
+_LOW = 0.10  # toes that rest beside a standing heel, or a foot that bears though it seems not to stand, are lower [m]
+_REST, _FAR = 0.15, 0.15  # ... and slower [m/s]; and it is not further from where it stands [m]
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
 _LAG = 0.012  # a sphere stands this long before and after it pushes [s]
 _LOADED = 0.35  # of body weight, above which something must bear
 _NEAR = 0.015  # over the lowest sphere [m]: they bear together
 _SMOOTHING = 0.02  # of the load [s]
+_SWING = 0.015  # least height of a swinging foot [m]: what tracks takes one below 8 mm for standing ...
+_RISE = 0.08  # ... reached so long before and after it stands [s]; captured feet swing at 2 to 5 cm
 _GRAVITY = 9.81
 
 
@@ -69,20 +74,21 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         calm, _ = around(smooth, margin)
     else:
         poses, calm, first = clip.poses, smooth.poses, 0
-    points = sole_points(poses)
-    standing = np.zeros(points.shape[:2], dtype=bool)
-    places = np.full(points.shape, CONTACT_RADIUS)
+    points, fps = sole_points(poses), clip.fps
+    parts = _parts(points, np.linalg.norm(np.gradient(poses[:, :2], axis=0), axis=1) * fps, fps)
+    load = _load(calm, fps)
+    for start, end in _runs(_cleaned(~parts.any(axis=(1, 2)) & (load > _LOADED), round(0.03 * fps), 2)):
+        _bear(points, parts, start, end)
     turned = global_rotations(poses)
+    standing, places = np.repeat(parts, 2, axis=2).reshape(len(points), 8), np.full(points.shape, CONTACT_RADIUS)
     for foot, side in enumerate(("left", "right")):
         mine = slice(4 * foot, 4 * foot + 4)
-        _plant(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], clip.fps,
-               standing[:, mine], places[:, mine])  # fmt: skip
-    load = _load(calm, clip.fps)
-    bare = ~standing.any(axis=1) & (load > _LOADED)
-    bare = _cleaned(bare, round(0.03 * clip.fps), 2)
+        _place(points[:, mine], turned[:, BODIES.index(f"{side}_foot")], soles()[mine], parts[:, foot], places[:, mine])
+    bare = _cleaned(~standing.any(axis=1) & (load > _LOADED), round(0.03 * fps), 2)
     heights = points[:, :, 2] - CONTACT_RADIUS
-    sliding = bare[:, None] & (heights < heights.min(axis=1, keepdims=True) + _NEAR)
-    lag = max(1, round(_LAG * clip.fps))
+    lowest = heights.min(axis=1, keepdims=True)
+    sliding = bare[:, None] & (heights < lowest + _NEAR) & (lowest < _LOW)
+    lag = max(1, round(_LAG * fps))
     firm = standing.copy()
     for shift in range(1, lag + 1):
         firm[shift:] &= standing[:-shift]
@@ -95,15 +101,65 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     return Stances(standing[here], pushing[here], places[here], sliding[here] & ~standing[here])
 
 
-def _plant(points: Array, turned: Array, sole: Array, fps: float, standing: Mask, places: Array) -> None:
-    """Write one foot's stances: parts that stand, and one flat place for each stance."""
-    parts: list[Mask] = []
-    for pair in (points[:, :2], points[:, 2:]):
-        middle = pair.mean(axis=1)
-        speed = np.linalg.norm(np.gradient(middle, axis=0), axis=1) * fps
-        stands = (middle[:, 2] - CONTACT_RADIUS < _REACH) & (speed < _SLOW)
-        parts.append(_cleaned(stands, round(_GAP * fps), round(_SHORT * fps)))
-    heel, toe = parts
+def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
+    """Least heights of the parts of the feet that swing [m], rising from where they stand, shape (n, 8).
+
+    A foot that swings a few millimetres over the floor is taken for a standing one by whatever follows the motion.
+    """
+    grounded = schedule.standing | schedule.sliding
+    n = len(grounded)
+    laps = np.tile(grounded, (3, 1)) if closed else grounded
+    here = slice(n, 2 * n) if closed else slice(0, n)
+    least = np.zeros((n, 8))
+    for foot in range(2):
+        mine = slice(4 * foot, 4 * foot + 4)
+        swings = ~laps[:, mine].any(axis=1)
+        for sphere in range(4 * foot, 4 * foot + 4):
+            stands = np.flatnonzero(laps[:, sphere])
+            if not len(stands):
+                continue
+            frames = np.arange(len(laps))
+            after = np.searchsorted(stands, frames)
+            away = np.minimum(
+                np.abs(frames - stands[np.minimum(after, len(stands) - 1)]),
+                np.abs(frames - stands[np.maximum(after - 1, 0)]),
+            )
+            risen = np.where(swings, _SWING, 0.0) * np.minimum(away / (_RISE * fps), 1.0)
+            least[:, sphere] = risen[here]
+    return least
+
+
+def _parts(points: Array, pace: Array, fps: float) -> Mask:
+    """Which of heel and toes of left and right foot stand, shape (n, 2, 2)."""
+    middles = points.reshape(len(points), 2, 2, 2, 3).mean(axis=3)
+    heights = middles[..., 2] - CONTACT_RADIUS
+    speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
+    stands = (heights < _REACH) & (speeds < np.maximum(_SLOW, _SHARE * pace)[:, None, None])
+    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _LOW) & (speeds[:, :, 1] < _REST)
+    for foot in range(2):
+        for part in range(2):
+            stands[:, foot, part] = _cleaned(stands[:, foot, part], round(_GAP * fps), round(_SHORT * fps))
+    return stands
+
+
+def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
+    """Let a stance last over frames start to end in which nothing stands though something bears, where one is near."""
+    span = slice(start, end)
+    middles = points[span].reshape(end - start, 2, 2, 2, 3).mean(axis=3)
+    heights = middles[..., 2].mean(axis=0) - CONTACT_RADIUS
+    for foot in np.argsort(heights.min(axis=1)):
+        after = start > 0 and parts[start - 1, foot].any()
+        before = end < len(parts) and parts[end, foot].any()
+        part = 1 if after else int(np.argmin(heights[foot]))
+        way = middles[:, foot, part, :2]
+        if heights[foot, part] < _LOW and np.linalg.norm(way - way[0], axis=1).max() < _FAR and (after or before):
+            parts[span, foot, part] = True
+            return
+
+
+def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array) -> None:
+    """Write one foot's places: one flat one for each stance."""
+    heel, toe = parts.T
     # Heading of the foot's own forward axis.
     x = 1.0 - 2.0 * (turned[:, 2] ** 2 + turned[:, 3] ** 2)
     y = 2.0 * (turned[:, 1] * turned[:, 2] + turned[:, 0] * turned[:, 3])
@@ -120,10 +176,7 @@ def _plant(points: Array, turned: Array, sole: Array, fps: float, standing: Mask
         angle = float(np.median(yaw[frames]))
         c, s = np.cos(angle), np.sin(angle)
         lying = sole[:, :2] @ np.array([[c, s], [-s, c]])
-        origin = np.median(points[frames][:, spheres, :2] - lying[spheres], axis=(0, 1))
-        places[start:end, :, :2] = lying + origin
-        standing[start:end, :2] = heel[start:end, None]
-        standing[start:end, 2:] = toe[start:end, None]
+        places[start:end, :, :2] = lying + np.median(points[frames][:, spheres, :2] - lying[spheres], axis=(0, 1))
 
 
 def _load(poses: Array, fps: float) -> Array:

@@ -1,4 +1,7 @@
-"""Where the floor is under a retargeted motion, and toes that do not go through it.
+"""Where the floor is under a retargeted motion, how it slopes, and toes that do not go through it.
+
+A volume calibrated askew gives a floor that slopes. Where the body stands at places far enough from each other,
+a plane through its level soles tells; it is believed where it is significant, and its rotation levels the motion.
 
 The figure's foot is one rigid piece. A foot that rolls off over bent toes would push the figure's through the floor, so
 where the toes' contact points are too low the ankle bends them up, about its own lateral axis, until they touch.
@@ -15,6 +18,11 @@ Array = npt.NDArray[np.float64]
 
 _LEVEL = 0.06  # the four contact points of a sole that is level differ by less in height [m]
 _SHARE = 0.25  # of the supporting, level soles are at or below the floor
+_STILL = 0.4  # m/s, of a sole that stands
+_SPREAD = 0.25  # RMS distance of standing soles along a direction, from which its slope is told [m]: a stride has 0.4
+_STEPS, _SURE = 4, 3.0  # stances at least, and standard errors that a slope is from level
+_SLOPE = np.deg2rad((0.5, 8.0))  # what is no slope, and what is none of a floor that was meant to be level
+_UNEVEN = 0.025  # RMS of the soles about the plane, beyond which they stand on stairs or boxes [m]
 _SMOOTHING = 0.02  # standard deviation of the window that smooths the bend of the toes [s]
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 _PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
@@ -37,7 +45,7 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     root, segments : arrays
         The same after the shift and the bending of the ankles.
     """
-    ankles = root[:, None, 2] + _ankle_heights(segments)
+    ankles = root[:, None, 2] + _ankles(segments)[..., 2]
     feet = segments[:, _FEET]
     points = _contact_points()
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
@@ -56,15 +64,56 @@ def _contact_points() -> Array:
     return np.array([[model.geom(f"{side}_{place}").pos for place in _PLACES] for side in ("left", "right")])
 
 
-def _ankle_heights(segments: Array) -> Array:
-    """Heights of the ankles over the pelvis [m], shape (frames, 2)."""
+def _ankles(segments: Array) -> Array:
+    """The ankles from the pelvis [m], shape (frames, 2, 3)."""
     model = figure_model()
-    heights = np.zeros((len(segments), len(_FEET)))
+    places = np.zeros((len(segments), len(_FEET), 3))
     for column, body in enumerate(_FEET):
         while (parent := SEGMENTS[body].parent) >= 0:
-            heights[:, column] += quaternions.rotated(segments[:, parent], model.body(BODIES[body]).pos)[:, 2]
+            places[:, column] += quaternions.rotated(segments[:, parent], model.body(BODIES[body]).pos)
             body = parent
-    return heights
+    return places
+
+
+def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, float]:
+    """The motion turned so that the floor on which it stands is level, and by what angle [rad]; 0 where none is told.
+
+    Parameters
+    ----------
+    root, segments, fps
+        As in `on_the_floor`.
+    """
+    soles = (root[:, None] + _ankles(segments))[:, :, None] + quaternions.rotated(
+        segments[:, _FEET][:, :, None], _contact_points()
+    )
+    middle = soles.mean(axis=2)
+    lower = np.arange(len(soles)), np.argmin(middle[..., 2], axis=1)
+    if len(soles) < 4:
+        return root, segments, 0.0
+    speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
+    stands = (np.ptp(soles[lower][..., 2], axis=1) < _LEVEL) & (speed < _STILL)
+    stances = int(np.sum(np.diff(np.concatenate(([0], np.where(stands, lower[1] + 1, 0)))) > 0))
+    slopes = _slopes(middle[lower][stands], stances) if stances >= _STEPS else np.zeros(2)
+    angle = float(np.arctan(np.linalg.norm(slopes)))
+    if not _SLOPE[0] < angle < _SLOPE[1]:
+        return root, segments, 0.0
+    # The plane z = s·(x, y) has the normal (−s, 1); turned about normal × z it is level.
+    axis = np.array([-slopes[1], slopes[0], 0.0]) / np.linalg.norm(slopes)
+    level = np.concatenate(([np.cos(angle / 2)], np.sin(angle / 2) * axis))
+    return quaternions.rotated(level, root), quaternions.product(level, segments), angle
+
+
+def _slopes(points: Array, stances: int) -> Array:
+    """dz/dx, dz/dy of the plane through points of so many stances, in the directions in which they tell it."""
+    flat = points[:, :2] - points[:, :2].mean(axis=0)
+    height = points[:, 2] - points[:, 2].mean()
+    _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
+    spread = sizes / np.sqrt(len(points))
+    told = np.where(spread > _SPREAD, 1.0, 0.0)
+    slopes = told * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
+    off = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
+    sure = np.abs(slopes) > _SURE * off / (np.maximum(spread, 1e-9) * np.sqrt(stances))
+    return np.zeros(2) if off > _UNEVEN else directions.T @ (slopes * sure)
 
 
 def _floor(heights: Array) -> float:

@@ -21,7 +21,7 @@ from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import body_lines, joints_below
 from models.mocap.retargeting.calibration import calibrate
-from models.mocap.retargeting.footing import on_the_floor
+from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.leading_pose import without_leading_pose
 from models.mocap.retargeting.skeleton_roles import Roles, missing, unused
 from models.mocap.retargeting.upright import AXES, check_sides, up_axis
@@ -167,8 +167,11 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     own_leg = _own_leg("left_foot" in roles.segments or "left_shank" in roles.ends)
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
+    root, segments, slope = levelled(root, segments, motion.fps)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     remarks: list[str] = []
+    if slope:
+        remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
     if calibrated.bend > _BENT and rest is None:
         remarks.append("the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it")
     report = RetargetReport(

@@ -1,6 +1,8 @@
 """A study whose driver and workers are killed at random moments until it is done, for the tests.
 
-``python tests/experiments/trials/killed_study.py 20`` does it with 20 kills and compares the tables.
+``python tests/experiments/trials/killed_study.py 20 60`` does it with 20 kills in a study of 960 trials and compares
+the tables. ``… 7 60 FOLDER 3`` does it in a folder, with 7 kills at the moments of seed 3, and may be run again with
+other seeds: what there is to compare with is kept there.
 """
 
 import contextlib
@@ -46,7 +48,7 @@ def start(study: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
 
 def finish(driver: subprocess.Popen[bytes]) -> None:
     """Wait for a driver that is left alone."""
-    _, said = driver.communicate(timeout=500)
+    _, said = driver.communicate(timeout=1500)
     assert driver.returncode == 0, said.decode()
 
 
@@ -97,16 +99,18 @@ def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str,
     return killed
 
 
-def main(kills: int, repetitions: int, seed: int) -> None:
+def main(kills: int, repetitions: int = 40, folder: str = "", seed: int = 1) -> None:
     """Compare a study that is killed with one that is not, and with one on one thread."""
-    with tempfile.TemporaryDirectory() as folder:
-        study = written(Path(folder), repetitions)
-        killed = killed_at_random(study, Path(folder) / "killed", kills, seed)
-        finish(start(study, Path(folder) / "undisturbed", "--workers", "2"))
-        finish(start(study, Path(folder) / "one", "--threads", "1"))
-        tables = [(Path(folder) / run / "trials.csv").read_bytes() for run in ("killed", "undisturbed", "one")]
-        print(killed, "rows:", tables[0].count(b"\n") - 1, "identical:", tables[0] == tables[1] == tables[2])
+    with contextlib.ExitStack() as stack:
+        out = Path(folder or stack.enter_context(tempfile.TemporaryDirectory()))
+        study = written(out, repetitions)
+        killed = killed_at_random(study, out / f"killed-{seed}", kills, seed)
+        print(killed, flush=True)
+        finish(start(study, out / "undisturbed", "--workers", "2"))
+        finish(start(study, out / "one", "--threads", "1"))
+        tables = [(out / run / "trials.csv").read_bytes() for run in (f"killed-{seed}", "undisturbed", "one")]
+        print("rows:", tables[0].count(b"\n") - 1, "identical:", tables[0] == tables[1] == tables[2])
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 40, 1)
+    main(*(int(word) if word.isdecimal() else word for word in sys.argv[1:]))  # pyright: ignore[reportArgumentType]

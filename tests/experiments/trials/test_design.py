@@ -58,6 +58,8 @@ def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
         ({"factors": {"stiffness": [1]}}, "has one level"),
         ({"factors": {"stifness": [1, 2]}}, "--stifness is not known"),
         ({"factors": {"stiffness": [-1, 2]}}, "--stiffness"),
+        ({"factors": {"map": ["cylindrical", "spherical"]}}, "spherical"),
+        ({"factors": {"guidance": {"none": {}, "river": {"mode": "flood"}}}}, "flood"),
         ({"factors": {"stiffness": [1, 2], "k": {"a": {"stiffness": 3}, "b": {"damping": 1}}}}, "both set 'stiffness'"),
         ({"factors": {"gain": {"a": {"stiffness": 3}, "b": {"stiffness": 3.0}}}}, "are the same"),
         ({"between": ["map"]}, "no factor 'map'"),

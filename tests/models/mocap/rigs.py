@@ -12,7 +12,7 @@ from models.mocap import quaternions
 # What vendors call the parts: pelvis, abdomen, chest, neck, head; clavicle, upper arm, forearm, hand; thigh, shank,
 # foot, toe. @ is the side, as the family writes it.
 FAMILIES = {
-    "HumanIK": ("Left Right", "Hips Spine Spine1 Neck Head",
+    "MotionBuilder": ("Left Right", "Hips Spine Spine1 Neck Head",
                 "@Shoulder @Arm @ForeArm @Hand @UpLeg @Leg @Foot @ToeBase"),
     "Mixamo": ("Left Right", "mixamorig:Hips mixamorig:Spine mixamorig:Spine2 mixamorig:Neck mixamorig:Head",
                "mixamorig:@Shoulder mixamorig:@Arm mixamorig:@ForeArm mixamorig:@Hand mixamorig:@UpLeg mixamorig:@Leg "
@@ -50,7 +50,7 @@ PARTS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "
 class Rig:
     """How a skeleton is drawn and written."""
 
-    family: str = "HumanIK"
+    family: str = "MotionBuilder"
     zero: str = "T"
     up: str = "+Y"
     turn: float = 0.0  # of the whole file about its vertical [rad]

@@ -1,4 +1,7 @@
-"""Kill or freeze whom you like: the servo goes on, or lets go; and what was recorded can be read."""
+"""Kill or freeze whom you like: the servo goes on, or lets go; and what was recorded can be read.
+
+Those that no busy machine disturbs are `slow`, the others `processes`.
+"""
 
 import contextlib
 import functools
@@ -27,7 +30,6 @@ from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
 from tests.sim.hardware.hosted import PERIOD, device, in_process, over_packets
 
-pytestmark = pytest.mark.processes
 CLOCK = ServoClock(late=20.0, heartbeat=20.0)
 """So long that a busy machine makes no fault of its own; a test of lateness or silence has a clock of its own."""
 LATE, SILENT = 0.2, 0.6
@@ -73,6 +75,7 @@ def goes_on(run: HardwareRun, ticks: int = 100) -> None:
     assert (look.state, look.fault) == (State.ACTIVE, Fault.NONE)
 
 
+@pytest.mark.slow
 def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
@@ -97,6 +100,7 @@ def test_the_recorder_frozen_and_killed_costs_rows_and_nothing_else(tmp_path: Pa
         assert np.isfinite(recording.channel("ticks", "hand_force")[:]).all()
 
 
+@pytest.mark.processes
 def test_a_whole_run_is_recorded_and_says_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with running(path) as run:
@@ -123,6 +127,7 @@ def bystander(status: SharedNumbers, began: SharedNumbers) -> None:
         began.write(np.ones(1))
 
 
+@pytest.mark.slow
 def test_a_page_that_is_frozen_and_killed_is_not_waited_for() -> None:
     began, seen = SharedNumbers(1), np.zeros(1)
     context = multiprocessing.get_context("spawn")
@@ -145,6 +150,7 @@ def limited(size: int, *arguments) -> None:
     record_rows(*arguments)
 
 
+@pytest.mark.processes
 def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with HardwareRun(in_process, PERIOD, CLOCK, job(path)) as run:
@@ -161,6 +167,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
         assert (np.diff(ticks) > 0).all()
 
 
+@pytest.mark.processes
 def test_controls_that_freeze_are_a_fault_and_controls_that_are_back_can_clear_it() -> None:
     with running(clock=ServoClock(late=20.0, heartbeat=SILENT)) as run:
         time.sleep(2.0 * SILENT)
@@ -182,6 +189,7 @@ def goes_past(run: HardwareRun, ticks: int = 20) -> None:
     until(run, lambda look: float(look.row["tick"]) > before + ticks)
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("stall", [0.05, 0.5])
 def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(stall: float) -> None:
     """A stop of 50 ms is counted where more is allowed; one of 500 ms is a fault where 200 ms are."""
@@ -203,6 +211,7 @@ def test_a_servo_that_was_stopped_misses_its_deadlines_and_does_not_catch_up(sta
             assert not after["torque"].any()
 
 
+@pytest.mark.slow
 def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown, seen = SharedNumbers(SHOWN_SIZE), np.zeros(SHOWN_SIZE)
@@ -243,6 +252,7 @@ def test_a_device_s_watchdog_lets_go_when_the_servo_is_stopped_or_killed() -> No
         theirs.close()
 
 
+@pytest.mark.processes
 def test_a_device_that_is_gone_is_a_fault() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
@@ -256,13 +266,13 @@ def test_a_device_that_is_gone_is_a_fault() -> None:
             ours.close()
             active(run)
             hosted.kill()
-            look = until(run, lambda look: look.fault is not Fault.NONE)
-            if look.fault is Fault.READING_STALE:  # of a machine too busy for the device, just before
-                run.request(CLEAR)
-                look = until(run, lambda look: look.fault is not Fault.READING_STALE)
-                look = until(run, lambda look: look.fault is not Fault.NONE)
-            assert look.fault is Fault.UNPLUGGED
-            assert not look.row["torque"].any()
+
+            def gone(look: Look) -> bool:
+                if look.fault is Fault.READING_STALE:  # a process that is killed is silent before its socket closes
+                    run.request(CLEAR)
+                return look.fault is Fault.UNPLUGGED
+
+            assert not until(run, gone).row["torque"].any()
     finally:
         hosted.kill()
         hosted.join()
@@ -273,6 +283,7 @@ def refuses() -> None:
     raise SimError("no such device; expected one that is plugged in")
 
 
+@pytest.mark.processes
 def test_a_device_that_cannot_be_opened_is_said_in_its_own_words() -> None:
     with HardwareRun(refuses, PERIOD, CLOCK) as run, pytest.raises(SimError, match="no such device"):
         run.start()

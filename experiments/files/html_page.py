@@ -1,4 +1,4 @@
-"""The frame of every page that is written: one HTML document that opens from disk, in one style."""
+"""The frame of every page that is written: one HTML document that opens from disk, readable on a phone."""
 
 import base64
 import html
@@ -9,27 +9,33 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+NUMBERS = """
+table { font-size: .85rem; }
+th, td { padding: .25rem .7rem .25rem 0; text-align: right; white-space: nowrap; }
+th:first-child, td:first-child, .l { text-align: left; }
+td.says { white-space: normal; text-align: left; }
+tr.weak { color: #7b8698; }
+"""
+"""Style of pages whose tables are of numbers."""
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }
-h1 { font-size: 1.5rem; margin: 0 0 .5rem; }
+h1 { font-size: 1.5rem; margin: 0 0 .5rem; overflow-wrap: anywhere; }
 h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
-iframe { width: 100%; height: min(42rem, 80vh); border: 1px solid #d9dde4; border-radius: 6px; }
+p, li { overflow-wrap: anywhere; }
 img { max-width: 100%; }
+iframe { width: 100%; height: min(42rem, 80vh); box-sizing: border-box; border: 1px solid #d9dde4; border-radius: 6px; }
 .found { font-size: 1.05rem; border-left: 4px solid #1f5fbf; padding-left: 1rem; }
 .found p { margin: .4rem 0; }
 .note { font-size: .9rem; color: #566072; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .7rem .25rem 0; text-align: right; border-bottom: 1px solid #e4e8ee; white-space: nowrap; }
-th:first-child, td:first-child, .l { text-align: left; }
-td.says { white-space: normal; text-align: left; }
-tr.weak { color: #7b8698; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #e4e8ee; }
 pre { background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; border-radius: 6px; }
 @media (max-width: 600px) { body { padding: .8rem; } iframe { height: 70vh; } }
 """
 
 
-def document(title: str, body: str, style: str = "") -> str:
+def html_page(title: str, body: str, style: str = "") -> str:
     """A whole page.
 
     Parameters
@@ -37,7 +43,8 @@ def document(title: str, body: str, style: str = "") -> str:
     title : str
         Of the page, and its heading.
     body : str
-        HTML below the heading.
+        HTML below the heading. A table or a picture that is wider than a phone stands in a ``div`` of class ``wide``,
+        which scrolls.
     style : str
         CSS of this page alone.
     """
@@ -45,7 +52,7 @@ def document(title: str, body: str, style: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<title>{name}</title>\n<style>{_STYLE}{style}</style>\n</head>\n<body>\n<h1>{name}</h1>\n{body}</body>\n</html>\n"
+        f"<title>{name}</title>\n<style>{_STYLE}{style}</style>\n</head>\n<body>\n<h1>{name}</h1>\n{body}\n</body>\n</html>\n"
     )
 
 

@@ -1,0 +1,102 @@
+r"""Whether what supports a motion between its flights can be contact: near the floor, held there, and without jumps.
+
+Contacts are told leniently, since captures miss the floor: a foot 5 cm up that is slow counts as support. That finds
+flights; it does not make a floor where there is none. So what is certified has to pass besides:
+
+- the floor that it stands on, the median height of the body's lowest point while supported, is near z = 0;
+- nine tenths of the supported time that point is near that floor, above and below;
+- something is at rest most of the time, and nothing at rest travels far: a body that glides is not held by friction;
+- the centre of mass is not carried off faster than legs push: with d the noise of a recording's centre of mass,
+
+.. math:: |\ddot c| \le a_{max} + 4 d f^2, \quad \ddot c \text{ by second differences at } f \text{ frames a second};
+
+- no joint turns in one frame by many times what it does before and after.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.certificates.flight.flight_fit import NOISE, Mask
+from controllers.certificates.flight.tolerance import ContactTolerance
+from controllers.state import Array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyContact:
+    """What touches the floor in n frames, and how the joints turn.
+
+    Parameters
+    ----------
+    lowest : array, shape (n,)
+        Height of the lowest point of the body over the floor [m].
+    supported, held : array of bool, shape (n,)
+        Whether anything bears load, and whether any of that is at rest.
+    skate : float
+        Furthest that a contact point of a foot travels over the floor while it is taken to be at rest [m].
+    turned : array, shape (n − 1,)
+        Largest turn of a joint from frame to frame [rad].
+    """
+
+    lowest: Array
+    supported: Mask
+    held: Mask
+    skate: float
+    turned: Array
+
+
+def contact_doubts(
+    touched: BodyContact, com: Array, fps: float, tolerance: ContactTolerance
+) -> tuple[list[str], dict[str, object]]:
+    """Why the support of a motion is no contact, a clause each, and its measures; com is the centre of mass (n, 3)."""
+    doubts: list[str] = []
+    figures: dict[str, object] = {}
+    if touched.supported.any():
+        heights = touched.lowest[touched.supported]
+        floor = float(np.median(heights))
+        low, high = (float(end) for end in np.quantile(heights, (0.05, 0.95)) - floor)
+        figures |= {"floor": floor, "lowest": low, "highest": high}
+        if abs(floor) > tolerance.floor:
+            where = "over" if floor > 0.0 else "under"
+            doubts.append(f"stands {1e3 * abs(floor):.0f} mm {where} the floor, more than {1e3 * tolerance.floor:g}")
+        if max(-low, high) > tolerance.spread:
+            doubts.append(
+                f"its lowest point is {1e3 * low:.0f} to {1e3 * high:+.0f} mm from where it stands, beyond "
+                f"±{1e3 * tolerance.spread:g}"
+            )
+    unheld = _longest(touched.supported & ~touched.held) / fps
+    figures |= {"unheld": unheld, "skate": touched.skate}
+    if unheld > tolerance.unheld:
+        doubts.append(f"glides for {unheld:.2f} s with nothing at rest, longer than {tolerance.unheld:g}")
+    if touched.skate > tolerance.skate:
+        doubts.append(f"a foot that stands slides by {100 * touched.skate:.0f} cm, more than {100 * tolerance.skate:g}")
+    return doubts + _jumps(touched, com, fps, tolerance, figures), figures
+
+
+def _jumps(
+    touched: BodyContact, com: Array, fps: float, tolerance: ContactTolerance, figures: dict[str, object]
+) -> list[str]:
+    doubts: list[str] = []
+    if len(com) > 2:
+        carried = np.linalg.norm(np.diff(com, 2, axis=0), axis=1) * fps**2
+        at, most = int(np.argmax(carried)), tolerance.push + 4.0 * NOISE * fps**2
+        figures["jump"] = float(carried[at])
+        if carried[at] > most:
+            doubts.append(
+                f"jumps at {(at + 1) / fps:.2f} s: its centre of mass accelerates by {carried[at]:.0f} m/s², more than "
+                f"{most:.0f}"
+            )
+    turned = touched.turned
+    if len(turned) > 2:
+        around = np.maximum(turned[:-2], turned[2:])
+        leaps = (turned[1:-1] > tolerance.leap) & (turned[1:-1] > tolerance.outlier * around)
+        if leaps.any():
+            at = int(np.argmax(leaps)) + 1
+            doubts.append(f"a joint leaps by {np.rad2deg(turned[at]):.0f}° in one frame, at {(at + 1) / fps:.2f} s")
+    return doubts
+
+
+def _longest(mask: Mask) -> int:
+    """Frames of the longest stretch."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))

@@ -1,0 +1,72 @@
+r"""Power that the executed law injects into a hand that shakes the stylus: sampled, filtered, late and rounded.
+
+The ideal law injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4, whatever the hand does. Of a hand that vibrates with frequency f the
+servo sees samples, their filtered differences and, held for a period, answers late: a complex stiffness
+
+.. math:: G(\omega) = \frac{1 - e^{-i\omega T}}{i\omega T}\, e^{-i\omega\tau}
+          \left(k_r + b_d \frac{(1 - s)(1 - e^{-i\omega T})}{T\,(1 - s e^{-i\omega T})}\right), \qquad
+          E(\omega) = -\frac{\mathrm{Im}\,G(\omega)}{\omega}
+
+with which a vibration of RMS speed V gains E(ω) V² watts on average. E is −b_d for ω → 0 and positive above a
+frequency f_0. Frequencies do not mix on average, so of a hand whose vibration has frequencies up to f (below Nyquist's)
+
+.. math:: \bar P \le \tfrac14 b_d |\dot\varphi|^2 + V^2 \max_{\omega \le 2\pi f} E(\omega)^+ + \nu V
+
+where ν bounds the force that rounded encoders make: a reading that is wrong by δ gives k_r δ + 2 b_d (1 − s) δ/T.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.certificates.loop.linear_loop import LinearLoop
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River
+from controllers.state import Array
+
+BANDS = (30.0, 100.0, 300.0)  # [Hz] what a hand does and trembles with; a tool against a table; what skin still feels
+
+
+class Injection(NamedTuple):
+    """What the executed law adds to the ideal bound of its power.
+
+    Attributes
+    ----------
+    passive_below : float
+        f_0 [Hz]: a slower vibration gains nothing.
+    activity : tuple of float
+        max E⁺ [N s/m] up to each of `BANDS`.
+    rounding : float
+        ν [N].
+    """
+
+    passive_below: float
+    activity: tuple[float, ...]
+    rounding: float
+
+    def bound(self, ideal: float, speed: float, band: int) -> float:
+        """P̄ [W] of a vibration of RMS speed V [m/s] within a band, on top of the ideal bound [W]."""
+        return ideal + self.activity[band] * speed**2 + self.rounding * speed
+
+
+def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
+    """E(ω) [N s/m] at frequencies [Hz] above 0 and up to Nyquist's."""
+    period, keep, omega = sampling.period, sampling.keep, 2.0 * np.pi * frequency
+    late = np.exp(-1j * omega * period)
+    hold = (1.0 - late) / (1j * omega * period) * np.exp(-1j * omega * sampling.delay)
+    stiffness = hold * (k + b * (1.0 - keep) * (1.0 - late) / (period * (1.0 - keep * late)))
+    return -stiffness.imag / omega
+
+
+def injection(river: River, linear: LinearLoop) -> Injection:
+    """What sampling, filter, delay and rounding add, of springs across the curve and dampers in any direction."""
+    nyquist = 0.5 / river.sampling.period
+    frequency = np.geomspace(0.1, nyquist, 2000)
+    # Along the curve there is no spring.
+    found = np.maximum(*(activity(k, river.b_d, river.sampling, frequency) for k in (0.0, river.k_r)))
+    active = np.flatnonzero(found > 0.0)
+    error = 0.5 * np.linalg.norm(linear.jacobian, axis=1) @ np.array(river.device.encoder_step)
+    keep, period = river.sampling.keep, river.sampling.period
+    rounding = float(error.max()) * (river.k_r + 2.0 * river.b_d * (1.0 - keep) / period)
+    most = tuple(max(0.0, float(found[frequency <= band].max())) for band in BANDS)
+    return Injection(float(frequency[active[0]]) if len(active) else nyquist, most, rounding)

@@ -1,0 +1,58 @@
+r"""Poses of a flight turned about their centre of mass until angular momentum is constant.
+
+Each pose is turned as a whole by R_k, R = 1 at take-off and landing. With L_k and I_k of the poses as they are,
+
+.. math:: R_k I_k R_k^T \omega_k = \bar L - R_k L_k, \qquad R_{k+1} = e^{[\omega_k \Delta t]} R_k
+
+and the constant momentum \bar L is the one for which the body lands as it was meant to: R = 1 at the last frame, three
+equations for three numbers, solved by Newton's method.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
+
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from models.mocap.dynamics.momentum import Momentum, momentum
+
+Array = npt.NDArray[np.float64]
+
+ROUNDS = 4  # differences see the turn of neighbouring frames: once more with what is left
+
+
+def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
+    """A clip whose flights, from frame to frame, keep their angular momentum; centres of mass stay where they are.
+
+    A flight for which there is no such turn stays as it is.
+    """
+    poses = clip.poses.copy()
+    for _ in range(ROUNDS):
+        moved = momentum(Clip(poses, clip.fps, clip.name))
+        for start, end in flights:
+            turn = _turns(moved, start, end, 1.0 / clip.fps)
+            if turn is not None:
+                span, q = slice(start, end + 1), turn.as_quat(scalar_first=True)
+                com = moved.com[span]
+                poses[span, :3] = com + quaternions.rotated(q, poses[span, :3] - com)
+                poses[span, 3:7] = quaternions.product(q, poses[span, 3:7])
+    return Clip(poses, clip.fps, clip.name)
+
+
+def _turns(moved: Momentum, start: int, end: int, step: float) -> Rotation | None:
+    """R of each frame of a flight; None where no momentum brings the body back."""
+    # Between two frames: momentum and inertia of the middle.
+    own = 0.5 * (moved.angular[start:end] + moved.angular[start + 1 : end + 1])
+    own[0], own[-1] = moved.angular[start + 1], moved.angular[end - 1]
+    inertia = 0.5 * (moved.inertia[start:end] + moved.inertia[start + 1 : end + 1])
+
+    def turned(mean: Array) -> list[Rotation]:
+        R = [Rotation.identity()]
+        for angular, own_inertia in zip(own, inertia, strict=True):
+            missing = R[-1].inv().apply(mean) - angular
+            R.append(R[-1] * Rotation.from_rotvec(np.linalg.solve(own_inertia, missing) * step))
+        return R
+
+    found = root(lambda mean: turned(mean)[-1].as_rotvec(), own.mean(axis=0), tol=1e-10)
+    return Rotation.concatenate(turned(np.asarray(found.x))) if found.success else None

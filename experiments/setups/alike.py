@@ -1,0 +1,125 @@
+"""Whether clips move alike, so that a mean of them is a motion: if not, a blend has the legs and trunk of one.
+
+A mean of a walk, a kick and a dance plants a foot where one of them stands while another one steps: corrected feet
+skate, and no floor gives the forces that the mean asks for. So the middle of a map is held against its clips, as it
+would be played: what floor contact lacks of its forces by inverse dynamics, and how far points of its soles move in a
+stance.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.legs.limbs import Limb
+from experiments.files.kept import kept_array
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
+from models.mocap.clip import Clip
+from models.mocap.preparation.feasible import contact_residual
+from models.mocap.preparation.poses import smoothed, sole_points
+from models.mocap.preparation.stances import stances
+from sim.compilation.compiled import CACHE_FOLDER
+from sim.reference.reference import poses_along
+
+Array = npt.NDArray[np.float64]
+
+LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] more than the clips' median: from there on they do not move alike
+_ON_FLOOR = 0.015  # [m]: what is higher does not rub, as in `well_formed`
+_FPS = 60.0
+_TRUNK = ("abdomen", "chest")
+_MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
+
+
+class Motion(NamedTuple):
+    """What a motion lacks.
+
+    Attributes
+    ----------
+    residual : float
+        RMS of the force that floor contact cannot give, by inverse dynamics [body weights].
+    lowest : float
+        Lowest point of the soles [m].
+    skate, furthest : float
+        How far a point of a sole moves in a stance: 95th percentile and largest [m].
+    """
+
+    residual: float
+    lowest: float
+    skate: float
+    furthest: float
+
+
+def upper_joints(legs: Sequence[Limb]) -> list[int]:
+    """Joints of the figure that are not its legs', counted from 1."""
+    return sorted(set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs)))
+
+
+def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
+    """Measure a motion (n, 75); its residual is 0 without `dynamics`."""
+    clip, points = Clip(poses, fps, "blend"), sole_points(poses)
+    schedule = stances(clip, smoothed(clip, 8.0))
+    heights = points[:, :, 2] - CONTACT_RADIUS
+    stands, ways = schedule.standing & (heights < _ON_FLOOR), [0.0]
+    for sphere in range(points.shape[1]):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], stands[:, sphere].astype(int), [0]))))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            stand = points[start:end, sphere, :2]
+            ways.append(float(np.linalg.norm(stand - np.median(stand, axis=0), axis=1).max()))
+    residual = contact_residual(clip, schedule) if dynamics else 0.0
+    return Motion(residual, float(heights.min()), float(np.quantile(ways, 0.95)), max(ways))
+
+
+def moves_alike(made: Cylindrical, lap: float) -> bool:
+    """Whether the middle of a map lacks little more than its clips do at the median; needs compiled code.
+
+    What was found once is kept beside the compiled code.
+    """
+    if all(np.array_equal(poses, made.clips[0][0]) for poses, _ in made.clips):
+        return True
+    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
+
+    def find() -> Array:
+        return np.array([_motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
+
+    found = kept_array(CACHE_FOLDER, "alike", (made.compiled().params, np.array([lap]), code), (5, 4), find)
+    usual = np.median(found[1:], axis=0)
+    return bool(found[0, 0] < usual[0] + LACKS and found[0, 2] < usual[2] + SKATES)
+
+
+def carries_alike(made: Composite, lap: float) -> bool:
+    """Whether legs of a composite map lack little more under the upper bodies of other clips than under their own."""
+    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
+    lower = made.clips[0]
+    own = Composite(lower, lower, lower, made.upper_joints, made.r_range, made.limbs, made.lap)
+
+    def find() -> Array:
+        return np.array([_motion_at(own, _MIDDLE, lap), *(_motion_at(made, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))])
+
+    found = kept_array(CACHE_FOLDER, "carries", (made.compiled().params, np.array([lap]), code), (4, 4), find)
+    return bool(found[1:, 0].max() < found[0, 0] + LACKS)
+
+
+def _motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
+    (r_low, r_high), (z_low, z_high) = made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)
+    rows = max(64, round(_FPS * lap))
+    angles, r = 2.0 * np.pi * np.arange(rows) / rows, r_low + place[0] * (r_high - r_low)
+    stylus, poses = np.zeros((rows, 7)), np.empty((rows, made.nq))
+    stylus[:, 0], stylus[:, 1] = r * np.cos(angles), r * np.sin(angles)
+    stylus[:, 2], stylus[:, 3] = z_low + place[1] * (z_high - z_low), 1.0
+    kind, params, memory = made.compiled()
+    poses_along(kind, params, memory.copy(), stylus, poses)
+    return motion_of(poses, rows / lap)
+
+
+def arms(legs: Sequence[Limb]) -> list[int]:
+    """Joints of arms and head."""
+    return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK}]
+
+
+def only_arms(made: Cylindrical) -> Cylindrical:
+    """The same map in which only arms and head are blended: legs, root and trunk are those of the first clip."""
+    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs))

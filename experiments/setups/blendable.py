@@ -1,0 +1,56 @@
+"""What clips cannot be blended with others, and why: a mean of who flies or turns over and of who stands."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controllers.motion.loops import Loop, checked_clip, closed_loop
+from controllers.motion.strides import natural_lap
+from models.humanoid.skeleton import CONTACT_RADIUS
+from models.mocap.clip import Clip
+from models.mocap.preparation.poses import sole_points
+
+FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
+LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
+UPRIGHT = (
+    0.0  # least vertical component of the pelvis axis: who kicks high leans back by 61°, who turns over passes 90°
+)
+SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
+
+
+def longest_flight(clip: Clip) -> float:
+    """Longest time without a sole near the floor [s]."""
+    flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FLIES
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flies.astype(int), [0]))))
+    return float((edges[1::2] - edges[::2]).max(initial=0)) / clip.fps
+
+
+def least_upright(clip: Clip) -> float:
+    """Least vertical component of the pelvis axis."""
+    return float((1.0 - 2.0 * (clip.poses[:, 4] ** 2 + clip.poses[:, 5] ** 2)).min())
+
+
+def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
+    """Which of different clips cannot be blended with the others, a line each; none if they are one and the same."""
+    if all(np.array_equal(clip.poses, clips[0].poses) for clip in clips):
+        return ()
+    found: list[str] = []
+    for clip in {clip.name: clip for clip in clips}.values():
+        flight, upright = longest_flight(clip), least_upright(clip)
+        if upright < UPRIGHT:
+            angle = np.rad2deg(np.arccos(upright))
+            found.append(f"{clip.name} turns over (pelvis {angle:.0f}° from upright): no mean with others is a motion")
+        elif flight > LONGEST_FLIGHT:
+            found.append(f"{clip.name} flies for {flight:.2f} s: a mean with what stays on the floor cannot")
+    return tuple(found)
+
+
+def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
+    """Which clips a lap [s] plays much faster or slower than they are, as loops that are played `in_step`."""
+    paces = {clip.name: loop.duration / lap for clip, loop in zip(clips, loops, strict=True)}
+    off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
+    if not off:
+        return ()
+    closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    best = natural_lap(closed)
+    return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; --lap {best:.1f} suits them best",)

@@ -1,0 +1,205 @@
+"""Blends of captures drawn by lot: how feet, joints and the physical figure hold while a hand pushes.
+
+``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares
+the files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and
+prints the table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.motion.loops import checked_clip, closed_loop
+from controllers.motion.strides import in_step, natural_lap
+from experiments.config.words import run_config
+from experiments.preparation.prepared_clip import prepared_clip
+from experiments.results.measures import FALLEN
+from experiments.setups.alike import motion_of
+from experiments.setups.blendable import not_blendable, off_pace
+from experiments.setups.wiring import wire
+from experiments.studies.prepared_captures import followed
+from experiments.trials.trial_log import TrialLog
+from models.errors import ModelError
+from models.humanoid.skeleton import joint_range
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from sim.loop.loop import Loop
+
+Array = npt.NDArray[np.float64]
+
+TUNING = (
+    "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "deepmimic/humanoid3d_backflip.txt", "deepmimic/humanoid3d_dance_a.txt",
+    "deepmimic/humanoid3d_jump.txt", "deepmimic/humanoid3d_run.txt", "deepmimic/humanoid3d_spinkick.txt",
+    "deepmimic/humanoid3d_walk.txt", "snu/backflip.bvh", "snu/dance.bvh", "snu/kick.bvh", "snu/run.bvh", "snu/walk.bvh",
+    "xia/angry_13_000.bvh", "xia/strutting_01_000.bvh", "animated_drawings/jumping.bvh", "cmu_amc/02_04.amc",
+)  # fmt: skip
+JUDGING = (
+    "cmu_amc/16_09.amc", "deepmimic/humanoid3d_cartwheel.txt", "deepmimic/humanoid3d_dance_b.txt",
+    "deepmimic/humanoid3d_kick.txt", "deepmimic/humanoid3d_spin.txt", "snu/cart.bvh", "snu/pirouette.bvh",
+    "xia/dme_example.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/scaled_131_03.bvh",
+)  # fmt: skip
+"""Halves of the captures, as in `docs/validation/prepared-captures.md`, without one that is a copy."""
+
+SECONDS = 20.0
+MOST_ALONE = 0.15  # [body weights] RMS: what is followed worse alone is no well-formed clip
+_WITHIN = np.deg2rad(1.0)  # beyond a joint's range: what an Euler angle and a rotation vector differ by near limits
+_EVERY = 5  # frames of the animation that are not looked at between two that are: 100 a second
+
+
+class Captured(NamedTuple):
+    """A file, prepared, and whether it can be drawn.
+
+    Attributes
+    ----------
+    name : str
+    reason : str
+        Why it is not blended; empty if it is.
+    alone : float
+        Residual of the figure that follows it alone [body weights].
+    fell : float or None
+        When it then fell [s].
+    """
+
+    name: str
+    reason: str
+    alone: float
+    fell: float | None
+
+
+def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
+    """Prepare a file and follow it alone."""
+    try:
+        clip = _named(prepared_clip(Path(folder) / name).clip, name)
+    except ModelError as error:
+        return Captured(name, f"refused: {error}", np.inf, None), None
+    residual, fell = followed(clip)
+    reason = "; ".join(not_blendable((clip, _other(clip))))
+    if not reason and (fell is not None or residual > MOST_ALONE):
+        reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
+    return Captured(name, reason, residual, fell), clip
+
+
+def _named(clip: Clip, name: str) -> Clip:
+    return Clip(clip.poses, clip.fps, name)
+
+
+def _other(clip: Clip) -> Clip:
+    """Some other clip, so that one that cannot be blended with any is told."""
+    return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
+
+
+def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str) -> dict[str, Any]:
+    """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure."""
+    began = time.process_time()
+    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    lap = natural_lap(loops)
+    pace = [loop.duration / lap for loop in in_step(loops, lap)]
+    names = tuple(clip.name for clip in clips)
+    mode = "rivers" if kind == "rivers" else "follow"
+    config = run_config(mode=mode, map=kind, user=user, clips=names, lap=lap, seconds=SECONDS, seed=seed)
+    session = wire(config, tuple(clips))
+    log = TrialLog(session.servo, session.world)
+    Loop(session.servo, session.world, log).run(SECONDS)
+    frames, weight = log.frames, session.weight
+    away = np.flatnonzero(frames["root_error"] > FALLEN)
+    fell = float(frames["t"][away[0]]) if len(away) else None
+    force = np.linalg.norm(frames["residual"][:, :3], axis=1)[frames["flight"] == 0.0] / weight
+    rate = 1.0 / float(np.diff(frames["t"]).mean())
+    return {
+        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "pace": [round(p, 2) for p in pace],
+        "remarks": session.remarks, "off_pace": off_pace(clips, in_step(loops, lap), lap), "fell": fell,
+        "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
+        "flight": float(np.mean(frames["flight"] > 0.0)),
+        "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
+        **animation_measures(frames["reference"][::_EVERY], rate / _EVERY), "cpu": time.process_time() - began,
+    }  # fmt: skip
+
+
+def animation_measures(poses: Array, fps: float) -> dict[str, float]:
+    """Of the animation: lowest sole, way of a point in a stance (95 %, largest) [cm], joints beyond limits [°]."""
+    motion = motion_of(poses, fps, dynamics=False)
+    vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
+    limits = joint_range()
+    excess = np.maximum(limits[:, :, 0] - vectors, vectors - limits[:, :, 1]).max() - _WITHIN
+    return {
+        "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,
+        "beyond": float(np.rad2deg(max(excess, 0.0))),
+    }  # fmt: skip
+
+
+def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
+    """Sets of different clips by lot, without end."""
+    rng = np.random.default_rng(seed)
+    while True:
+        yield tuple(clips[i] for i in rng.choice(len(clips), size=min(size, len(clips)), replace=False))
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Lines of the table, a map each."""
+    lines = [
+        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm "
+        "| skate cm (95 % of stances; worst) | joints beyond ° |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for kind in dict.fromkeys(row["map"] for row in rows):
+        of = [row for row in rows if row["map"] == kind]
+        stood = [row for row in of if row["fell"] is None]
+        residual = 100 * np.array([row["residual"] for row in stood] or [np.nan])
+        lines.append(
+            f"| {kind} | {len(of)} | {len(stood)} | {np.sqrt(np.mean(residual**2)):.1f}, {np.median(residual):.1f}, "
+            f"{np.quantile(residual, 0.9):.1f} | {min(row['lowest'] for row in of):.1f} | "
+            f"{np.median([row['skate'] for row in of]):.1f}; {max(row['slid'] for row in of):.1f} | "
+            f"{max(row['beyond'] for row in of):.1f} |"
+        )
+    return lines
+
+
+SIZES = {"cylindrical": 4, "composite": 3, "rivers": 3}
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder")
+    parser.add_argument("--half", choices=("tuning", "judging"), default="tuning")
+    parser.add_argument("--sets", type=int, default=10)
+    parser.add_argument("--maps", nargs="+", default=["cylindrical"], choices=tuple(SIZES))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--user", default="push")
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    files = TUNING if given.half == "tuning" else JUDGING
+    clips: list[Clip] = []
+    with ProcessPoolExecutor(given.processes) as pool, given.out.open("w") as out:
+        for found, clip in pool.map(captured, [given.folder] * len(files), files):
+            print(f"{found.name}: {found.reason or 'drawn'} (alone {100 * found.alone:.1f} %)", flush=True)
+            if clip is not None and not found.reason:
+                clips.append(clip)
+        rows: list[dict[str, Any]] = []
+        tasks = [
+            pool.submit(run_set, k, kind, chosen, given.seed + k, given.user)
+            for k, sets in enumerate(
+                islice(zip(*(drawn(clips, SIZES[m], given.seed) for m in given.maps), strict=True), given.sets)
+            )
+            for kind, chosen in zip(given.maps, sets, strict=True)
+        ]
+        for task in as_completed(tasks):
+            row = task.result()
+            rows.append(row)
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+            print(row["set"], row["map"], row["fell"], round(100 * row["residual"], 1), row["clips"], flush=True)
+    print("\n".join(summary(rows)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Inverse dynamics of many states, and how wrench, torques and places follow position, velocity and acceleration.
+
+Derivatives by position and velocity are forward differences of the recursive Newton–Euler algorithm (MuJoCo's
+`mj_rne`), that by acceleration is the mass matrix; all in the tangent of `Clip` poses.
+"""
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
+from models.mocap.dynamics.floor_forces import Demand
+from models.mocap.preparation.change import State
+
+Array = npt.NDArray[np.float64]
+
+_ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
+_LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
+
+
+class InverseDynamics:
+    """Inverse dynamics of m sampled states, and how they follow place, velocity and acceleration in the tangent.
+
+    Parameters
+    ----------
+    state : State
+        The states.
+    with_jacobian : bool
+        Whether to find derivatives.
+
+    Attributes
+    ----------
+    demand : Demand
+        What the states ask of the floor.
+    wrench : array, shape (m, 3, 6, 57)
+        Derivatives of the wrench about the centre of mass by position, velocity, acceleration.
+    torque : array, shape (m, 3, 51, 57)
+        Of the joints' torques without floor.
+    spheres, com : arrays, shapes (m, 8, 3, 57), (m, 3, 57)
+        Of the places of contact spheres and centre of mass, by position.
+    """
+
+    def __init__(self, state: State, with_jacobian: bool) -> None:
+        model = figure_model()
+        d = mujoco.MjData(model)
+        geoms = [int(model.geom(name).id) for name in FOOT_CONTACTS]
+        m = len(state.q)
+        force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, 8, 3)), np.empty((m, 3))
+        bodies = [1 + body for body in _LEGS]
+        anchors, frames, root = np.empty((m, 6, 3)), np.empty((m, 6, 9)), np.empty((m, 3, 3))
+        many = m if with_jacobian else 0
+        by = np.zeros((many, 3, N_TANGENT, N_TANGENT))
+        self.spheres, self.com = np.zeros((many, 8, 3, N_TANGENT)), np.zeros((many, 3, N_TANGENT))
+        self.anchors, self.turns = np.zeros((2, many, 6, 3, N_TANGENT))
+        result, moved, full = np.zeros(N_TANGENT), np.zeros(model.nq), np.empty((N_TANGENT, N_TANGENT))
+        step = np.zeros(N_TANGENT)
+        kinematics, places, rates, inverse = mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel, mujoco.mj_rne
+        for k in range(m):
+            d.qpos[:], d.qvel[:], d.qacc[:] = state.q[k], state.v[k], state.a[k]
+            kinematics(model, d)
+            places(model, d)
+            rates(model, d)
+            inverse(model, d, 1, result)
+            force[k], spheres[k], com[k] = result, d.geom_xpos[geoms], d.subtree_com[1]
+            anchors[k], frames[k], root[k] = d.xpos[bodies], d.xmat[bodies], d.xmat[1].reshape(3, 3)
+            if not with_jacobian:
+                continue
+            for i, geom in enumerate(geoms):
+                mujoco.mj_jac(model, d, self.spheres[k, i], None, spheres[k, i], int(model.geom_bodyid[geom]))
+            for i, body in enumerate(bodies):
+                mujoco.mj_jac(model, d, self.anchors[k, i], self.turns[k, i], anchors[k, i], body)
+            mujoco.mj_jacSubtreeCom(model, d, self.com[k], 1)
+            mujoco.mj_crb(model, d)
+            _full_mass(model, d, full)
+            by[k, 2] = full
+            qvel, qpos, here = d.qvel, d.qpos, state.q[k]
+            for i in range(3, N_TANGENT):
+                qvel[i] += _RATE
+                rates(model, d)
+                inverse(model, d, 1, result)
+                qvel[i] = state.v[k, i]
+                by[k, 1, :, i] = (result - force[k]) / _RATE
+            for i in range(3, N_TANGENT):
+                step[i] = _ANGLE
+                moved[:] = here
+                mujoco.mj_integratePos(model, moved, step, 1.0)
+                step[i] = 0.0
+                qpos[:] = moved
+                kinematics(model, d)
+                places(model, d)
+                rates(model, d)
+                inverse(model, d, 1, result)
+                by[k, 0, :, i] = (result - force[k]) / _ANGLE
+        arm = com - state.q[:, :3]
+        moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
+        wrench = np.concatenate((force[:, :3], moment), axis=1)
+        self.demand = Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, 6, 3, 3))
+        if with_jacobian:
+            self._complete(state, by, force, root, arm)
+
+    def _complete(self, state: State, by: Array, force: Array, root: Array, arm: Array) -> None:
+        """Derivatives of the wrench about the centre of mass and of the legs' torques."""
+        m = len(arm)
+        turning = cross_matrix(state.v[:, 3:].reshape(m, 18, 3))
+        spinning = cross_matrix(state.a[:, 3:].reshape(m, 18, 3))
+        for j in range(18):
+            # A change in a segment's own frame carries its velocity and acceleration with it.
+            c = slice(3 + 3 * j, 6 + 3 * j)
+            by[:, 0, :, c] += by[:, 1, :, c] @ turning[:, j] + by[:, 2, :, c] @ spinning[:, j]
+            by[:, 1, :, c] += by[:, 2, :, c] @ turning[:, j]
+        self.wrench = np.empty((m, 3, 6, N_TANGENT))
+        self.wrench[:, :, :3] = by[:, :, :3]
+        self.wrench[:, :, 3:] = root[:, None] @ by[:, :, 3:6] - cross_matrix(arm)[:, None] @ by[:, :, :3]
+        self.wrench[:, 0, 3:, 3:6] -= root @ cross_matrix(force[:, 3:6])
+        shifted = self.com.copy()
+        shifted[:, :, :3] -= np.eye(3)
+        self.wrench[:, 0, 3:] += cross_matrix(force[:, :3]) @ shifted
+        self.torque = by[:, :, 6:]
+
+    def leaning(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
+        """How the torques of forces that stay follow the place, d(Jᵀ)/dx f: shape (n, 51, 57).
+
+        Parameters
+        ----------
+        pushes : Array
+            Forces of the floor, shape (m, 8, 3) [N].
+        states : array of int, shape (n,)
+            Of which states.
+        """
+        demand, leaning = self.demand, np.zeros((len(states), 51, N_TANGENT))
+        soles = demand.spheres[states] - (0.0, 0.0, CONTACT_RADIUS)
+        for leg, body in enumerate(_LEGS):
+            mine = slice(0, 4) if leg < 3 else slice(4, 8)
+            force, anchor = pushes[states, mine], demand.anchors[states, leg]
+            moment = np.cross(soles[:, mine] - anchor[:, None], force).sum(1)
+            moved = self.spheres[states, mine] - self.anchors[states, leg, None]
+            change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, leg]
+            leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, leg].transpose(0, 2, 1) @ change
+        return leaning
+
+
+def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
+    """M as a full matrix, whichever way this version of MuJoCo is asked for it."""
+    try:
+        mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
+    except TypeError:
+        mujoco.mj_fullM(model, full, data.qM)  # pyright: ignore[reportCallIssue, reportArgumentType, reportAttributeAccessIssue]
+
+
+def cross_matrix(w: Array) -> Array:
+    """Matrices [w]× of vectors, shape (..., 3) → (..., 3, 3)."""
+    zero = np.zeros(w.shape[:-1])
+    rows = ((zero, -w[..., 2], w[..., 1]), (w[..., 2], zero, -w[..., 0]), (-w[..., 1], w[..., 0], zero))
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -1,0 +1,85 @@
+"""From where a live page is looked at: so that what a view shows fills what the panel leaves free of the window."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+Array = npt.NDArray[np.float64]
+
+FIELD_OF_VIEW = np.deg2rad(34.0)
+PANEL = 335.0  # [px] that viser's panel takes of the width of a window
+PHONE = 576.0  # [px] up to which width viser lays the panel over the lower part
+SHEET = 0.6  # of the height that it takes there
+DEFAULT_SIZE = 1400.0, 850.0  # [px] of a window that has not told its own
+
+
+class View(NamedTuple):
+    """What is looked at, and from which side.
+
+    Attributes
+    ----------
+    centre : tuple of float
+        Of what is shown [m].
+    half : tuple of float
+        Half its width and half its height on the screen [m].
+    side : tuple of float
+        On which side of it the camera is, of any length.
+    """
+
+    centre: tuple[float, float, float]
+    half: tuple[float, float]
+    side: tuple[float, float, float]
+
+
+class Camera(NamedTuple):
+    """Where a camera is, and the point in the middle of its picture [m], shapes (3,)."""
+
+    position: Array
+    look_at: Array
+
+
+VIEWS = {
+    "both": View((0.47, -0.2, 1.02), (1.7, 1.2), (0.08, -1.0, 0.4)),
+    "workspace": View((1.4, -0.6, 1.25), (0.8, 0.55), (0.0, -1.0, 0.4)),
+    "stage": View((-0.3, 0.2, 0.98), (1.0, 1.25), (0.15, -1.0, 0.25)),
+}
+
+
+def camera_of(view: View, width: float, height: float) -> Camera:
+    r"""Where a camera stands that shows a view in a window of so many pixels.
+
+    With m metres a pixel in the plane of the view's centre, its distance is m h/(2 tan(α/2)), and it is shifted by half
+    of what the panel covers, so that the centre is in the middle of the rest.
+    """
+    phone = width <= PHONE
+    free = (width, (1.0 - SHEET) * height) if phone else (max(width - PANEL, 0.3 * width), height)
+    metres = max(2.0 * half / pixels for half, pixels in zip(view.half, free, strict=True))
+    side = np.array(view.side) / np.linalg.norm(view.side)
+    right, up = screen_axes(-side)
+    middle = np.array(view.centre) + 0.5 * metres * ((width - free[0]) * right - (height - free[1]) * up)
+    return Camera(middle + 0.5 * metres * height / np.tan(0.5 * FIELD_OF_VIEW) * side, middle)
+
+
+def screen_axes(forward: Array) -> tuple[Array, Array]:
+    """Directions to the right and up on the screen of a camera that looks along a unit vector, shapes (3,)."""
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, forward)
+
+
+def look(camera: viser.CameraHandle | viser.InitialCameraConfig, view: View, size: tuple[float, float]) -> None:
+    """Put a camera where a view is shown in a window of so many pixels."""
+    place = camera_of(view, *size)
+    camera.position, camera.look_at, camera.fov = place.position, place.look_at, FIELD_OF_VIEW
+
+
+def look_from(client: viser.ClientHandle, view: View) -> None:
+    """Let a browser show a view."""
+    look(client.camera, view, (float(client.camera.image_width), float(client.camera.image_height)))
+
+
+def is_phone(client: viser.ClientHandle) -> bool:
+    """Whether a browser's window is as narrow as a phone's."""
+    return client.camera.image_width <= PHONE

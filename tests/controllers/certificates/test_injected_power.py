@@ -1,0 +1,86 @@
+"""What the executed law injects into a hand that shakes the stylus stays below its bound, and not far below."""
+
+import numpy as np
+import pytest
+
+from controllers.certificates.loop.injected import BANDS, activity, injection
+from controllers.certificates.loop.laws import FOLLOW_LAW
+from controllers.certificates.loop.sampling import Sampling
+from controllers.certificates.loop.stability import River
+from controllers.curves.trajectory import Trajectory
+from controllers.fields.follow import Follow
+from controllers.fields.program import evaluate
+from controllers.safety.energy_tank import river_power
+from controllers.state import HandState
+from experiments.certify.certified_device import phantom_device
+
+CIRCLE = Trajectory.circle(0.0477, 4.0)
+PACE = 0.0477 * np.pi / 2.0
+DEVICE = phantom_device()
+
+
+def injected(sampling, frequency, amplitude, direction, rounded=True, gains=(300.0, 8.0), periods=40):
+    """Mean power [W] of the compiled law, sensed and held as the servo does it, and the hand's RMS speed [m/s]."""
+    program, keep, period = Follow(CIRCLE, *gains, 0.25).program(), sampling.keep, sampling.period
+    memory, wrench = program.fresh_memory(), np.empty(6)
+    ticks = max(round(periods / frequency / period), 200)
+    place = lambda t: CIRCLE.point(1.0) + amplitude * np.sin(2.0 * np.pi * frequency * t) * direction  # noqa: E731
+    step = np.array(DEVICE.encoder_step)
+    last, omega, work, square, waiting = None, np.zeros(3), 0.0, 0.0, []
+    for k in range(ticks):
+        theta = np.array(DEVICE.angles(place(k * period)))
+        theta = step * np.round(theta / step) if rounded else theta
+        omega = omega if last is None else keep * omega + (1.0 - keep) * (theta - last) / period
+        last = theta
+        p, jacobian = DEVICE.numbers(theta)
+        evaluate(*program.compiled(), memory, HandState.at(p, jacobian @ omega, 0.0).vector(), wrench)
+        waiting.append(wrench[:3].copy())
+        force = waiting[max(0, len(waiting) - 1 - sampling.whole_delay)]
+        moved = place((k + 1) * period) - place(k * period)
+        if k > 20:
+            # A force held over a period does work on the way, however the hand goes it.
+            work += float(force @ moved)
+            square += 0.5 * (2.0 * np.pi * frequency * amplitude) ** 2 * period
+    seconds = (ticks - 21) * period
+    return work / seconds, np.sqrt(square / seconds)
+
+
+def bound(sampling, frequency, speed, gains=(300.0, 8.0)):
+    river = River(FOLLOW_LAW, *gains, 0.25, CIRCLE, DEVICE, sampling)
+    band = next(i for i, f in enumerate(BANDS) if frequency <= f)
+    return injection(river, river.still()).bound(river_power(gains[1], PACE), speed, band)
+
+
+RADIAL = CIRCLE.point(1.0) / np.linalg.norm(CIRCLE.point(1.0))
+TANGENT = CIRCLE.velocity(1.0) / PACE
+
+
+def test_half_a_millimetre_at_300_hz_gets_most_of_what_the_bound_allows_and_many_times_the_ideal_one():
+    power, speed = injected(Sampling(1e-3), 300.0, 5e-4, RADIAL)
+    assert power > 50.0 * river_power(8.0, PACE)
+    assert 0.5 * bound(Sampling(1e-3), 300.0, speed) < power < bound(Sampling(1e-3), 300.0, speed)
+
+
+@pytest.mark.parametrize("delay", [0.0, 1e-3])
+@pytest.mark.parametrize("direction", [RADIAL, TANGENT, np.array([0.0, 0.0, 1.0])])
+def test_no_sinusoidal_hand_gets_more_than_the_bound(direction, delay):
+    rng, sampling = np.random.default_rng(3), Sampling(1e-3, delay)
+    for frequency in (2.0, 7.3, 21.0, 67.0, 140.0, 211.0, 290.0):
+        amplitude = float(10.0 ** rng.uniform(-4.5, -3.0)) * min(1.0, 60.0 / frequency)
+        power, speed = injected(sampling, frequency, amplitude, direction, periods=15)
+        assert power < bound(sampling, frequency, speed), (frequency, amplitude)
+
+
+def test_the_activity_is_the_power_of_the_loop_as_it_runs():
+    for frequency in (40.0, 130.0, 260.0):
+        power, speed = injected(Sampling(1e-3), frequency, 2e-4, RADIAL, rounded=False, periods=100)
+        expected = float(activity(300.0, 8.0, Sampling(1e-3), np.array([frequency]))[0]) * speed**2
+        assert power == pytest.approx(expected, rel=0.03, abs=0.02 * abs(expected))
+
+
+def test_slow_hands_gain_no_more_than_the_ideal_law_gives():
+    river = River(FOLLOW_LAW, 300.0, 8.0, 0.25, CIRCLE, DEVICE, Sampling(1e-3))
+    found = injection(river, river.still())
+    assert found.activity[0] == 0.0
+    assert 30.0 < found.passive_below < 300.0
+    assert activity(300.0, 8.0, Sampling(1e-6, cutoff=1e5), np.array([1.0]))[0] == pytest.approx(-8.0, rel=1e-3)

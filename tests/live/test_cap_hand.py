@@ -1,0 +1,57 @@
+"""The hand on a SpaceMouse begins where the stylus is, goes as the cap is pushed, and lets go when it rests."""
+
+import numpy as np
+import pytest
+
+from experiments.live import cap_hand
+from experiments.live.cap_hand import RESTS, CapHand
+from sim.devices.spacemouse import TOP_SPEED, SpaceMouse
+from tests.devices.test_hid import Clock
+from tests.devices.test_spacemouse import Cap
+
+STYLUS = np.array([0.03, -0.01, 0.02])
+
+
+@pytest.fixture
+def hand(monkeypatch: pytest.MonkeyPatch) -> tuple[CapHand, Cap, Clock]:
+    cap, clock = Cap(), Clock()
+    monkeypatch.setattr(cap_hand.time, "monotonic", lambda: clock.now)
+    return CapHand(SpaceMouse(cap, "SpaceNavigator", "test", lambda: clock.now)), cap, clock
+
+
+def test_a_cap_at_rest_holds_nothing(hand: tuple[CapHand, Cap, Clock]) -> None:
+    held, _, _ = hand
+    assert held.wish(STYLUS) is None
+
+
+def test_a_push_takes_the_hand_along_and_a_rest_lets_go(hand: tuple[CapHand, Cap, Clock]) -> None:
+    held, cap, clock = hand
+    held.wish(STYLUS)
+    cap.push(0, 0, -350)  # lifted all the way
+    for _ in range(11):
+        clock.now += 0.02
+        wish = held.wish(STYLUS)
+    assert wish is not None
+    target, pressed = wish
+    np.testing.assert_allclose(target - STYLUS, [0.0, 0.0, 0.2 * TOP_SPEED], atol=0.03 * TOP_SPEED)
+    assert not pressed
+    cap.push(0, 0, 0)
+    held.wish(STYLUS)
+    clock.now += 0.5 * RESTS
+    assert held.wish(STYLUS) is not None  # a short rest is none
+    clock.now += 2.0 * RESTS
+    assert held.wish(STYLUS) is None
+
+
+def test_the_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
+    held, cap, clock = hand
+    cap.queue.append(b"\x03\x01")
+    clock.now += 0.02
+    wish = held.wish(STYLUS)
+    assert wish is not None
+    assert wish[1]
+
+
+def test_without_a_spacemouse_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cap_hand, "found_devices", lambda: [])
+    assert cap_hand.cap_there() == (None, "")

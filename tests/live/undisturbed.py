@@ -1,0 +1,94 @@
+"""Does a page that is open, dragged and reloaded cost the servo anything? ``make live-load``: two minutes with it.
+
+Stretches with and without a browser take turns, so that what else goes on on the machine falls on both. Of each the
+99th percentile of the processor time of a tick is taken (of blocks of 8), and how much of real time the engine kept;
+what is printed is the ratio of the medians over the stretches.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from experiments.config.words import run_config
+from tests.live.browser import ARGUMENTS, CHROMIUM, Served, drag, new_tab, on_screen
+
+WITH, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
+REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more than 1000 blocks of 8 ms
+LIMIT = 1.10
+
+
+class Stretch(NamedTuple):
+    """99th percentile and median of the processor time of a tick [s], share of real time, pictures drawn [1/s]."""
+
+    most: float
+    middle: float
+    pace: float
+    pictures: float
+
+
+def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretch:
+    """What a stretch of time cost in which something is done."""
+    begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
+    costs: list[np.ndarray] = []
+    while (passed := time.monotonic() - begin) < seconds:
+        doing()
+        if passed > REMEMBERED:
+            costs.append(served.desk.now["cost"].copy())
+    middle, most = np.median(costs, axis=0)
+    passed = time.monotonic() - begin
+    pace = (float(served.desk.now["t"][0]) - t) / passed
+    return Stretch(float(most), float(middle), pace, (served.page.pictures - pictures) / passed)
+
+
+def used(served: Served, browser: Any) -> Stretch:
+    """The same with a page that is dragged, and loaded anew."""
+    tab = new_tab(browser, served.address)
+
+    def doing() -> None:
+        for way in ((40, -30), (-40, 30)):
+            with drag(tab, on_screen(served.desk.now["p"]), way):
+                time.sleep(0.5)
+        tab.reload()
+        tab.get_by_role("button", name="Pause").wait_for()
+
+    try:
+        return watched(served, WITH, doing)
+    finally:
+        tab.close()
+
+
+def main() -> int:
+    """Measure, and tell whether the ratio is within `LIMIT`."""
+    from playwright.sync_api import sync_playwright
+
+    served = Served(run_config(mode="follow", seconds=86400.0), Path(tempfile.mkdtemp()))
+    alone: list[Stretch] = []
+    with_page: list[Stretch] = []
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            for _ in range(STRETCHES):
+                alone.append(watched(served, ALONE, lambda: time.sleep(0.25)))
+                with_page.append(used(served, browser))
+                for name, (most, middle, pace) in (("alone", alone[-1]), ("with the page", with_page[-1])):
+                    print(
+                        f"{name:14s} p99 {1e6 * most:6.0f} µs, median {1e6 * middle:5.0f} µs, pace {pace:.2f}",
+                        flush=True,
+                    )
+            browser.close()
+    finally:
+        served.close()
+    ratio = np.median(with_page, axis=0) / np.median(alone, axis=0)
+    print(
+        f"with the page / alone: p99 {ratio[0]:.3f}, median {ratio[1]:.3f}, pace {ratio[2]:.3f}; limit of p99 {LIMIT}"
+    )
+    return 0 if ratio[0] <= LIMIT else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
