@@ -1,6 +1,6 @@
 """The ``hvf`` command: haptic vector fields from the command line."""
 
-from experiments import started  # noqa: F401 - first: when the program began, and threads before NumPy is imported
+from experiments import started  # noqa: F401  # pyright: ignore[reportUnusedImport] - before NumPy is imported
 
 # isort: split
 
@@ -87,7 +87,7 @@ def parsed(words: Sequence[str]) -> Any:
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(_PARSED, prog="hvf", args=words, description=__doc__, config=_STYLE)
+            return tyro.cli(_PARSED, prog="hvf", args=words, description=__doc__, config=_STYLE)  # pyright: ignore[reportArgumentType, reportCallIssue]
     except SystemExit as ended:
         if ended.code in (0, None):
             raise

@@ -1,7 +1,7 @@
 """What a command prints: its result in words, or, with ``--json``, all of it for other programs."""
 
 from collections.abc import Iterable
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, Protocol, cast
 
 import tyro
 
@@ -31,6 +31,9 @@ def say(result: Result | Any, as_json: bool, lines: Iterable[str] | None = None)
     lines : iterable of str, optional
         Its words, where it has none of its own.
     """
+    if as_json:
+        print(json_text(result), flush=True)
+        return
     if lines is None:
-        lines = result["lines"] if isinstance(result, dict) else result.lines()
-    print(json_text(result) if as_json else "\n".join(lines), flush=True)
+        lines = cast(Iterable[str], result["lines"] if isinstance(result, dict) else result.lines())
+    print("\n".join(lines), flush=True)

@@ -226,16 +226,17 @@ class Simulation:
             If its parts do not fit together.
         """
         world, console = World(self.scene, self.figure.kind), Console(stderr=True)
-        own = isinstance(self.haptic_map, HapticMap)
-        maps = own_parts(self.haptic_map, self._curve()) if own else self.haptic_map.parts(world)
+        given = self.haptic_map
+        maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
         return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
 
     def _curve(self) -> Trajectory:
         """That of the one law of the field that has one, along which a map of one's own lies."""
-        curves = [law.curve for law in self.field.program().laws if isinstance(getattr(law, "curve", None), Trajectory)]
-        if not curves:
+        curves = (getattr(law, "curve", None) for law in self.field.program().laws)
+        found = [curve for curve in curves if isinstance(curve, Trajectory)]
+        if not found:
             raise ParameterError("a map of one's own lies along the curve of the field; expected a field with a curve")
-        return curves[0]
+        return found[0]
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()

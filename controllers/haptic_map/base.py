@@ -1,7 +1,7 @@
 """Haptic maps: every stylus pose is a pose of something with many joints (Donald & Henle 2000, section 2.2)."""
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,8 @@ class HapticMap(ABC):
     finite differences, and the tick calls it in Python.
     """
 
+    _asked: ClassVar[Asked | None] = None
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is to be said of it before a run."""
@@ -78,18 +80,17 @@ class HapticMap(ABC):
         ParameterError
             If `pose` gives no configuration where the stylus begins.
         """
-        asked = self.__dict__.get("_asked")
+        asked = self._asked
         if asked is None:
             start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
             asked = Asked(self.pose, self.jacobian, checked_pose(start, start.size))
-            self.__dict__["_asked"] = asked  # kept: the tick has its address only
+            object.__setattr__(self, "_asked", asked)  # kept: the tick has its address only
         return CompiledMap(OWN, asked.params, np.zeros(1))
 
     def check(self) -> None:
         """Raise what went wrong in a map of one's own while the tick asked it."""
-        asked = self.__dict__.get("_asked")
-        if asked is not None and asked.error is not None:
-            raise asked.error
+        if self._asked is not None and self._asked.error is not None:
+            raise self._asked.error
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""

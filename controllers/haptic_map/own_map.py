@@ -5,7 +5,7 @@ The tick runs without the GIL; the C function takes it for as long as the map co
 
 import ctypes
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
@@ -23,7 +23,7 @@ _STEP = 1e-5  # of finite differences [m, rad]: the cube root of rounding, of le
 
 
 @intrinsic
-def _call(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: Any, rows: Any) -> Any:
+def _call_c(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: Any, rows: Any) -> Any:
     """Call ``void (double *x, double *pose, double *jacobian, int64 nq, int64 rows)``; all are given as int64."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -35,6 +35,9 @@ def _call(typingctx: Any, address: Any, x: Any, pose: Any, jacobian: Any, nq: An
         return context.get_dummy_value()
 
     return types.void(*[types.int64] * 6), generate
+
+
+_call = cast(Callable[[int, int, int, int, int, int], None], _call_c)
 
 
 @njit

@@ -28,7 +28,7 @@ ASKED = "asked.json"
 class Command:
     """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
-    options: Options = field(default_factory=RunOptions)
+    options: Options = field(default_factory=RunOptions)  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """The field."""
     run: Positional[Path | None] = None
     """Folder of a run, whose field and clips are certified; flags of the run itself then do not count."""

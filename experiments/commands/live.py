@@ -11,7 +11,7 @@ from experiments.config.words import Options, config_of_options
 class Command:
     """Take the stylus with the mouse: a page in the browser on which a run is driven, bent, tuned and recorded."""
 
-    options: Options
+    options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
     port: Annotated[int, whole(0, 2**16)] = 8080
     """Of the page; the next free one is taken if it is in use."""

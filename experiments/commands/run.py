@@ -12,7 +12,7 @@ from experiments.started import STARTED
 class Command:
     """Run a hand, a field, a map and a figure, and write what happened into a folder."""
 
-    options: Options
+    options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
     out: Path = Path("runs/run")
     """Folder to write."""

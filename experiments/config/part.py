@@ -23,8 +23,8 @@ def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool
 
     Without a default it stands in the annotation, where the command line is to find the default itself.
     """
-    limit = {} if infinite else {"le": most}
-    return Field(default=default, ge=least, allow_inf_nan=infinite, json_schema_extra={"unit": unit}, **limit)
+    limit = None if infinite else most
+    return Field(default=default, ge=least, le=limit, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
 def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:

@@ -82,9 +82,9 @@ class Figure:
     blend : float
         Time in which one clip goes over into another [s].
     residual_force : float
-        Largest force at the root beside ground and joints, as a share of body weight; 0: none.
+        Largest force at the root beside ground and joints, as a share of body weight [1]; 0: none.
     residual_moment : float
-        Largest such moment, as a share of body weight × stature.
+        Largest such moment, as a share of body weight × stature [1].
     """
 
     kind: FigureKind = "physical"

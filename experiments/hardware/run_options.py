@@ -15,7 +15,7 @@ EMULATED = "emulated"
 class RunHardware:
     """How a field is run on a real device."""
 
-    options: Options
+    options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """The field, as in `hvf run`."""
     name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
     """A device as `hvf hardware list` names it, or "emulated": the MuJoCo linkage in a process of its own."""

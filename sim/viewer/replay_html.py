@@ -27,7 +27,7 @@ Array = npt.NDArray[np.float64]
 FPS = 30.0
 SECONDS = 60.0  # of a longer run, the beginning is shown
 MAGNIFICATION = 4.0
-PHANTOM_AT = np.array([1.35, -0.55, 1.0])  # where the origin of the hand frame is drawn [m]
+PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # where the origin of the hand frame is drawn, out of the figure's reach [m]
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # the ghost's distance from the physical figure [m]
 ARROW = 0.6  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.1  # length of the pieces in which the path appears
@@ -171,7 +171,7 @@ class _Stage:
     def play(self, server: viser.ViserServer) -> str:
         """Run through the recording and return the page."""
         camera = server.initial_camera
-        camera.position, camera.look_at, camera.fov = (4.1, -4.95, 3.05), (0.55, -0.1, 0.75), np.deg2rad(31)
+        camera.position, camera.look_at, camera.fov = (4.6, -5.5, 3.3), (0.8, -0.1, 0.75), np.deg2rad(31)
         serializer = server.get_scene_serializer()
         times, frame_times = self._ticks["t"][:], self._frames["t"][:]
         n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
