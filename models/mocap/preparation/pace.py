@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s²]
 _HIGH = 0.03  # of feet and hands in flight [m]: captured feet hover by 1 to 2 cm where they stand
+_CLEAR = 0.08  # that they reach in it [m]: dancers' feet hover higher than walkers'
 _SHORT = 0.09  # [s], of flights that tell an acceleration
 _RIGHT = 1.5  # [m/s²] from gravity that is kept, what `well_formed` allows
 _SLOWEST, _FASTEST = 0.35, 1.6  # beyond which something else is wrong
@@ -62,7 +63,11 @@ def falling(clip: Clip) -> float | None:
     """With what the centre of mass falls while neither feet nor hands are near the floor [m/s²]."""
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     edges = np.flatnonzero(np.diff(np.concatenate(([0], (heights > _HIGH).astype(int), [0]))))
-    spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= max(4, _SHORT * clip.fps)]
+    spans = [
+        (a, b)
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+        if b - a >= max(4, _SHORT * clip.fps) and heights[a:b].max() > _CLEAR
+    ]
     if not spans:
         return None
     height = momentum(clip).com[:, 2]
