@@ -19,6 +19,8 @@ Array = npt.NDArray[np.float64]
 
 _FPS = 30.0
 _SECONDS = 12.0  # that are shown at least of what goes on lap after lap, and at most of everything
+# The only notification a replay can give is that the browser renders in software.
+_HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 _APART = 0.6  # of each figure from the middle [m]
 
 
@@ -42,7 +44,8 @@ def both_html(captured: Clip, prepared: Clip) -> str:
             poses = clip_motion(clip, times).poses
             at = np.array([0.0, _APART * side, 0.0])
             figures.append((Actor(scene, name, shapes, 1.0, colour), poses, followed(poses[:, :2], _FPS), at))
-            scene.add_label(f"/labels/{name}", name, position=at + np.array([0.0, 0.0, 2.0]), anchor="bottom-center")
+            scene.add_label(f"/labels/{name}", name, position=at + np.array([0.0, 0.0, 2.0]), anchor="bottom-center",
+                            font_screen_scale=1.25)  # fmt: skip
         floor = scene.add_grid("/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=10.0)
         camera = server.initial_camera
         camera.position, camera.look_at, camera.fov = (2.2, -4.4, 1.7), (0.0, 0.0, 0.85), np.deg2rad(32)
@@ -54,7 +57,7 @@ def both_html(captured: Clip, prepared: Clip) -> str:
                 actor.pose(data, np.append(shifts[k], 0.0), 1.0, at)
             floor.position = -np.append(figures[1][2][k], 0.0) % 1.0 * np.array([1.0, 1.0, 0.0])
             serializer.insert_sleep(1.0 / _FPS)
-        return serializer.as_html()
+        return serializer.as_html().replace("</head>", _HEAD + "</head>", 1)
     finally:
         with contextlib.redirect_stdout(quiet):
             server.stop()

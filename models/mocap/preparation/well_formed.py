@@ -108,7 +108,7 @@ class WellFormed:
             f"{np.rad2deg(self.tilt):.1f}°, skate {1000 * self.skate:.0f} mm",
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "
             f"{'seam differ by' if self.closed else 'ends'} {self.seam:.2f} rad/s",
-            f"{self.outliers} frames stand out; joints {np.rad2deg(self.excess):.1f}° beyond their range",
+            f"{self.outliers} frames stand out; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
             f"{self.flights} flights, {self.falling:.1f} m/s² beside gravity; contact lacks "
             f"{100 * self.residual:.1f} % of weight",
         )
