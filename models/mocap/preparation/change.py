@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
-from scipy.linalg.blas import dsbmv
+from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssue]
 
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap import quaternions

@@ -7,8 +7,9 @@ clip played σ times as fast is accelerated σ² times as much: one whose flight
 
 Files are played at a wrong rate, and figures of another size fall with another time scale; a motion keeps its
 character at another pace, while flights that are bent to gravity one by one do not. Only what falls too fast is slowed:
-nothing pulls a body down, but one that falls too slowly may be borne by a foot that was captured too high. With several flights the
-acceleration is the mean with weights T⁴: that of a parabola through points with noise is known as well as T² is large.
+nothing pulls a body down, but one that falls too slowly may be borne by a foot that was captured too high. With several
+flights the acceleration is the mean with weights T⁴: that of a parabola through points with noise is known as well as
+T² is large.
 """
 
 from typing import NamedTuple
