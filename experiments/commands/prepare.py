@@ -21,7 +21,7 @@ class Command:
     loop: str = "auto"
     """How it goes on: auto, open, or START:END of the cycle in seconds."""
     mirror: bool = False
-    """Exchange left and right."""
+    """Go on with the mirror image of half a stride, or of START:END, as walks and runs do."""
     up: str | None = None
     """The file's axis that points up, such as +Y, where the motion does not tell."""
     rest_frame: int | None = None

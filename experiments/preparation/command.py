@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.files.html_page import html_page, image
+from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
 from models.errors import ModelError
 from models.mocap.preparation.prepare import Prepared, prepared
@@ -27,7 +28,7 @@ def prepare_file(
     loop : str
         ``auto``, ``open``, or ``START:END`` of the cycle in seconds.
     mirror : bool
-        Exchange left and right.
+        Go on with the mirror image of half a stride, or of START:END.
     hints : Hints or None
         What a person knows of the file.
     report : Path or None
@@ -61,35 +62,72 @@ def prepare_file(
 
 def summary(made: Prepared, measures: WellFormed) -> str:
     """One line for the terminal."""
-    whole = made.looped.kind == "cycle"
-    part = f"cycle {made.looped.start:.2f} to {made.looped.end:.2f} s" if whole else made.looped.kind
-    faults = list(measures.faults())
-    if not made.near:
-        faults.insert(0, "no feasible motion is near it, so dynamics and feet are as captured")
+    faults = measures.faults()
     return (
-        f"{made.clip.name}: {part}, {made.clip.duration:.2f} s; "
-        f"contact lacks {100 * measures.residual:.1f} % of weight; "
-        f"joints moved {np.rad2deg(made.feasible.turned):.1f}°, root {100 * made.feasible.moved:.1f} cm RMS; "
+        f"{made.clip.name}: {'; '.join(changes(made))}; contact lacks {100 * measures.residual:.1f} % of weight; "
         f"{made.seconds:.0f} s of processor time; "
-        + ("well-formed" if not faults else "not well-formed: " + "; ".join(faults))
+        + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
+        + "".join(f"; {line}" for line in advice(made))
+    )
+
+
+def changes(made: Prepared) -> tuple[str, ...]:
+    """What was done to the capture, a line each."""
+    part, pace, change = made.looped, made.paced, made.feasible
+    words = {
+        "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s",
+        "half stride": f"half a stride, {part.start:.2f} to {part.end:.2f} s, and its mirror image",
+        "way back": "the whole, and a way back",
+        "open": "the whole, at rest at both ends",
+    }
+    lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
+    if pace.pace != 1.0:
+        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+    if not made.near:
+        return (*lines, "dynamics and feet as captured")
+    lines.append(
+        f"joints moved {np.rad2deg(change.turned):.1f}°, root {100 * change.moved:.1f} cm RMS; at most {change.joint} "
+        f"by {np.rad2deg(change.most_turned):.0f}° at {change.when:.2f} s, root by {100 * change.furthest:.0f} cm"
+    )
+    return tuple(lines)
+
+
+def advice(made: Prepared) -> tuple[str, ...]:
+    """Where no feasible motion is near: by how much not, and what may help."""
+    change = made.feasible
+    if made.near:
+        return ()
+    return (
+        f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and moves the "
+        f"root {100 * change.moved:.0f} cm RMS, and still lacks {100 * change.residual:.0f} % of weight",
+        f"most is wrong at {change.when:.1f} s ({change.joint}): try --loop START:END without it, --loop open if it "
+        "does not repeat, or a capture whose support is feet alone",
     )
 
 
 def page(made: Prepared) -> str:
-    """The report as a self-contained page: before and after, what was done, and both as rows of pictures."""
+    """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
     before, after = well_formed(made.captured), well_formed(made.clip)
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     rows = "".join(
-        f"<tr><td>{name}</td><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
+        f"<tr><th>{name}</th><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
         for name, was, now in zip(
             ("soles", "ends", "continuity", "dynamics"), before.lines(), after.lines(), strict=True
         )
     )
-    said = [*(made.report.lines() if made.report else ()), summary(made, after)]
+
+    def listed(title: str, lines: tuple[str, ...]) -> str:
+        points = "".join(f"<li>{escape(line)}</li>" for line in lines)
+        return f"<h2>{title}</h2><ul>{points}</ul>" if lines else ""
+
+    well = "Well-formed." if made.near and not after.faults() else "Not well-formed."
     body = (
-        f'<div class="wide"><table><tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>'
+        f'<p>{well}</p><div class="wide"><table><tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>'
+        + listed("What was changed", changes(made))
+        + listed("What is not within bounds", (*after.faults(), *advice(made)))
+        + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
-        + "".join(f"<p>{escape(line)}</p>" for line in said)
+        + listed("What the file was taken for", made.report.lines() if made.report else ())
     )
     style = "th, td { text-align: left; vertical-align: top; }"
     return html_page(f"{made.clip.name}, prepared", body, style)

@@ -1,7 +1,7 @@
 r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
 
 A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). An open motion rests at both ends,
-and so does its change: the outer three control points are one, so that δ̇ = δ̈ = 0 there. Each instant depends on six
+and so does its change: the outer five control points are one, so that δ̇ = δ̈ = 0 there. Each instant depends on six
 control points, so the normal equations are banded; those of a closed motion have a border of the last five of them.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
-from scipy.linalg.blas import dsbmv
+from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssue]
 
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap import quaternions
@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STEP = 1e-3  # of the differences that give velocities [s]
-_HELD = 2  # control points beyond an open motion's first and last one that are the same as it
+_HELD = DEGREE - 1  # control points beyond an open motion's first and last one that are the same as it
 _MARGIN = 12  # frames beyond the ends of a closed clip that shape its spline
 
 
@@ -58,7 +58,7 @@ class Change:
     def __init__(self, clip: Clip, knot: float, step: float) -> None:
         self.clip, self.closed = clip, clip.closes()
         seconds = clip.duration
-        self.intervals = max(DEGREE + 2, round(seconds / knot))
+        self.intervals = max(2 * DEGREE, round(seconds / knot))
         each = max(2, round(seconds / self.intervals / step))
         count = self.intervals * each
         self.times = np.arange(count + (not self.closed)) * seconds / count

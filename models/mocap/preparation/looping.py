@@ -23,6 +23,7 @@ _GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps
 _COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
 _LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it
+_MIRRORED = 0.25  # d of the ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3
 _HALF = 0.25  # of half a stride, at least [s]: sprinters take 0.22
 _FAST = 1.0  # of the root at both ends [m/s]: such a motion cannot be brought to rest in a blink
 _SHORTEST = 0.6  # of a cycle in place [s]
@@ -206,7 +207,7 @@ def _half_stride(clip: Clip) -> tuple[int, int, float] | None:
         return None
     # Rows: ends, columns: starts, in the mirror.
     j, i = np.unravel_index(int(np.argmin(np.where(long, apart, np.inf))), apart.shape)
-    return (int(inner[i]), int(inner[j]), float(apart[j, i])) if apart[j, i] < _GAIT else None
+    return (int(inner[i]), int(inner[j]), float(apart[j, i])) if apart[j, i] < _MIRRORED else None
 
 
 def _smooth(x: float) -> float:

@@ -17,7 +17,8 @@ from models.mocap.retargeting.retarget import Hints, RetargetReport
 FPS = 120.0  # of prepared clips [1/s], CMU's: slower captures gain what the change adds
 _CORNER = 8.0  # low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
 _TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which it is another motion: the nearest feasible one is far
-_LONGEST = 120.0  # [s]: the Jacobian of a minute takes 0.6 GB
+_LACKS = 0.12  # body weights RMS of residual force, beyond which nothing feasible was found
+_LONGEST = 120.0  # [s]: of what repeats one lap is prepared; nothing else was tried longer
 
 
 class Prepared(NamedTuple):
@@ -86,7 +87,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
     smooth = smoothed(cycle.clip, _CORNER)
     made = feasible(smooth, stances(cycle.clip, smooth), fps=FPS)
-    near = made.turned < _TURNED and made.moved < _MOVED
+    near = made.turned < _TURNED and made.moved < _MOVED and made.residual < _LACKS
     taken = made.clip if near else smooth
     clip = Clip(taken.poses, taken.fps, captured.name)
     return Prepared(clip, captured, loaded.report, timed, cycle, made, process_time() - began, near)

@@ -37,6 +37,27 @@ def test_a_changed_lap_still_closes(change):
     assert change.changed(x, 60.0).closes() == change.closed
 
 
+def test_a_changed_open_motion_still_rests_at_its_ends(change):
+    if change.closed:
+        pytest.skip("a lap has no ends")
+    x = 0.02 * np.random.default_rng(1).normal(size=(change.n_points, N_TANGENT))
+    for order in (1, 2):
+        rates = np.einsum("mk,mkn->mn", change.basis[order], change.points(x)[change.first[:, None] + np.arange(6)])
+        np.testing.assert_allclose(rates[[0, -1]], 0.0, atol=1e-6)
+        assert np.abs(rates).max() > 0.05
+
+
+def test_memory_does_not_hold_all_jacobians(change, monkeypatch):
+    """The normal equations by chunks of knot intervals are those of all at once."""
+    problem = _Problem(change, stances(change.clip, change.clip), FeasibleWeights())
+    x = 1e-3 * np.random.default_rng(4).normal(size=change.n_points * N_TANGENT)
+    whole, g = problem._linearised(x)
+    monkeypatch.setattr(feasible, "_CHUNK", 3)
+    parts, h = problem._linearised(x)
+    np.testing.assert_allclose(parts.band, whole.band, atol=1e-9 * np.abs(whole.band).max())
+    np.testing.assert_allclose(h, g, atol=1e-9 * np.abs(g).max())
+
+
 def test_normal_equations_are_those_of_the_stacked_rows(change):
     """Banded and bordered, against a dense matrix whose columns are found by moving one unknown at a time."""
     rng = np.random.default_rng(2)

@@ -3,6 +3,7 @@ import pytest
 
 from experiments.preparation.command import prepare_file, summary
 from models.errors import ModelError
+from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, load
 from models.mocap.preparation.looping import looped, mirrored
@@ -41,6 +42,53 @@ def test_what_does_not_repeat_rests_at_both_ends(walks):
     assert found.kind == "open"
     speeds = np.abs(found.clip.velocities())
     assert max(speeds[0].max(), speeds[-1].max()) < 0.2
+
+
+def test_what_ends_in_the_air_comes_down_to_rest():
+    jump = resampled(embedded("jump"), 120.0)
+    flying = np.flatnonzero(sole_points(jump.poses)[:, :, 2].min(axis=1) > CONTACT_RADIUS + 0.05)
+    found = looped(Clip(jump.poses[: int(np.median(flying))], 120.0, "up"), "open")
+    assert sole_points(found.clip.poses[[0, -1]])[:, :, 2].min(axis=1) == pytest.approx(CONTACT_RADIUS, abs=1e-6)
+
+
+def test_half_a_stride_goes_on_in_the_mirror(walks):
+    walk, several = walks
+    found = looped(Clip(several.poses[: round(0.4 * walk.n_frames)], 120.0, "steps"), mirror=True)
+    assert found.kind == "half stride"
+    assert found.clip.closes()
+    assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
+    half = round(found.clip.n_frames / 2)
+    image = mirrored(found.clip)
+    ours, theirs = (np.abs(c.velocities()[:, 6:]).mean(axis=1) for c in (found.clip, image))
+    np.testing.assert_allclose(ours[: half - 2], np.roll(theirs, -half + 1)[: half - 2], rtol=0.1, atol=0.05)
+
+
+def test_no_half_stride_in_the_mirror_is_told(walks):
+    standing = Clip(np.repeat(embedded("cheer").poses[:1], 12, axis=0), 120.0, "still")
+    with pytest.raises(ModelError, match=r"--mirror.*expected a gait"):
+        looped(standing, mirror=True)
+
+
+def test_of_a_minute_of_walking_a_lap_is_taken(walks):
+    walk = walks[0]
+    rows = [walk.poses[:-1]]
+    for _ in range(27):
+        rows.append(walk.displacement.moved(rows[-1]))
+    minute = Clip(np.concatenate(rows), 120.0, "minute")
+    found = looped(minute)
+    assert minute.duration > 59.0
+    assert found.kind == "cycle"
+    laps = found.clip.duration / (walk.duration / 2)
+    assert laps == pytest.approx(round(laps), abs=0.05)
+
+
+def test_feet_in_the_air_bear_nothing():
+    flip = resampled(embedded("backflip"), 120.0)
+    rough = Clip(flip.poses + 1e-3 * np.random.default_rng(0).normal(size=flip.poses.shape), 120.0, "rough")
+    schedule = stances(flip, rough)
+    high = sole_points(flip.poses)[:, :, 2] > CONTACT_RADIUS + 0.15
+    assert high.any()
+    assert not (schedule.pushing & high).any()
 
 
 @pytest.mark.parametrize("wish", ["1:9", "two", "2:1"])

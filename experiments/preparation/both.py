@@ -1,0 +1,63 @@
+"""A capture and what was made of it, side by side in 3D: one HTML page that plays without a network or a server."""
+
+import contextlib
+import io
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from models.humanoid.skeleton import figure_model
+from models.mocap.clip import Clip
+from sim.body.clip_motion import clip_motion
+from sim.viewer.actor import GHOST, Actor
+from sim.viewer.framing import followed
+from sim.viewer.shapes import body_shapes
+
+Array = npt.NDArray[np.float64]
+
+_FPS = 30.0
+_SECONDS = 12.0  # that are shown at least of what goes on lap after lap, and at most of everything
+# The only notification a replay can give is that the browser renders in software.
+_HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
+_APART = 0.6  # of each figure from the middle [m]
+
+
+def both_html(captured: Clip, prepared: Clip) -> str:
+    """The page: the capture at the back, translucent, and the prepared clip in front, each from its beginning.
+
+    A clip that closes goes on lap after lap, another one holds its last pose; both travel over the floor, which moves
+    under them.
+    """
+    longest = max(captured.duration, prepared.duration, _SECONDS if prepared.closes(1e-3) else 0.0)
+    times = np.arange(int(min(longest, _SECONDS) * _FPS) + 1) / _FPS
+    model = figure_model()
+    data = mujoco.MjData(model)
+    quiet = io.StringIO()  # viser announces its address and its end, which mean nothing here
+    with contextlib.redirect_stdout(quiet):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        scene, shapes = server.scene, body_shapes(model, "")
+        figures: list[tuple[Actor, Array, Array, Array]] = []
+        for name, clip, side, colour in (("captured", captured, 1.0, GHOST), ("prepared", prepared, -1.0, "")):
+            poses = clip_motion(clip, times).poses
+            at = np.array([0.0, _APART * side, 0.0])
+            figures.append((Actor(scene, name, shapes, 1.0, colour), poses, followed(poses[:, :2], _FPS), at))
+            scene.add_label(f"/labels/{name}", name, position=at + np.array([0.0, 0.0, 2.0]), anchor="bottom-center",
+                            font_screen_scale=1.25)  # fmt: skip
+        floor = scene.add_grid("/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=10.0)
+        camera = server.initial_camera
+        camera.position, camera.look_at, camera.fov = (2.2, -4.4, 1.7), (0.0, 0.0, 0.85), np.deg2rad(32)
+        serializer = server.get_scene_serializer()
+        for k in range(len(times)):
+            for actor, poses, shifts, at in figures:
+                data.qpos[:] = poses[k]
+                mujoco.mj_kinematics(model, data)
+                actor.pose(data, np.append(shifts[k], 0.0), 1.0, at)
+            floor.position = -np.append(figures[1][2][k], 0.0) % 1.0 * np.array([1.0, 1.0, 0.0])
+            serializer.insert_sleep(1.0 / _FPS)
+        return serializer.as_html().replace("</head>", _HEAD + "</head>", 1)
+    finally:
+        with contextlib.redirect_stdout(quiet):
+            server.stop()
