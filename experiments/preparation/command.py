@@ -122,7 +122,8 @@ def page(made: Prepared) -> str:
 
     well = "Well-formed." if made.near and not after.faults() else "Not well-formed."
     body = (
-        f'<p>{well}</p><div class="wide"><table><tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>'
+        f'<p>{well}</p><div class="wide"><table>'
+        f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
         + listed("What is not within bounds", (*after.faults(), *advice(made)))
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
