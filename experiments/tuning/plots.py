@@ -33,9 +33,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         drawn = axis.scatter(costs[:, 0], costs[:, 1], c=used, s=26, cmap="viridis", label="tried")
         figure.colorbar(drawn, label="k_r over the critical k_r (the certificate's boundary is 1)")
         ends = _front_of_two(config, tried)
-        axis.plot(
-            ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both"
-        )
+        axis.plot(ends[:, 0], ends[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both")
         place = np.array(chosen.objectives)
         axis.plot(place[:1], place[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
         axis.set_xlabel(label_of(config.objectives[0]))
