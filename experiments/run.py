@@ -94,7 +94,8 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         from experiments.results.report_of import write_report_of  # matplotlib and viser: after the first tick
 
         write_report_of(out)
-    console.print(f"Written to {out}: {REPORT} (open it in a browser), {EDITED}, {DEFAULT}, {SUMMARY}, {RECORDING}.")
+    others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())
+    console.print(f"Written to {out}: {REPORT} (open it in a browser), {others}.")
     return summary
 
 

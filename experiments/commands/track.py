@@ -19,9 +19,9 @@ class Command:
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     residual_force: Annotated[float, at_least(0.0)] = 0.1
-    """Largest force at the root beside ground and joints, as a share of body weight."""
+    """Largest force at the root beside ground and joints, as a share of body weight [1]."""
     residual_moment: Annotated[float, at_least(0.0)] = 0.02
-    """Largest such moment, as a share of body weight × stature."""
+    """Largest such moment, as a share of body weight × stature [1]."""
     json: Json = False
 
     def __call__(self) -> int:
