@@ -167,7 +167,7 @@ LAWS = {
         Follow(STILL, 12_000.0, 8.0, 0.25), lambda: governed_stability(river(k_r=12_000.0), 0.0, [HandImpedance()]),
     ),
     "bunny": (
-        Bunny(STILL, 300.0, 8.0, 0.05, pace="clock"),
+        Bunny(STILL, 300.0, 8.0, 0.05, pace="wait"),
         lambda: governed_stability(river(BUNNY_LAW, width=0.05), 0.0, [HandImpedance()]),
     ),
     "seek": (
