@@ -19,9 +19,6 @@ from controllers.legs.limbs import Limb
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip
-from models.mocap.preparation.feasible import contact_residual
-from models.mocap.preparation.poses import smoothed, sole_points
-from models.mocap.preparation.stances import stances
 from sim.compilation.compiled import CACHE_FOLDER
 from sim.reference.reference import poses_along
 
@@ -60,6 +57,11 @@ def upper_joints(legs: Sequence[Limb]) -> list[int]:
 
 def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     """Measure a motion (n, 75); its residual is 0 without `dynamics`."""
+    # They bring signal processing with them, which a run whose map is known does not need.
+    from models.mocap.preparation.feasible import contact_residual
+    from models.mocap.preparation.poses import smoothed, sole_points
+    from models.mocap.preparation.stances import stances
+
     clip, points = Clip(poses, fps, "blend"), sole_points(poses)
     schedule = stances(clip, smoothed(clip, 8.0))
     heights = points[:, :, 2] - CONTACT_RADIUS
