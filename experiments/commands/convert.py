@@ -16,6 +16,10 @@ class Command:
     """Motion file to read."""
     target: Positional[Path]
     """File to write: .bvh, or .glb for glTF."""
+    up: str | None = None
+    """The file's axis that points up, such as +Y, where the motion does not tell."""
+    rest_frame: int | None = None
+    """A frame in which the body stands upright with level feet, where the motion does not tell."""
     overwrite: bool = False
     """Replace the target if it exists."""
     json: Json = False
@@ -26,8 +30,10 @@ class Command:
             from experiments.export.gltf import convert_to_gltf as convert
         else:
             from models.mocap.library import convert
+        from models.mocap.retargeting.retarget import Hints
 
-        report = convert(self.source, self.target, overwrite=self.overwrite).report
+        hints = Hints(self.up, self.rest_frame)
+        report = convert(self.source, self.target, overwrite=self.overwrite, hints=hints).report
         own = "the figure's own skeleton: nothing to retarget"
         say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))
         return 0

@@ -15,6 +15,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.clip import Clip
 from models.mocap.library import Loaded, load
+from models.mocap.retargeting.retarget import Hints
 from sim.viewer.shapes import body_shapes, coarser
 
 Array = npt.NDArray[np.float64]
@@ -172,7 +173,7 @@ def _add_motion(library: Any, document: Any, buffer: _Buffer, clip: Clip) -> Non
     document.animations.append(library.Animation(name=clip.name, samplers=samplers, channels=channels))
 
 
-def convert_to_gltf(source: Path, target: Path, overwrite: bool = False) -> Loaded:
+def convert_to_gltf(source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None) -> Loaded:
     """Read any motion file and write it as glTF on the figure.
 
     Raises
@@ -182,7 +183,7 @@ def convert_to_gltf(source: Path, target: Path, overwrite: bool = False) -> Load
     """
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
-    loaded = load(source)
+    loaded = load(source, hints)
     try:
         write_gltf(loaded.clip, target)
     except OSError as error:
