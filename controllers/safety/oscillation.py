@@ -15,6 +15,7 @@ are counted, which needs no window and no transform.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -139,7 +140,8 @@ def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> 
     params = detector.params()
     params[_DOWN], params[_UP], params[_LONGEST] = 1.0, 0.0, np.inf
     # Plain numbers: the compiled law would cost a second of compilation for a tenth of a second of work.
-    given, step = params.tolist(), oscillation_gain.py_func
+    given: Any = params.tolist()
+    step: Any = oscillation_gain.py_func
     found = np.zeros(len(force), dtype=np.bool_)
     for k, row in enumerate(force.tolist()):
         step(given, memory, row)

@@ -17,6 +17,7 @@ from experiments.setups.setups import map_parts, parts_of
 from models.mocap.clip import Clip
 from sim.world.world import World
 
+REACH = 0.025  # [m] where a map tells of none
 NEAR = 0.2  # of the map's reach: as far off the curve as pushes bring a hand
 FAST = 2.0  # times the curve's own pace: a hand that pushes on, at the edge of the map
 
@@ -35,7 +36,8 @@ def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
     """A verdict that leaves out walls, with what the executed program does at the states that were looked at."""
     parts = executed_parts(config, clips)
-    return seen(parts.program, main._replace(curve=parts.course), parts.maps.reach, verdict, hands)
+    reach = float(getattr(parts.maps, "reach", REACH))
+    return seen(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:

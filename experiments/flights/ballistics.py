@@ -123,7 +123,7 @@ def body_contact(clip: Clip) -> BodyContact:
             travelled.append(float(np.linalg.norm(stance - np.median(stance, axis=0), axis=1).max()))
     turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)
     return BodyContact(
-        touched.clearance, touched.supported, touched.resting.any(axis=1), max(travelled),
+        touched.clearance, touched.supported, np.any(touched.resting, axis=1), max(travelled),
         np.linalg.norm(turns, axis=2).max(axis=1, initial=0.0),
     )  # fmt: skip
 

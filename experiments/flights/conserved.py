@@ -54,5 +54,8 @@ def _turns(moved: Momentum, start: int, end: int, step: float) -> Rotation | Non
             R.append(R[-1] * Rotation.from_rotvec(np.linalg.solve(own_inertia, missing) * step))
         return R
 
-    found = root(lambda mean: turned(mean)[-1].as_rotvec(), own.mean(axis=0), tol=1e-10)
+    def landed(mean: Array) -> Array:
+        return turned(mean)[-1].as_rotvec()
+
+    found = root(landed, own.mean(axis=0), tol=1e-10)
     return Rotation.concatenate(turned(np.asarray(found.x))) if found.success else None

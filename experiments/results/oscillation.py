@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from controllers.safety.oscillation import OscillationDetector, shaken
@@ -105,13 +106,14 @@ class _Fast:
 
     def __init__(self, period: float) -> None:
         self._period = period
-        self._sections = butter(2, OscillationDetector(period).corner, "highpass", fs=1.0 / period, output="sos")
+        corner = OscillationDetector(period).corner
+        self._sections: Array = np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos"))
         self._states = [np.zeros((len(self._sections), 2, 3)) for _ in range(2)]
         self.force, self.motion = _Size(), _Size()
         self._turns, self._shaken, self._last = 0, 0, np.zeros(3)
         self._envelope: list[float] = []
 
-    def add(self, force: Array, away: Array, found: Array) -> None:
+    def add(self, force: Array, away: Array, found: npt.NDArray[np.bool_]) -> None:
         if not self._envelope:
             # A run begins with a force and a place, not with a step to them.
             for state, values in zip(self._states, (force, away), strict=True):
