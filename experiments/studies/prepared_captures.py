@@ -38,7 +38,7 @@ class Followed(NamedTuple):
     residual : float
         RMS of the residual force while the reference stands [body weights].
     fell : float or None
-        When the root was first `FALLEN` from its reference [s].
+        When it first fell, or its root was `FALLEN` from its reference [s].
     cost : float
         Processor time of simulating a second [s].
     """
@@ -63,9 +63,9 @@ def followed(clip: Clip) -> Followed:
     motion = tracked_motion(clip, SECONDS, TrackingConfig())
     cost = (process_time() - began) / SECONDS
     away = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
-    fallen = np.flatnonzero(away > FALLEN)
-    fell = float(motion.reference.times[fallen[0]]) if len(fallen) else None
-    return Followed(report(motion).residual_force, fell, cost)
+    told = report(motion)
+    fallen = [*motion.reference.times[away > FALLEN][:1].tolist(), *told.falls[:1]]
+    return Followed(told.residual_force, min(fallen, default=None), cost)
 
 
 def row(name: str, made: Prepared) -> str:
