@@ -35,9 +35,9 @@ def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretc
     """What a stretch of time cost in which something is done."""
     begin, t, pictures = time.monotonic(), float(served.desk.now["t"][0]), served.page.pictures
     costs: list[np.ndarray] = []
-    while (passed := time.monotonic() - begin) < seconds:
+    while time.monotonic() - begin < seconds or not costs:
         doing()
-        if passed > REMEMBERED:
+        if time.monotonic() - begin > REMEMBERED:
             costs.append(served.desk.now["cost"].copy())
     middle, most = np.median(costs, axis=0)
     passed = time.monotonic() - begin
