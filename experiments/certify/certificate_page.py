@@ -15,8 +15,6 @@ from controllers.certificates.report import Certificate, Verdict
 from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
 
-Array = npt.NDArray[np.float64]
-
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
 _SHORT = 12  # numbers of an array that are told
 _RATES = (0.25, 4.0)  # that the picture of admissible rates shows

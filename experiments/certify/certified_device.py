@@ -3,16 +3,14 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
+from controllers.state import Array
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.linkage import Linkage
 from sim.world.world import phantom_angles
-
-Array = npt.NDArray[np.float64]
 
 
 def phantom_device(linkage: Linkage | None = None) -> Device:

@@ -6,7 +6,6 @@ from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import HandImpedance, HandRange
@@ -22,13 +21,12 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.setups.lifted_runs import lifted_river, side_by_side
 from experiments.setups.rivers import default_choice, law_of
-
-Array = npt.NDArray[np.float64]
 
 
 class Meeting(NamedTuple):

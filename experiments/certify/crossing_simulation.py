@@ -2,7 +2,6 @@
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.sampling import Sampling
@@ -10,13 +9,12 @@ from controllers.certificates.switching.switching_search import Course, Push
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
 from controllers.fields.program import evaluate
+from controllers.state import Array
 from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
 from models.scene import PHANTOM
 from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense
 from sim.world.world import phantom_angles
-
-Array = npt.NDArray[np.float64]
 
 SUBSTEPS = 8
 

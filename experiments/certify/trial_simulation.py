@@ -22,6 +22,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
+from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
 from models.scene import PHANTOM, R_WP
@@ -32,7 +33,6 @@ from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_por
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 LAP = 1e6  # [s] of a lap: the curve stands still, so a trial is about one configuration

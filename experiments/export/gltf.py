@@ -11,14 +11,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from controllers.state import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.clip import Clip
 from models.mocap.library import Loaded, load
 from models.mocap.retargeting.retarget import Hints
 from sim.viewer.shapes import body_shapes, coarser
-
-Array = npt.NDArray[np.float64]
 
 _TO_FILE = [1, 2, 0]
 _FLOAT, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT = 5126, 5121, 5123, 5125

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
@@ -19,6 +18,7 @@ from controllers.certificates.flight.flight_fit import FlightFit, best_fall
 from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
+from controllers.state import Array
 from experiments.files.certificate_files import clip_inputs
 from models.humanoid.skeleton import N_POSE
 from models.mocap import quaternions
@@ -28,8 +28,6 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.poses import sole_points
 from sim.body.clip_motion import clip_motion
 from sim.body.tracking import TrackingConfig, tracked_motion
-
-Array = npt.NDArray[np.float64]
 
 _LIFT = 10.0  # flown so high that nothing but gravity acts [m]
 _FINE = 480.0  # frames per second at which a flight is flown [1/s]

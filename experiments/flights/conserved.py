@@ -9,15 +9,13 @@ equations for three numbers, solved by Newton's method.
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
+from controllers.state import Array
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.dynamics.momentum import Momentum, momentum
-
-Array = npt.NDArray[np.float64]
 
 ROUNDS = 4  # differences see the turn of neighbouring frames: once more with what is left
 

@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
+from controllers.state import Array
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved import with_constant_momentum
 from models.errors import ModelError
@@ -20,8 +21,6 @@ from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
 from models.mocap.library import load_clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
-
-Array = npt.NDArray[np.float64]
 
 _AROUND = 1.0  # what may change before the first refuted flight and after the last one [s]
 _SINKS = 0.01  # [m] of the floor that captures miss

@@ -3,8 +3,8 @@
 import time
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
 from experiments.hardware.run_options import EMULATED, CalibrateHardware
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame
@@ -15,8 +15,6 @@ from sim.devices.hardware_list import open_device
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
 from sim.users.arm import Arm
-
-Array = npt.NDArray[np.float64]
 
 STILL = 5e-3
 """How far a joint may turn while it is read [rad]: a millimetre at the tip, a hand's tremor and not its motion."""

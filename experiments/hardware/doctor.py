@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.devices.dhd import DHD
 from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, Driver
 from sim.devices.exchange import READING_SIZE
 from sim.devices.hardware_list import RULES_FILE, FoundDevice
 from sim.devices.hdapi import HDAPI
-
-Array = npt.NDArray[np.float64]
 
 PERIOD = 1e-3
 """Of the loop whose lateness is measured [s]."""

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.certificates.flight.flight_fit import best_fall, find_flights
+from controllers.state import Array
 from models.humanoid.skeleton import (
     CONTACT_RADIUS,
     FOOT_CONTACTS,
@@ -18,8 +18,6 @@ from models.humanoid.skeleton import (
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-
-Array = npt.NDArray[np.float64]
 
 TOUCH = 0.003  # [m] over the floor, at which a sole is taken to stand
 

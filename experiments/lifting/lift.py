@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
@@ -27,8 +26,6 @@ from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from sim.errors import SimError
 from sim.world.world import phantom_angles
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

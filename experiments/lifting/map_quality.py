@@ -6,14 +6,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.haptic_map.animation import ClipMap
+from controllers.state import Array
 from experiments.lifting.in_betweens import MotionMeasure, measure_motion
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 SAMPLES = 96  # of the lap
 _PROBES = 400

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _PATIENCE = 1.0  # [s] no writing lasts longer
 

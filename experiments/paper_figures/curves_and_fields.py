@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
+from controllers.state import Array
 from experiments.config.modes import Follow
 from experiments.paper_figures.silhouettes import Silhouettes, facing
 from experiments.paper_figures.sources import (
@@ -26,8 +26,6 @@ from experiments.results.figures import PALE_TUBE
 from experiments.results.folder import config_of
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
-
-Array = npt.NDArray[np.float64]
 
 SECONDS = 0.25  # of motion that an arrow of Figure 1 shows
 LONGEST = 22.0  # arrow of Figure 4 [mm]

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from controllers.state import Array
 from experiments.config.maps import Cylindrical
 from experiments.paper_figures.silhouettes import Paint, Silhouettes, facing
 from experiments.paper_figures.sources import (
@@ -24,8 +24,6 @@ from experiments.results.folder import clips_of, config_of
 from models.mocap.clip import Clip
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
-
-Array = npt.NDArray[np.float64]
 
 FRAMES = 9
 APART = 1.15  # between two frames [m]

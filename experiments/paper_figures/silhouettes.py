@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
+from controllers.state import Array
 from models.humanoid.skeleton import figure_model
 
-Array = npt.NDArray[np.float64]
 Paint = Callable[[str, Array], str | tuple[float, ...]]
 
 _CORNERS = 28  # of an outline

@@ -3,16 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
 from experiments.config.maps import Composite, RiverClips
 from experiments.config.modes import Rivers, StretchThenFollow
 from experiments.config.run_config import RunConfig, User
 from experiments.demo import demo_config
 from sim.recording.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 CYLINDER, COMPOSITE, STRETCH, RIVERS = "cylinder", "composite", "stretch", "rivers"
 MILLIMETRES = 1e3

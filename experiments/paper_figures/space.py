@@ -3,12 +3,11 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _AZIMUTH = -60.0  # of who looks [degrees]
 

@@ -5,17 +5,15 @@ import io
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import followed
 from sim.viewer.shapes import body_shapes
-
-Array = npt.NDArray[np.float64]
 
 _FPS = 30.0
 _SECONDS = 12.0  # that are shown at least of what goes on lap after lap, and at most of everything

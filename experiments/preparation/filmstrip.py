@@ -2,14 +2,12 @@
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from controllers.state import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGMENTS, figure_model
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
 _APART = 1.0  # between two pictures [m]

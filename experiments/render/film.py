@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Literal, cast
 
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from controllers.state import Array
 from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.render.captions import Captions, Entry, halved
 from experiments.render.film_file import FilmFile, check_target
@@ -23,7 +23,6 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, TUBE, USER
 
-Array = npt.NDArray[np.float64]
 Show = Literal["both", "workspace", "stage"]
 
 WORKSPACE_SHARE = 0.42  # of the width, where both are shown

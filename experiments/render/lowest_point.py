@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _GEOM = mujoco.mjtGeom
 FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for looking at

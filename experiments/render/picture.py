@@ -4,8 +4,8 @@ from pathlib import Path
 
 import matplotlib.image
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.render.graphics import Canvas, Image, View, offscreen_backend
 from experiments.render.scenes import Stage, Workspace
 from experiments.render.shown_world import SHADOW_REACH, STAGE, ShownWorld, shown_world
@@ -14,8 +14,6 @@ from experiments.results.folder import RECORDING
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import PlanarDisplacement
 from sim.recording.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
 FINER = 3  # times as many rows and columns are drawn

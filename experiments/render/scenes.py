@@ -6,8 +6,8 @@ from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.render.graphics import Canvas, Image, View
 from experiments.render.lowest_point import lowest_point, seen_geoms
 from experiments.render.shown_world import BENCH, GHOST, STAGE, ShownWorld, mixed_with_white
@@ -17,7 +17,6 @@ from sim.recording.recording import Recording
 from sim.viewer.framing import typical_peak
 from sim.viewer.palette import FIELD, USER
 
-Array = npt.NDArray[np.float64]
 Camera = Literal["three-quarter", "front", "side", "back", "above"]
 
 # From in front of the figure: azimuth to its heading, elevation [degrees].

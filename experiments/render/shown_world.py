@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.render.lowest_point import FIRST_HIDDEN_GROUP
 from experiments.results.folder import scene_of
 from models.humanoid.skeleton import N_POSE, figure_spec
@@ -20,7 +20,6 @@ from sim.viewer.palette import FIELD, TUBE, rgb
 from sim.viewer.replay_html import drawn_tube
 from sim.viewer.shapes import tube
 
-Array = npt.NDArray[np.float64]
 Rgba = tuple[float, float, float, float]
 
 GHOST = "ghost/"

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.render.shown_world import ShownWorld
 from experiments.results.folder import DEFAULT
 from models.mocap.library import load_clip
@@ -14,7 +15,6 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.framing import followed
 
-Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
 Ghost = Literal["default", "animation", "none"]
 """The animation of the curve as it was, that of the hand's path, or nobody."""

@@ -3,12 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sim.recording.recording import Recording
 from sim.reference.transition import DWELL
-
-Array = npt.NDArray[np.float64]
 
 ROWS = 100_000  # of the recording, read at a time
 

@@ -4,15 +4,13 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.results.summary_parts import FigureSummary
 from models.humanoid.skeleton import N_TANGENT
 from sim.body.falls import UP
 from sim.body.residual import ResidualMeasure
 from sim.recording.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 TOUCH = 1.0  # [N] from which the ground bears the figure
 

@@ -19,12 +19,11 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from controllers.state import Array
 from experiments.results.changes import river_changes
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
-
-Array = npt.NDArray[np.float64]
 
 POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"

@@ -8,18 +8,16 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from experiments.results.figures import AXES, POINTS, STYLE
 from experiments.results.folder import FIGURES, REPORT
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
-
-Array = npt.NDArray[np.float64]
 
 SHADES = {State.ARMING: "#f1f1f4", State.RAMPING: "#e3ecf6", State.FAULT: "#f8dedb"}
 _WINDOW = 2.0  # [s] of motion in which the prediction can be told from the measurement

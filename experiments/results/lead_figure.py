@@ -4,15 +4,13 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from controllers.state import Array
 from experiments.results.figures import AXES, PALE_TUBE, PALE_USER, STYLE, legend_above
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
-
-Array = npt.NDArray[np.float64]
 
 POINTS = 3000  # drawn of a line
 BACK = (0, (4, 2.5))  # dashes of a way back

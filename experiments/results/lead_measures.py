@@ -7,13 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.fields.leading import Leading
+from controllers.state import Array
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from experiments.results.soles import Soles
 from models.humanoid.skeleton import N_POSE
 from models.scene import SceneConfig
 from sim.recording.recording import Recording
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 BLOCK_FRAMES = 2000

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from controllers.state import Array
 from experiments.results.changes import river_changes
 from experiments.results.faults import fault_lines
 from experiments.results.figure_measure import FigureMeasure, MeanSquare
@@ -25,7 +26,6 @@ from experiments.results.summary_parts import (
 from models.mocap.clip import pose_difference
 from sim.recording.recording import Recording
 
-Array = npt.NDArray[np.float64]
 Span = tuple[float, float]
 """From and until when [s]."""
 

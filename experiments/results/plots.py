@@ -6,13 +6,11 @@ from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.body.falls import UP
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
-
-Array = npt.NDArray[np.float64]
 
 POINTS = 1500  # of a line at most: of a longer run, each is the largest value of its share of the time
 

@@ -2,12 +2,10 @@
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.scene import SceneConfig
-
-Array = npt.NDArray[np.float64]
 
 TOUCH = 0.003  # [m] a sole's point that is lower touches
 

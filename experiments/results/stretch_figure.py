@@ -4,15 +4,13 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from controllers.state import Array
 from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.results.figures import STYLE
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
-
-Array = npt.NDArray[np.float64]
 
 POINTS = 2000  # drawn of a curve or a path
 

@@ -4,15 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
+from controllers.state import Array
 from experiments.results.measures import Span, measured
 from experiments.results.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
 from sim.recording.recording import Channel, Recording
-
-Array = npt.NDArray[np.float64]
 
 _ROWS = 100_000  # of the recording, read at a time
 _CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")

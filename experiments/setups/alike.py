@@ -11,18 +11,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
+from controllers.state import Array
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip
 from sim.compilation.compiled import CACHE_FOLDER
 from sim.reference.reference import poses_along
-
-Array = npt.NDArray[np.float64]
 
 LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] more than the clips' median: from there on they do not move alike
 _ON_FLOOR = 0.015  # [m]: what is higher does not rub, as in `well_formed`

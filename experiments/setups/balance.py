@@ -17,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.state import Array
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.authoring.balance import GRAVITY
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
-Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _ROWS = 96  # of a lap

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, cast
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.blending.clip_arrays import clip_arrays
 from controllers.curves.trajectory import Trajectory
@@ -20,6 +19,7 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
+from controllers.state import Array
 from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
@@ -40,7 +40,6 @@ from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.world.world import phantom_angles
 
-Array = npt.NDArray[np.float64]
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
 LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other

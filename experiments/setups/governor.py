@@ -3,19 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.governor import Governor
 from controllers.fields.law import Law, Program
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips, change_clip
+from controllers.state import Array
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts import ClipMapParts
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
-
-Array = npt.NDArray[np.float64]
 
 _FPS = 120.0  # of the animation whose flights are judged [1/s]
 _FASTEST = 10.0  # [m/s], for where nothing bounds the speed: no hand is faster

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.state import Array
 from experiments.config.run_config import User
 from experiments.setups.expression import lap_turns
 from sim.users.arm import Arm
@@ -26,8 +26,6 @@ from sim.users.intents import (
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person import Person
-
-Array = npt.NDArray[np.float64]
 
 PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
 RIVER_PUSH = 1.0  # over into another river: in the middle of what takes a hand there and does not throw it out [N]

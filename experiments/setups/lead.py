@@ -14,6 +14,7 @@ from controllers.legs.grounded import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
@@ -32,7 +33,6 @@ from sim.users.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 FORTH = 5.0  # [s] along the S at the clip's own pace

@@ -2,15 +2,12 @@
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
 from experiments.setups.balance import measured_laps, nearest_supported, sway_of
 from sim.body.figure import FigureGains
 from sim.reference.reference import poses_along
-
-Array = npt.NDArray[np.float64]
 
 # A foot that bears what it is not held to turns about itself: the plan gives it load, and lifts it. So on a led figure,
 # which may stop anywhere, a point bears nothing from half the height on at which it is let go.

@@ -6,14 +6,12 @@ curve and the joints at q̇, b (φ̇ − v) is Σ_k (f_k |q̇_k| + d_k q̇_k²)/
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
 from models.phantom.kinematics import jacobian, vector_to_device_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.world import phantom_angles
-
-Array = npt.NDArray[np.float64]
 
 
 def friction_along(curve: Trajectory, phases: Array) -> Array:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
@@ -12,6 +11,7 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.robot_arm import ROBOT_ARM, RobotArm
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array
 from experiments.config.run_config import ArmConfig
 from experiments.setups.budget import fastest, tank_for
 from experiments.setups.hands import lap_pushes
@@ -27,8 +27,6 @@ from sim.users.arm import Arm
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.robot_world import RobotWorld
-
-Array = npt.NDArray[np.float64]
 
 HOME = np.array([0.7, 0.0, 0.4])  # of the tool, in the frame of the arm's base [m]
 TILT = np.radians(75.0)  # of the tool away from the vertical

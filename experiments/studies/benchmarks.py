@@ -20,7 +20,7 @@ from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import Compiled, evaluate
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import HandState
+from controllers.state import Array, HandState
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
 from experiments.config.words import run_config
@@ -46,7 +46,6 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.loop.servo import run_block
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 ROUNDS = 7

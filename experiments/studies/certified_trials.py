@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import tyro
 
 from controllers.certificates.loop.hand import HandImpedance, HandRange
@@ -22,8 +21,6 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 FORCE = 3.0  # [N] that the law asks for at most at the start: the motors give it anywhere, and the limiter too
 LAP_SECONDS = 4.0  # of the rivers; the hands are let go where the curve stands still

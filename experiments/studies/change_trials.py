@@ -10,11 +10,11 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
+from controllers.state import Array
 from experiments.lifting.in_betweens import largest_slide, soles
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs, packed_legs
@@ -24,8 +24,6 @@ from experiments.setups.stylus import stylus_path
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
-
-Array = npt.NDArray[np.float64]
 
 PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] between updates, of a lap, and the least for a change
 _TUBE = 0.015  # [m]

@@ -20,6 +20,7 @@ from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
+from controllers.state import Array
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
@@ -33,7 +34,6 @@ from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_por
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import place_stylus
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Form = Literal["discrete", "smooth"]
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
@@ -21,11 +20,9 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.law import Law
 from controllers.fields.program import evaluate
 from controllers.fields.river import River, integrate
-from controllers.state import HandState
+from controllers.state import Array, HandState
 from experiments.setups.rivers import ADMISSION, HYSTERESIS, SIGMA
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
-
-Array = npt.NDArray[np.float64]
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]
 DRAG = 4.0

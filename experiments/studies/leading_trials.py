@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import tyro
 
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
@@ -28,8 +27,6 @@ from experiments.certify.trial_simulation import LAP, Conditions, Trial
 from experiments.setups.lead import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.arm import Arm
-
-Array = npt.NDArray[np.float64]
 
 SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials: so that what the walker moves is nothing
 EXCESS = 1e-4  # [m] of the stylus on the side of an edge where the spring acts

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.rotations import logarithm, multiply, rotate
+from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.results.figures import AXES, STYLE
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
@@ -24,8 +25,6 @@ from models.humanoid.skeleton import BODIES, N_POSE
 from models.scene import FIGURE, world_model
 from sim.recording.recording import Recording
 from sim.reference.reference import poses_along
-
-Array = npt.NDArray[np.float64]
 
 CONFIG = run_config(
     clips=("cheer",), expressive=True, user="turn", seconds=16.0, orientation_stiffness=0.05, orientation_damping=5e-4

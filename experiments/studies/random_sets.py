@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import in_step, natural_lap
+from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.results.measures import FALLEN
@@ -32,8 +32,6 @@ from models.humanoid.skeleton import joint_range
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from sim.loop.loop import Loop
-
-Array = npt.NDArray[np.float64]
 
 TUNING = (
     "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "deepmimic/humanoid3d_backflip.txt", "deepmimic/humanoid3d_dance_a.txt",

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.easing import smooth_step
@@ -20,6 +19,7 @@ from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_R
 from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
+from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.results.figures import STYLE
 from experiments.setups.governor import speeds_along
@@ -34,8 +34,6 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
-
-Array = npt.NDArray[np.float64]
 
 DRAG, TUBE = 8.0, 0.015  # of governor and river [N s/m], [m]
 SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import tyro
 
 from controllers.certificates.loop.device import kinematics_function, plant_function
@@ -20,11 +19,10 @@ from controllers.certificates.region.region import region
 from controllers.certificates.report import Verdict
 from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import Array
 from experiments.certify.certify import certified_rivers
 from experiments.certify.trial_simulation import Conditions, Trial, hand_path
 from experiments.config.run_config import RunConfig
-
-Array = npt.NDArray[np.float64]
 
 CONFIG, HANDS = RunConfig(), HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400

@@ -12,15 +12,12 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import tyro
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.stability import slowest_mode
 from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
-
-Array = npt.NDArray[np.float64]
 
 _WORLDS_OWN = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()

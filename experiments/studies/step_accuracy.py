@@ -13,10 +13,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
+from controllers.state import Array
 from experiments.compiling import compile_once
 from experiments.config.run_config import ArmConfig, RunConfig
 from experiments.config.words import run_config
@@ -29,8 +29,6 @@ from sim.body.figure_state import REPORT_DOWN
 from sim.compilation.units import Unit
 from sim.loop.loop import Loop, pose_errors, tick_channels
 from sim.loop.servo import FrameLog, TickLog
-
-Array = npt.NDArray[np.float64]
 
 SECONDS, FINER = 8.0, 8
 BAND = 8.0  # [Hz]: a hand at 8 cm/s feels what is a centimetre long

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.sampling import Sampling
@@ -20,14 +19,13 @@ from controllers.certificates.switching.switching import Keeping, Sharing
 from controllers.certificates.switching.switching_search import Push, failure
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
+from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.results.figures import STYLE
 from experiments.setups.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
-
-Array = npt.NDArray[np.float64]
 
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] that are tried on every crossing, to 4 N
 NONE, NEVER = 0.025, 5.7  # [N] where the picture has what is not certified, and who is never lost

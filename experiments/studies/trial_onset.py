@@ -5,15 +5,13 @@ from dataclasses import replace
 from typing import NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness, slowest_mode
+from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import Conditions, Trial, simulate
-
-Array = npt.NDArray[np.float64]
 
 LARGEST = 20.0  # times as far off as at the start, a motion is no longer taken for linear
 

@@ -13,17 +13,15 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from controllers.certificates.flight.ballistic import BodyMotion
 from controllers.certificates.flight.tolerance import GRAVITY, JUDGING
+from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.clips import load_clips
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 _STEP = 5e-5  # of the simulation [s]
 _FOOT = 1.0  # mass of the foot [kg], radius of its sole 0.1 m

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from controllers.rotations import exponential, logarithm, multiply
+from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import JOINTS, N_POSE, joint_range
@@ -19,8 +19,6 @@ from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.users.intent import Push
 from sim.viewer.palette import CURVE, FIELD, USER
-
-Array = npt.NDArray[np.float64]
 
 BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a turn of it that it cannot do
 _STYLE: dict[Any, Any] = {

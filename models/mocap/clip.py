@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
 from models.mocap import quaternions
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
-
-Array = npt.NDArray[np.float64]
 
 _TIME, _LENGTH = 0.1, 0.5  # τ [s], r [m]
 CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is

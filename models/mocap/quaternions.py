@@ -1,9 +1,8 @@
 """Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm, signs that do not jump."""
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from models.arrays import Array
 
 
 def product(q: Array, r: Array) -> Array:

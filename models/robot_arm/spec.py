@@ -4,9 +4,8 @@ from importlib.resources import files
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from models.arrays import Array
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 TOOL = "tool"

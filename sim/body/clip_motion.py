@@ -11,13 +11,11 @@ in its own frame, as in MuJoCo's qvel.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 _MARGIN = 8  # frames of the neighbouring laps that shape the spline at the ends
 _SEAM = 1e-3  # [rad], [m]: how nearly a clip must close to be repeated

@@ -15,12 +15,10 @@ in a handful of steps however many edges there are, and y itself is what the gro
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.body.stance import factor, substitute
-
-Array = npt.NDArray[np.float64]
 
 N_EDGES = 4  # of a linearised friction cone
 _STEPS = 40

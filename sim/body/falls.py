@@ -20,10 +20,10 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.easing import smooth_step
+from controllers.state import Array
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT
 from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 UP, DOWN, SET_BACK = 0.0, 1.0, 2.0

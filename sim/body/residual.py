@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 FORCE, MOMENT = 0.05, 0.01
 

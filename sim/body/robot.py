@@ -9,16 +9,14 @@ as long as no motor saturates (Craig, Introduction to Robotics, chapter 10).
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS
 from models.scene import ROBOT
 from sim.compilation.native import mj_full_m
 from sim.errors import SimError
 from sim.world.robot_world import RobotWorld
-
-Array = npt.NDArray[np.float64]
 
 REPORT_SATURATED, REPORT_SIZE = 1, 8  # as in the figure's report
 

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
+
 IntArray = npt.NDArray[np.int64]
 
 _ADHERENCE = 300.0  # κ

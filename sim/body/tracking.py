@@ -10,6 +10,7 @@ import numpy.typing as npt
 from numba import typeof, types
 
 from controllers.kernel_call import call_as_given
+from controllers.state import Array
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.clip import Clip, pose_difference
@@ -24,7 +25,6 @@ from sim.compilation.native import mj_step
 from sim.compilation.units import Unit
 from sim.errors import SimError
 
-Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 _PREFIX = "figure/"

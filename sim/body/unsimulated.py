@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.body.figure_state import REPORT_SIZE
-
-Array = npt.NDArray[np.float64]
 
 
 class KinematicFigure(NamedTuple):

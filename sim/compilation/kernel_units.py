@@ -14,9 +14,9 @@ from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.law import Program
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS, kinds_of
 from controllers.kernel_call import address_of
+from controllers.state import Array
 from sim.compilation.units import Unit
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

@@ -11,10 +11,9 @@ To add one: write it and its kernels in a file of its own, and name them here.
 
 from typing import Any, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 from numba.extending import overload
 
+from controllers.state import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 from sim.devices.exchange import Exchange, actuate_exchange, advance_exchange, sense_exchange
@@ -22,7 +21,6 @@ from sim.devices.replayed import ReplayedHand, actuate_replayed, advance_replaye
 from sim.devices.simulated import SimulatedPhantom, actuate_simulated, advance_simulated, sense_simulated
 from sim.world.plant import Plant
 
-Array = npt.NDArray[np.float64]
 DeviceState: TypeAlias = SimulatedPhantom | ReplayedHand | Exchange
 
 _SENSE: dict[type, Any] = {

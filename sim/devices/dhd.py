@@ -12,9 +12,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from models.phantom.kinematics import R_HP
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
@@ -22,8 +22,6 @@ from sim.devices.hid import WATCHDOG
 from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import tip_force, write_pose
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 LARGEST = 8.5
 """Largest force that is sent [N]: the Premium's at its stall. Falcon, omega and delta give 8 to 20 and more."""

@@ -11,12 +11,10 @@ Whatever cannot be a reading raises `DriverFault`; who drives latches it, lets g
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 
 class DriverFault(SimError):

@@ -9,19 +9,16 @@ are the simulated device's own.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE
+from controllers.state import HAND_QUATERNION, HAND_SIZE, Array
 from sim.errors import SimError
 from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
 from sim.world.plant import Plant, step
 from sim.world.shown_phantom import ShownPhantom, show_angles, shown_phantom
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 READING_SEQUENCE, READING_CLOCK, READING_SWITCH, READING_THETA, READING_GIMBAL, READING_SIZE = 0, 1, 2, 3, 6, 9
 """Number of the reading (from 1 on), the driver's clock [s], 1 while the switch is pressed, θ1…θ3 and gimbal [rad]."""

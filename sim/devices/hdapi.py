@@ -16,17 +16,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from models.phantom.kinematics import R_HP
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import tip_force, write_pose
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 SILENCE = 5e-3
 """Time without a command after which the callback commands no force [s]; five of its periods."""

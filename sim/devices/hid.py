@@ -14,9 +14,9 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault, first_not_finite
+from controllers.state import Array
 from sim.devices import hid_protocol as protocol
 from sim.devices.driver import (
     BAD,
@@ -38,8 +38,6 @@ from sim.devices.exchange import (
     READING_THETA,
 )
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 WATCHDOG = 0.01
 """Time without a command after which the firmware switches the motors off [s]: twice the silence after which a command

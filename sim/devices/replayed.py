@@ -3,19 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import READING_NOT_FINITE, READINGS_ENDED, first_not_finite, latch
-from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_VELOCITY
+from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_VELOCITY, Array
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.world.encoders import plausibility
 from sim.world.plant import Plant, step
 from sim.world.shown_phantom import ShownPhantom, show_hand, shown_phantom
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 _CHANNELS = ("t", "p", "quaternion", "v", "omega", "switch")
 

@@ -2,18 +2,15 @@
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.compilation.units import Unit
 from sim.users.arm import Arm
 from sim.users.person_state import PersonState
 from sim.users.person_unit import link_person, person_unit
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
 from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
-
-Array = npt.NDArray[np.float64]
 
 
 class SimulatedPhantom(NamedTuple):

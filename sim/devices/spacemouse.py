@@ -15,14 +15,13 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from models.phantom.kinematics import R_HP, inside_workspace
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import BAD, READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SIZE, READING_SWITCH
 from sim.devices.hid import HidHandle
 from sim.devices.virtual_arm import write_pose
-
-Array = npt.NDArray[np.float64]
 
 TOP_SPEED, TOP_TURN = 0.15, 1.5
 """With the cap pushed all the way [m/s], [rad/s]: across the workspace of a river in about a second."""

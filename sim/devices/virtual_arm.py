@@ -10,15 +10,13 @@ left out: such a device carries its own.
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, gimbal_angles, inverse_kinematics, jacobian, within_limits
 from sim.devices.driver import DriverFault
 from sim.devices.exchange import READING_GIMBAL, READING_THETA
-
-Array = npt.NDArray[np.float64]
 
 WEAKEST = 0.05
 """Least singular value of J [m/rad] for which a torque is turned into a force: on the turret's axis, where it is zero,

@@ -11,10 +11,10 @@ from multiprocessing.process import BaseProcess
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.arming import NO_REQUEST, State
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from sim.errors import SimError
 from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
 from sim.hardware.recorder_process import (
@@ -43,8 +43,6 @@ from sim.hardware.servo_process import (
     serve,
 )
 from sim.hardware.shared import Ring, SharedNumbers
-
-Array = npt.NDArray[np.float64]
 
 SILENT = 0.2
 """Time without a tick after which a servo counts as gone [s]."""

@@ -5,8 +5,8 @@ it is, with a tremor, until the motors have been on for a while, and then lets g
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
 from models.scene import SceneConfig
@@ -19,8 +19,6 @@ from sim.world.linkage import Linkage
 from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 TREMOR, TREMOR_FREQUENCY = 1e-4, 10.0
 """Physiological tremor of a hand at rest: some 0.1 mm [m] at 8 to 12 Hz."""

@@ -14,16 +14,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.faults import Fault
+from controllers.state import Array
 from sim.devices.driver import LOST, READ, ROUND_TRIP, TELEMETRY_SIZE, TEMPERATURE, DriverFault
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
-
-Array = npt.NDArray[np.float64]
 
 WATCHDOG = 0.02
 """Time without a command after which the device lets go [s]: twenty periods at 1 kHz."""

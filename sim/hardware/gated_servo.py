@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
+from controllers.state import Array
 from sim.devices.driver import LOST, ROUND_TRIP, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
@@ -15,8 +15,6 @@ from sim.hardware.gated_tick import GateMemory, gated_tick
 from sim.loop.loop import make_logs, tick_channels
 from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 READ_SHARE = 0.3
 """Share of a period that is waited for a reading: the rest is for the tick and the command."""

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.safety.arming import pushes
 from controllers.safety.energy_tank import book_force
@@ -12,13 +11,12 @@ from controllers.safety.faults import FAULT_CODE, Fault, latch
 from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
 from controllers.safety.limiter import LIMITER_FORCE
 from controllers.safety.thermal import hold_to_heat
+from controllers.state import Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compilation.compiled import entry_point
 from sim.devices.exchange import COMMAND_FAULT, COMMAND_FORCE, COMMAND_TORQUE, Exchange
 from sim.world.encoders import PEAK_TORQUE, motor_torques
-
-Array = npt.NDArray[np.float64]
 
 CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
 THERMAL_TIME = 10.0

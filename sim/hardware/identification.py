@@ -34,11 +34,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
+from controllers.state import Array
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 NAMES = (
     *(f"coulomb{i}" for i in (1, 2, 3)), *(f"viscous{i}" for i in (1, 2, 3)), *(f"inertia{i}" for i in (1, 2, 3)),

@@ -20,8 +20,6 @@ from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
 from sim.recording.recorder import Group, Recorder
 
-Array = npt.NDArray[np.float64]
-
 TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_READY, TOLD_SIZE = 0, 1, 2, 3, 6, 7, 8
 """What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m], and
 whether it is ready, which takes longer than rows are kept where the twin is to be compiled."""

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.errors import ControllerError, ParameterError
 from controllers.safety.arming import NO_REQUEST
@@ -28,8 +27,6 @@ from sim.hardware.gated_servo import GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.spread import Quantiles, Spread
-
-Array = npt.NDArray[np.float64]
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """What controls tell the servo: a number that changes, the number of a request, the request, 1 to end."""

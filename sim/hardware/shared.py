@@ -8,9 +8,8 @@ from multiprocessing.shared_memory import SharedMemory
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _TRIES = 200
 

@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
@@ -35,7 +36,6 @@ from sim.world.phantom_port import ARM_JOINTS, MOTORS
 from sim.world.plant import Plant, make_plant, step
 from sim.world.world import World
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 BANDWIDTH = 2.0 * math.pi * 30.0

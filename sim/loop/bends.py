@@ -1,12 +1,8 @@
 """Undo and redo of a curve that is bent in a field's memory, from Python, between two blocks."""
 
-import numpy as np
-import numpy.typing as npt
-
 from controllers.curves.deformation import redo, undo
+from controllers.state import Array
 from sim.compilation.compiled import entry_point
-
-Array = npt.NDArray[np.float64]
 
 
 @entry_point

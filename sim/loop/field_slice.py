@@ -1,15 +1,12 @@
 """The field at many points at once, for those who look at it: none of them leaves a trace in its memory."""
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.fields.program import evaluate
-from controllers.state import HAND_POSITION, HAND_SWITCH
+from controllers.state import HAND_POSITION, HAND_SWITCH, Array
 from sim.compilation.compiled import entry_point
 from sim.loop.servo import Field
-
-Array = npt.NDArray[np.float64]
 
 
 @njit

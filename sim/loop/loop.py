@@ -5,10 +5,9 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
-from controllers.state import HandState
+from controllers.state import Array, HandState
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
@@ -20,8 +19,6 @@ from sim.loop.servo import FrameLog, Servo, TickLog, run_block
 from sim.recording.recorder import Group, Recorder
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 BLOCK_SECONDS = 0.2  # of simulated time between two looks at the clock and the recorder
 

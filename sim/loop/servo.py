@@ -29,6 +29,7 @@ from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
+from controllers.state import Array
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
@@ -37,7 +38,6 @@ from sim.reference.reference import NO_MAP
 from sim.reference.reference_state import CompiledReference
 from sim.world.plant import Plant
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

@@ -23,10 +23,9 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite.binding import get_host_cpu_name
 
+from controllers.state import Array
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
 from sim.recording.unclosed import held
-
-Array = npt.NDArray[np.float64]
 
 CHUNK_SECONDS = 0.5  # what a killed run can lose, beside what was not yet appended
 # The system copies a page of a write at once, and between two pages a kill can end it: what crosses a page can be torn.

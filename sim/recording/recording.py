@@ -16,12 +16,10 @@ from typing import Self
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.errors import SimError
 from sim.recording.unclosed import AsClosed, has_writer, superblock
-
-Array = npt.NDArray[np.float64]
 
 RESERVED = frozenset({"rows", "rate"})
 """Names in a group that are not channels."""

@@ -7,11 +7,11 @@ from numba import types
 from controllers.fields.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.evaluate import evaluate_map_jacobian
+from controllers.state import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.units import Unit
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

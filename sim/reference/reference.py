@@ -17,6 +17,7 @@ from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS, lets_go, phase_rate, takes_over
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB
+from controllers.state import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import map_units
 from sim.compilation.native import mj_differentiate_pos
@@ -28,7 +29,6 @@ from sim.reference.settling import approach, let_down, slowness
 from sim.reference.stylus_filter import smooth_hand, smooth_turn, turn_rate
 from sim.reference.transition import dwells, make_transition
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

@@ -7,10 +7,10 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
+from controllers.state import Array
 from sim.reference.stylus_filter import turned_on
 from sim.reference.transition import Transition, carry_on
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

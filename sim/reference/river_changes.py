@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
@@ -18,11 +17,10 @@ from controllers.haptic_map.river_clips import (
 from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_way
 from controllers.rotations import rotate
+from controllers.state import Array
 from sim.reference.reference_state import CompiledReference, carry, look_around
 from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
 from sim.reference.waiting import leaps, stands, waits_no_longer
-
-Array = npt.NDArray[np.float64]
 
 
 @njit

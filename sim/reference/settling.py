@@ -15,17 +15,15 @@ s follows its goal critically damped, so pose, velocity and acceleration are con
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit, types
 
 from controllers.legs.footsteps import limb_end
 from controllers.legs.limbs import LIMB
 from controllers.rotations import rotate
+from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
-
-Array = npt.NDArray[np.float64]
 
 _HELD, _FLOWN = 0.7, 0.9  # σ₀, σ₁: below the first all of a flight is let down, from the second on none
 _RATE = 10.0  # of the approach to the goal [1/s]: a body falls as far as a jump is high in 0.3 s

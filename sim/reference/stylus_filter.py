@@ -14,12 +14,10 @@ in T:
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.rotations import exponential, logarithm, multiply, relative
-
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _SLOW = 0.02  # v₀ [m/s], below which encoder noise has no direction to turn
 

@@ -3,16 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.legs.footsteps import STEP, limb_end, pivot, plan_steps, step_end
 from controllers.legs.stepping_limbs import put_limb, shortfall
 from controllers.motion.inertialization import add_offset, offset_left
+from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
-
-Array = npt.NDArray[np.float64]
 
 DWELL = 0.04  # [s] for which a river must have the hand before its clip plays: noise gives a hand away for less
 _ROOT = 6  # components of a tangent that are the root's

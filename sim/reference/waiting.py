@@ -4,14 +4,11 @@ A leap that goes over into another motion ends in the air: what the old motion r
 landing. So a change waits for a figure that stands, and for a new motion that does not leap before it is shown.
 """
 
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.reference.settling import clearance
 from sim.reference.transition import DWELL, Transition
-
-Array = npt.NDArray[np.float64]
 
 _STANDS, _LEAPS = 0.01, 0.05  # [m] over the floor: from there a figure flies; and does so for long
 _RISES = 0.6  # [m/s] of the root: faster, it is about to take off

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.easing import smooth_step
+from controllers.state import Array
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn, grab_table, push_table, turn_table
-
-Array = npt.NDArray[np.float64]
 
 
 @njit

@@ -12,12 +12,10 @@ between it and the stylus give way.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.errors import SimError
 from sim.users.person import Person
-
-Array = npt.NDArray[np.float64]
 
 REFERENCE_GRIP = 2.0  # [N] at which impedances are given: the middle of Fu & Cavusoglu 2012
 LEAST_TIP = 0.03  # [kg] of the bare linkage, in its lightest direction: its own M seen through J at θ = 0

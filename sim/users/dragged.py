@@ -8,12 +8,10 @@ the force is the same law by which every simulated hand holds the stylus.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.users.arm import CompiledArm
 from sim.users.intent import GRAB_COLUMNS
-
-Array = npt.NDArray[np.float64]
 
 _SPAN = 1e6  # [s] between the two samples of a path, longer than anybody watches
 _FOR_EVER = 1e9  # [s]

@@ -15,12 +15,10 @@ proprioception are combined (van Beers, Sittig & Gon 1999, J. Neurophysiol. 81: 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.rotations import logarithm, relative
-
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 LOOKS = 0.008  # [s] between two pictures of the figure, at most: 120 a second
 _NEAR = 1.0 / 8.0  # of the motion, around where she feels it to be, in which she looks for a pose: steps are alike

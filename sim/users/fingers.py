@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply
-
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 
 @njit

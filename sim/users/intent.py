@@ -9,11 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 PUSH_COLUMNS = 11
 """A push as a row: start, duration, peak, direction (3), outward, place (3), radius. A radius of 0 means any place."""

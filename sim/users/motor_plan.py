@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.users.chance import normal
 from sim.users.person_state import (
     BEGUN,
@@ -29,8 +29,6 @@ from sim.users.person_state import (
 )
 from sim.users.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.wishes import PLACE
-
-Array = npt.NDArray[np.float64]
 
 ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994: ellipses along the way, m)
 LEAST_SECONDS = 0.16  # [s] of the shortest submovement

@@ -9,9 +9,9 @@ the force f that she exerts, over her strength, the share F f of what is able ti
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.users.person_state import (
     CAPACITY,
     DRIVEN_A,
@@ -33,8 +33,6 @@ from sim.users.person_state import (
     WANTED_FORCE,
     PersonState,
 )
-
-Array = npt.NDArray[np.float64]
 
 SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
 RECOVERY = 0.04  # [1/min] of muscle that is tired: grip of the three-compartment model (Frey-Law et al. 2012, m)

@@ -4,13 +4,9 @@ Her wishes are then two rows (see `sim.users.wishes`) that the function writes: 
 second row the velocity at which the wanted place moves.
 """
 
-import numpy as np
-import numpy.typing as npt
 from numba import types
 
 from controllers.kernel_call import kernel_call
-
-Array = npt.NDArray[np.float64]
 
 _VECTOR = types.Array(types.float64, 1, "C")
 INTENT_ARGUMENTS = (types.float64, _VECTOR, _VECTOR, types.Array(types.float64, 2, "C"))

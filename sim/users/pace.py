@@ -6,10 +6,9 @@ r"""The pace at which a hand draws a given path: the smoothest one.
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _WAVES = 6  # of the logarithm of the pace, a lap
 

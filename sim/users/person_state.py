@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from controllers.state import Array
 from sim.users.eye import Eye, no_eye
 from sim.users.wishes import WISH_SIZE
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 (GRIP, STIFFENING, GRIP_STIFFNESS, GRIP_DAMPING, STRENGTH, FATIGUE, REFLEX_GAIN, SKILL, FELT_NOISE, SEEN_NOISE,

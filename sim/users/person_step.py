@@ -4,10 +4,9 @@ She gets what a person gets: force and motion of the stylus with noise and a ref
 sight's delay, and what she wants. No field, no phase, no limiter reaches her.
 """
 
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.users.body import REFERENCE_GRIP
 from sim.users.muscles import move
 from sim.users.person_state import (
@@ -29,8 +28,6 @@ from sim.users.person_state import (
 )
 from sim.users.senses import sense
 from sim.users.will import want
-
-Array = npt.NDArray[np.float64]
 
 
 @njit

@@ -7,9 +7,9 @@ Her belief is what she feels, corrected by what she sees when that arrives, and 
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.users.chance import normal
 from sim.users.eye import seen_place
 from sim.users.person_state import (
@@ -48,8 +48,6 @@ from sim.users.person_state import (
     UNSTEADY,
     PersonState,
 )
-
-Array = npt.NDArray[np.float64]
 
 DRIFT_TIME = 60.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] of what is seen: a fixation

@@ -8,10 +8,9 @@ is the motion of least ∫|x⃛|² between two states (position, velocity, accel
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 MOST_STAGES = 8  # submovements to a target that are planned ahead: more leave a 2000th of the way
 

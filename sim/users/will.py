@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.users.body import REFERENCE_GRIP
 from sim.users.motor_plan import aim, drive, may_decide, submove
 from sim.users.own_intent import call_intent
@@ -37,8 +37,6 @@ from sim.users.person_state import (
 )
 from sim.users.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, wanted_motion
 from sim.users.wishes import GRIP as WISHED_GRIP
-
-Array = npt.NDArray[np.float64]
 
 ENGAGING_TIME = 0.1  # [s] in which muscles are activated: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] in which a relaxed arm takes the place where it was moved to for its own

@@ -3,12 +3,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10
 """Columns of a wish: place (3) [m] and force (3) [N] in H, grip [N] or NaN for the person's own, width of a target [m],

@@ -1,14 +1,11 @@
 """Bodies of a model as they are drawn: solid or as a ghost, at their true size or magnified."""
 
 import mujoco
-import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.viewer.palette import TUBE, rgb
 from sim.viewer.shapes import Shape
-
-Array = npt.NDArray[np.float64]
 
 GHOST_OPACITY = 0.35
 

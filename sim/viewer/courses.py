@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from controllers.state import Array
 from sim.viewer.palette import CURVE, TUBE, river_colors
-
-Array = npt.NDArray[np.float64]
 
 
 class Course(NamedTuple):

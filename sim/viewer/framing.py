@@ -1,11 +1,9 @@
 """What keeps a replay in the picture: arrows of a length that fits, and a camera that goes with who travels."""
 
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from sim.recording.recording import Channel
-
-Array = npt.NDArray[np.float64]
 
 TRAVEL = 1.5  # a figure that leaves this radius is followed [m]
 

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.viewer.live_stage import drawn_at, taken_at
 from sim.viewer.palette import USER, rgb
 
-Array = npt.NDArray[np.float64]
 Dragged = Callable[[Any, Array, bool], None]
 """Called with viser's event, the place of the hand in H [m], shape (3,), and whether shift is held."""
 

@@ -6,15 +6,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Shown
 from sim.viewer.views import DEFAULT_SIZE, VIEWS, look, look_from
-
-Array = npt.NDArray[np.float64]
 
 _FPS = 30.0
 

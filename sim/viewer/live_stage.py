@@ -9,16 +9,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import body_shapes, coarser, tube
 from sim.viewer.shown import Shown
-
-Array = npt.NDArray[np.float64]
 
 MAGNIFICATION = 8.0
 PHANTOM_AT = np.array([1.45, -0.6, 1.2])  # where the origin of the hand frame is drawn [m]

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 FIELD = "#22a046"  # the field and what it leads
 USER = "#eb7814"  # the hand's own force, and where it pushes

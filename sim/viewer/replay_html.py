@@ -12,17 +12,15 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course, courses
 from sim.viewer.framing import followed, typical_peak
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import body_shapes, tube
-
-Array = npt.NDArray[np.float64]
 
 FPS = 30.0
 SECONDS = 60.0  # of a longer run, the beginning is shown

@@ -8,7 +8,7 @@ import numpy.typing as npt
 import trimesh
 from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 _LEAST_STEP = 1e-12  # [m] from one point to the next, that has a direction
 _LEAST_NORMAL = 1e-6  # of what is left of a unit normal

@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from controllers.state import Array
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT, GHOST_CELL, drawn_at
 from sim.viewer.palette import RIVERS, rgb
 from sim.viewer.shapes import body_shapes, coarser, tube
-
-Array = npt.NDArray[np.float64]
 
 COLORS = RIVERS[1:]
 _LEAST = 1e-4  # [m] from point to point of a path that is drawn

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import viser
 
-Array = npt.NDArray[np.float64]
+from controllers.state import Array
 
 FIELD_OF_VIEW = np.deg2rad(34.0)
 PANEL = 335.0  # [px] that viser's panel takes of the width of a window

@@ -6,7 +6,6 @@ The simulated device and a real one differ in where the angles come from and whe
 import math
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import (
@@ -17,6 +16,7 @@ from controllers.safety.faults import (
     latch,
     note_command,
 )
+from controllers.state import Array
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,
@@ -29,7 +29,6 @@ from models.phantom.kinematics import (
 )
 from models.phantom.parameters import PREMIUM_1_5
 
-Array = npt.NDArray[np.float64]
 Angles = tuple[float, float, float]
 
 PEAK_TORQUE = PREMIUM_1_5.peak_torque

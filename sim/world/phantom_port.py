@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import HELD, NO_SEQUENCE, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE
+from controllers.state import HAND_QUATERNION, HAND_SIZE, Array
 from models.phantom.kinematics import (
     encoder_reading,
     forward_kinematics,
@@ -22,8 +21,6 @@ from models.phantom.kinematics import (
 from models.scene import PHANTOM
 from sim.errors import SimError
 from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
-
-Array = npt.NDArray[np.float64]
 
 ARM_JOINTS = ("theta1", "theta2", "theta3")
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")

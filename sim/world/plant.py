@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from controllers.kernel_call import call_as_given
 from controllers.safety.faults import is_silent
+from controllers.state import Array
 from models.scene import PHANTOM
 from sim.compilation.native import mj_step
 from sim.users.arm import Arm, CompiledArm, hand_force
@@ -16,8 +16,6 @@ from sim.users.person_state import PersonState, nobody
 from sim.world.phantom_port import ARM_JOINTS, PhantomPort, let_go, true_motion, true_turn
 from sim.world.robot_world import RobotWorld
 from sim.world.world import World
-
-Array = npt.NDArray[np.float64]
 
 
 class Plant(NamedTuple):

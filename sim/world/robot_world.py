@@ -4,13 +4,11 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS, arm_model
 from models.scene import ROBOT, SceneConfig, robot_world_model
 from sim.world.world import place_stylus
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

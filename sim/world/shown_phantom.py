@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.state import Array
 from models.phantom.kinematics import gimbal_angles, inverse_kinematics, vector_to_device_frame
 from models.scene import PHANTOM
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Angles = tuple[float, float, float]
 

@@ -5,8 +5,8 @@ from typing import Literal, TypeAlias, get_args
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT, figure_model
 from models.phantom.kinematics import (
     Quat,
@@ -18,8 +18,6 @@ from models.phantom.kinematics import (
 )
 from models.scene import FIGURE, PHANTOM, SceneConfig, device_world_model, world_model
 from sim.errors import SimError
-
-Array = npt.NDArray[np.float64]
 
 FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]
 """How a world has the figure: stepped with the rest; as the pose h(p), evaluated and recorded; not at all."""

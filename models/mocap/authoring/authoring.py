@@ -11,14 +11,12 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_POSE, figure_model
-
-Array = npt.NDArray[np.float64]
 
 _TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame, about which a heel rises
 _HANG = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards

@@ -12,14 +12,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
+from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 GRAVITY = 9.81
 _TOUCH = 0.006  # a contact sphere this near the floor [m] can push

@@ -9,17 +9,15 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
 from models.mocap.authoring.authoring import Arm
 from models.mocap.clip import Clip
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
-
-Array = npt.NDArray[np.float64]
 
 FPS = 120.0
 _HIP = 0.0875  # from the middle to a hip [m]: the feet stand below the hips

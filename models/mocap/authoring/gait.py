@@ -11,17 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT
 from models.mocap.clip import Clip
 from models.mocap.dynamics.coordinates import coordinate, poses, reflection
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task
-
-Array = npt.NDArray[np.float64]
 
 FPS = 120.0
 _ACTIVE = (

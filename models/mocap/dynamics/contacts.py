@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
 from models.mocap.clip import Clip
 
-Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _CERTAIN = 0.005  # what is lower than this touches, however fast [m]

@@ -6,13 +6,11 @@ the singularity at a full turn; the root may (a backflip), if it turns about one
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
-
-Array = npt.NDArray[np.float64]
 
 _DELTA = 1e-3  # [s] of the difference quotients that turn rotation vectors into angular velocity
 

@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
 
+from models.arrays import Array
 from models.floor import FRICTION
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
 
-Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _SHARE = 0.01  # ε: makes the forces unique, so that they share the load and depend continuously on the state

@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip
-
-Array = npt.NDArray[np.float64]
 
 
 class Momentum(NamedTuple):

@@ -1,12 +1,10 @@
 """Legs that follow a moved body: feet that stand stay where they are, knees bend about their own axes."""
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap import quaternions
-
-Array = npt.NDArray[np.float64]
 
 _REACH = 0.9995  # share of a leg's length that a knee can straighten to
 _CHAINS = tuple(

@@ -15,12 +15,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.coordinates import states
 from models.mocap.dynamics.floor_forces import Demand, Floor, residual
-
-Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STRONG = 0.8  # share of the joints' largest torques beyond which effort counts as strain

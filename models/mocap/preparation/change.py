@@ -13,12 +13,11 @@ from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
 from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssue]
 
+from models.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.preparation.poses import around, plus
-
-Array = npt.NDArray[np.float64]
 
 DEGREE = 5
 _STEP = 1e-3  # of the differences that give velocities [s]

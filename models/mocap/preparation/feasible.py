@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap import quaternions
 from models.mocap.clip import Clip
@@ -25,7 +26,6 @@ from models.mocap.preparation.change import DEGREE, Change, Normal
 from models.mocap.preparation.inverse_dynamics import InverseDynamics, cross_matrix
 from models.mocap.preparation.stances import Stances, clearance
 
-Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _MARGIN = 0.02  # to the joints' limits [rad]

@@ -8,11 +8,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model
 from models.mocap.dynamics.floor_forces import Demand
 from models.mocap.preparation.change import State
-
-Array = npt.NDArray[np.float64]
 
 _ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))

@@ -11,13 +11,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
-
-Array = npt.NDArray[np.float64]
 
 _GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]; walkers have 0.1 to 0.3
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps

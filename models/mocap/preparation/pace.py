@@ -15,14 +15,11 @@ T² is large.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.clip import Clip
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.poses import contact_points
-
-Array = npt.NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s²]
 _HIGH = 0.03  # of feet and hands in flight [m]: captured feet hover by 1 to 2 cm where they stand

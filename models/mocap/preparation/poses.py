@@ -2,15 +2,13 @@
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap import quaternions
 from models.mocap.clip import Clip, PlanarDisplacement
-
-Array = npt.NDArray[np.float64]
 
 _PASSES = (
     0.802  # a Butterworth filter of second order run both ways halves the power at this share of its corner (Winter)

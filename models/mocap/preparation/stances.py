@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip, global_rotations
 from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.poses import around, sole_points
 
-Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, joint_range
 from models.mocap import quaternions
 from models.mocap.clip import Clip, global_rotations, pose_difference
@@ -16,8 +17,6 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.feasible import contact_residual
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
-
-Array = npt.NDArray[np.float64]
 
 LOWEST, HIGHEST = -0.003, 0.005  # of soles in stance [m]
 FLATTEST = np.deg2rad(2.0)

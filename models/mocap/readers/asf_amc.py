@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
 from models.mocap.readers.motion_file import (
     JOINT_LIMIT,
@@ -24,8 +24,6 @@ from models.mocap.readers.motion_file import (
     quoted,
 )
 from models.mocap.readers.source_motion import SourceMotion
-
-Array = npt.NDArray[np.float64]
 
 FPS = 120.0
 _INCH = 0.0254

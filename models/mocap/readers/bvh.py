@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
 from models.mocap.readers.motion_file import (
     FRAME_LIMIT,
@@ -23,8 +23,6 @@ from models.mocap.readers.motion_file import (
     quoted,
 )
 from models.mocap.readers.source_motion import SourceMotion
-
-Array = npt.NDArray[np.float64]
 
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 

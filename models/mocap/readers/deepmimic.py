@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
 from models.mocap.readers.motion_file import (
     JOINT_LIMIT,
@@ -24,8 +24,6 @@ from models.mocap.readers.motion_file import (
     read_text,
 )
 from models.mocap.readers.source_motion import SourceMotion
-
-Array = npt.NDArray[np.float64]
 
 _WIDTH = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
 _JSON_LIMIT = 16_000_000  # bytes: parsed, a hostile file takes some thirty times its size

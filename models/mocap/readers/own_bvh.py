@@ -9,14 +9,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.clip import Clip
 from models.mocap.readers.source_motion import SourceMotion
-
-Array = npt.NDArray[np.float64]
 
 _CENTIMETRES = 100.0
 _TIPS = {"head": (0.0, 0.0, 0.25), "left_wrist": (0.0, 0.175, 0.0), "right_wrist": (0.0, -0.175, 0.0),

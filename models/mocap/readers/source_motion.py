@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,14 +7,12 @@ on the frames of its joints, or on joints in between.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from models.arrays import Array
 from models.mocap import quaternions
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles
-
-Array = npt.NDArray[np.float64]
 
 SIDES = ("left", "right")
 

@@ -23,12 +23,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap import quaternions
 from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
 from models.mocap.retargeting.skeleton_roles import Roles
-
-Array = npt.NDArray[np.float64]
 
 _Z = np.array([0.0, 0.0, 1.0])
 _STRAIGHT = np.deg2rad(20.0)  # angle between trunk and thighs, beyond the least, at which a frame counts 0.6 as neutral

@@ -8,13 +8,11 @@ where the toes' contact points are too low the ankle bends them up, about its ow
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
+from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
 from models.mocap import quaternions
-
-Array = npt.NDArray[np.float64]
 
 _LEVEL = 0.06  # the four contact points of a sole that is level differ by less in height [m]
 _SHARE = 0.25  # of the supporting, level soles are at or below the floor

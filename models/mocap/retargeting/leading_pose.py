@@ -6,12 +6,9 @@ It is parted from the motion by one step that no step of the motion comes near.
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from models.mocap import quaternions
 from models.mocap.readers.source_motion import SourceMotion
-
-Array = npt.NDArray[np.float64]
 
 _SHARE = 0.25  # of a motion that may be such a pose, held
 _TIMES = 5.0  # a jump is so much larger than all but 1 % of the steps ...

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap import quaternions
@@ -25,8 +25,6 @@ from models.mocap.retargeting.footing import levelled, on_the_floor
 from models.mocap.retargeting.leading_pose import without_leading_pose
 from models.mocap.retargeting.skeleton_roles import Roles, missing, unused
 from models.mocap.retargeting.upright import AXES, check_sides, up_axis
-
-Array = npt.NDArray[np.float64]
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # a body that never stands straighter does not tell how its spine is at rest

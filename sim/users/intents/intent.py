@@ -3,14 +3,12 @@
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import smooth_step
+from controllers.state import Array
 from sim.errors import SimError
 from sim.users.wishes import Wishes
-
-Array = npt.NDArray[np.float64]
 
 PERIOD = 0.02  # [s] between two wishes: shorter than any submovement
 

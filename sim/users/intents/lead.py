@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.state import Array
 from sim.users.intents.intent import PERIOD, moments
 from sim.users.wishes import Wishes, following
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

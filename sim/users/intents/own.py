@@ -16,8 +16,6 @@ from sim.users.own_intent import INTENT_ARGUMENTS
 from sim.users.person_state import BELIEF, FELT_FORCE, PersonState
 from sim.users.wishes import ENGAGED, FORCE, GRIP, OWN, PLACE, SWITCH, Wishes, resting
 
-Array = npt.NDArray[np.float64]
-
 
 class Wish(NamedTuple):
     """What a person wants now.

@@ -9,16 +9,14 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from controllers.state import Array
 from experiments.cli import main
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh
-
-Array = npt.NDArray[np.float64]
 
 pytest.importorskip("pygltflib")
 

@@ -1,0 +1,8 @@
+"""The type of arrays of numbers."""
+
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[np.float64]
