@@ -216,7 +216,7 @@ class Engine:
         laws = program.ops[program.ops[:, 0] >= 0]
         for row, law in zip(laws.tolist(), program.laws, strict=True):
             if law is self.tubes:
-                self._record = law.record_at(row[2])
+                self._record = self.tubes.record_at(row[2])
                 return row[1] + StretchyGains._fields.index("until")
         return 0
 

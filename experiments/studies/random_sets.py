@@ -21,7 +21,6 @@ from controllers.motion.strides import in_step, natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.preparation.prepared_clip import prepared_clip
-from experiments.results.measures import FALLEN
 from experiments.setups.alike import motion_of
 from experiments.setups.blendable import not_blendable, off_pace
 from experiments.setups.wiring import wire
@@ -31,6 +30,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import joint_range
 from models.mocap import quaternions
 from models.mocap.clip import Clip
+from sim.body.falls import UP
 from sim.loop.loop import Loop
 
 TUNING = (
@@ -78,7 +78,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
         clip = _named(prepared_clip(Path(folder) / name).clip, name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
-    residual, fell = followed(clip)
+    residual, fell, _ = followed(clip)
     reason = "; ".join(not_blendable((clip, _other(clip))))
     if not reason and (fell is not None or residual > MOST_ALONE):
         reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
@@ -107,9 +107,10 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
     frames, weight = log.frames, session.weight
-    away = np.flatnonzero(frames["root_error"] > FALLEN)
-    fell = float(frames["t"][away[0]]) if len(away) else None
-    force = np.linalg.norm(frames["residual"][:, :3], axis=1)[frames["flight"] == 0.0] / weight
+    fallen = np.flatnonzero(frames["down"] != UP)
+    fell = float(frames["t"][fallen[0]]) if len(fallen) else None
+    stands = (frames["flight"] == 0.0) & (frames["down"] == UP)
+    force = np.linalg.norm(frames["residual"][:, :3], axis=1)[stands] / weight
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
         "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "pace": [round(p, 2) for p in pace],
