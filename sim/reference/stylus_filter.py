@@ -10,7 +10,9 @@ with a reference that does not move as fast as its velocity says. So the predict
 (Bar-Shalom, Li and Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order
 in T:
 
-.. math:: j = -\Omega^2 \dot p, \qquad \Omega = |\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2)
+.. math:: j = -\Omega^2 \dot p, \qquad \Omega = \min(|\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2),\ 2\pi)
+
+Without the bound a slow hand's noise turns the prediction: the run that is led falls at 7.9 s.
 """
 
 import numpy as np
@@ -20,6 +22,7 @@ from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array
 
 _SLOW = 0.02  # v₀ [m/s], below which encoder noise has no direction to turn
+_FASTEST = 2.0 * np.pi  # [rad/s]: no lap takes less than a second, and a slow hand that seems to turn faster is noise
 
 
 @njit
@@ -48,7 +51,8 @@ def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -
 def turn_rate(v: Array, a: Array) -> float:
     """Ω [rad/s] at which a hand with a velocity and an acceleration (3,) turns."""
     x, y, z = v[1] * a[2] - v[2] * a[1], v[2] * a[0] - v[0] * a[2], v[0] * a[1] - v[1] * a[0]
-    return np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _SLOW**2)
+    rate = np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _SLOW**2)
+    return min(rate, _FASTEST)
 
 
 @njit
