@@ -211,22 +211,22 @@ def _begin(parts: Parts, servo: Servo, world: World) -> None:
     """Put stylus and figure where the run begins."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), moves)
-    if world.kind == "none":
-        world.reset(begin.point, rest_pose())
-        return
-    argument = stylus_path(begin.point[None]) if parts.walker is None else servo.argument[None]
-    poses = np.empty((1, whole_map.nq))
-    poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
-    if parts.bends:
-        stood(packed_legs(world.figure), poses[0])
     # Where its orientation matters, the stylus begins as the curve and the first pose have it.
     orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
-    if not moves:
-        world.reset(begin.point, poses[0], orientation)
-        return
-    world.reset(begin.point, poses[0], orientation, begin.velocity, _velocity(whole_map, argument[0], begin))
-    begin_in_motion(reference, np.array(begin))
-    if isinstance(servo.device, SimulatedPhantom):
+    stylus = begin.velocity if moves else None
+    if world.kind == "none":
+        world.reset(begin.point, rest_pose(), orientation, stylus)
+    else:
+        argument = stylus_path(begin.point[None]) if parts.walker is None else servo.argument[None]
+        poses = np.empty((1, whole_map.nq))
+        poses_along(reference.kind, reference.params, reference.memory.copy(), argument, poses)
+        if parts.bends:
+            stood(packed_legs(world.figure), poses[0])
+        figure = _velocity(whole_map, argument[0], begin) if moves else None
+        world.reset(begin.point, poses[0], orientation, stylus, figure)
+        if moves:
+            begin_in_motion(reference, np.array(begin))
+    if moves and isinstance(servo.device, SimulatedPhantom):
         sense_in_motion(servo.device.port)
 
 

@@ -36,7 +36,7 @@ def recording_of(path: Path, down: np.ndarray) -> Recording:
     flight[100:120] = 1.0
     residual = np.where(flight[:, None] > 0.0, 0.0, np.array([3.0, 4.0, 0.0, 0.0, 0.0, 2.0]))
     residual[220] = [0.0, 0.0, 70.0, 0.0, 7.0, 0.0]  # in the air, where it should stand
-    ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user}
+    ticks = {"t": t, "p": p, "nearest": nearest, "distance": distance, "phase": phase, "user": user, "force": -user}
     ticks |= {"river": np.full(N, -1.0), "tank": 0.1 - 0.02 * t}
     ticks["tank_scale"] = np.where((t >= 3.0) & (t < 3.1), 0.5, 1.0)
     ground = np.tile([0.0, 0.0, 700.0], (m, 1))
@@ -104,6 +104,8 @@ def test_what_was_put_in_comes_out(tmp_path: Path) -> None:
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
+    # A push of half a second is no shaking.
+    assert (summary.oscillation.since, summary.oscillation.share) == (None, 0.0)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)
     assert len(summary.lines()) == 9
     assert summary.path.pace == pytest.approx(1.2 / 1.5)
