@@ -43,17 +43,25 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
     return Clip(poses, (frames - 1) / seconds, "along the curve")
 
 
-def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Array:
+def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
     """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
 
     What is judged is the animation h∘φ that the map makes of the curve: the clip itself where the curve is in a place
     of one clip only, and the blend, in the map's own time alignment, where it is between several. A blend in which
-    nobody leaves the floor has no flight, whatever its clips do. Parameters are those of `animation_along`.
+    nobody leaves the floor has no flight, whatever its clips do.
+
+    Parameters
+    ----------
+    haptic_map, curve, river
+        Of `animation_along`.
+    course : Trajectory, optional
+        The curve as a field leads along it, through the same samples at other times (`pace.course_of`); by default
+        as it is.
 
     Returns
     -------
     Array, shape (m, 2)
-        At m phases equally spaced from the curve's start to its end.
+        At m phases equally spaced from the course's start to its end.
 
     Raises
     ------
@@ -64,18 +72,22 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Arra
         clip_ballistics,  # statistics take long to import, for a run without a governor
     )
 
-    clip = animation_along(haptic_map, curve, river)
-    share = np.linspace(0.0, 1.0, clip.n_frames)
+    clip, led = animation_along(haptic_map, curve, river), curve if course is None else course
+    phases = np.interp(np.linspace(led.start, led.end, clip.n_frames), led.times, curve.times)
+    share = np.clip((phases - curve.start) / curve.duration, 0.0, 1.0)
     # |φ̇| when a pass takes as long as the clips do.
-    recorded = np.linalg.norm(curve.velocity(curve.start + share * curve.duration), axis=1) * curve.duration
+    recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
     low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration)
     # What rises for ever falls at no rate: nothing can be asked of the hand.
     low = np.where(np.isfinite(low), low, 0.0)
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 
-def governed(governor: SpeedGovernor | None, law: Law, curve: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
-    """A field over a curve with the governor of the animation under it, and the speed [m/s] to which that urges a hand.
+def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
+    """A field over a course with the governor of the animation under it, and the speed [m/s] to which that urges a hand.
+
+    What is judged is the animation at the pace of the map's own curve: to that the Phantom's friction brings a hand
+    which is led along the course.
 
     Raises
     ------
@@ -84,8 +96,8 @@ def governed(governor: SpeedGovernor | None, law: Law, curve: Trajectory, maps: 
     """
     if governor is None:
         return law, 0.0
-    speeds = speeds_along(maps.haptic_map, curve)
-    made = Governor(curve, speeds, governor.governor_drag, maps.reach)
+    speeds = speeds_along(maps.haptic_map, maps.curve, course=course)
+    made = Governor(course, speeds, governor.governor_drag, maps.reach)
     return Governed(law, made), float(speeds[:, 0].max())
 
 

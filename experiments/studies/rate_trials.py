@@ -26,8 +26,7 @@ from experiments.setups.governor import speeds_along
 from experiments.setups.rivers import GATE, HYSTERESIS, SIGMA
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
-from models.humanoid.skeleton import N_POSE
-from models.scene import FIGURE
+from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
@@ -69,7 +68,7 @@ class Bench:
     Attributes
     ----------
     curve : Trajectory
-        φ.
+        φ, as the map has it: no field that makes up for friction leads along it.
     speeds : Array
         Least and greatest speed [m/s] at equal steps of the phase, shape (m, 2).
     flight : tuple of two floats
@@ -77,9 +76,9 @@ class Bench:
     """
 
     def __init__(self) -> None:
-        self._config = run_config(clips=("backflip",), lap=2.7, tube=TUBE)
+        self._config = run_config(clips=("backflip",), figure="none", lap=2.7, tube=TUBE)
         session = self._session()
-        self.curve = session.curve
+        self.curve = session.parts.maps.curve
         clip_map = session.parts.maps.haptic_map
         assert isinstance(clip_map, ClipMap)
         self.speeds = speeds_along(clip_map, self.curve)
@@ -121,9 +120,7 @@ class Bench:
     def led(self, program: Program, way: Array) -> Passage:
         """Lead a hand along a way, in steps of `STEP`, in a field."""
         session = self._session()
-        plant = session.servo.plant
-        root = int(session.world.model.joint(FIGURE + "root").qposadr[0])
-        session.world.reset(way[0], plant.qpos[root : root + N_POSE].copy())
+        session.world.reset(way[0], rest_pose())
         field = session.servo.field.of(program)
         phantom = session.servo.device
         assert isinstance(phantom, SimulatedPhantom)

@@ -58,7 +58,21 @@ def test_a_run_governs_its_field_by_its_own_animation():
     config = run_config(clips=("backflip",), governor=True, seconds=1.0)
     session = wire(config)
     assert isinstance(session.field, Governed)
-    assert session.field.governor.speeds[:, 0].max() > session.curve.length / config.map.around.lap
+    maps, governor = session.parts.maps, session.field.governor
+    # At the clips' own pace, neither at that of a lap nor at that which the field leads at to make up for friction.
+    pace, shares = maps.curve.length / maps.lap_seconds, np.linspace(0.0, 1.0, len(governor.speeds))
+    assert maps.lap_seconds != pytest.approx(config.map.around.lap, rel=0.1)
+    assert session.curve.duration < 0.95 * config.map.around.lap
+    (flight,) = clip_ballistics(embedded("backflip")).flights
+    flying = governor.speeds[:, 0] > 0.0
+    np.testing.assert_allclose(governor.speeds[flying], np.tile(pace * np.array(flight.admissible), (flying.sum(), 1)),
+                               rtol=5e-3)  # fmt: skip
+    # And where the clip flies: each of its flights over the lap begins at the stylus' place at that time.
+    begins = session.curve.point(session.curve.start + session.curve.duration * shares[1:][np.diff(flying * 1) > 0])
+    clip = embedded("backflip")
+    laps = np.arange(round(maps.lap_seconds / clip.duration))
+    own = (laps * clip.duration + flight.fit.time) / maps.lap_seconds * maps.curve.duration
+    np.testing.assert_allclose(begins, maps.curve.point(maps.curve.start + own), atol=1.5e-3)
     plain = wire(run_config(clips=("backflip",), seconds=1.0), session.clips)
     assert session.servo.field.budget[0] > plain.servo.field.budget[0]
     gated = wire(run_config(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True), load_clips(
