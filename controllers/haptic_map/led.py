@@ -26,7 +26,7 @@ from controllers.legs.limbs import END, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
-from controllers.motion.loops import checked_clip, closed_loop, turned, yawed
+from controllers.motion.loops import checked_clip, forward_loop, turned, yawed
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
 from controllers.walking.walked_path import (
@@ -202,7 +202,7 @@ class Led(HapticMap):
     Parameters
     ----------
     clip : (Array, float)
-        Poses (n, nq) and frames per second. A clip that does not close is closed (`closed_loop`).
+        Poses (n, nq) and frames per second. A clip that does not close is closed (`forward_loop`).
     limbs : sequence of Limb
         Legs whose feet stand.
     phase : float
@@ -244,7 +244,7 @@ class Led(HapticMap):
     ) -> None:
         self._made_of = (clip, tuple(limbs), phase, standing, capture)
         poses, fps = clip
-        loop = closed_loop(checked_clip(poses, fps, "the clip that is led"), fps)
+        loop = forward_loop(checked_clip(poses, fps, "the clip that is led"), fps)
         self.phase = phase
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration

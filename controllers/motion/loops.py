@@ -224,13 +224,16 @@ def there_and_back(poses: Array, fps: float) -> Array:
 
 
 def closed_loop(poses: Array, fps: float) -> Loop:
+    """Loop of a clip; one that is open and about rests at both ends is played there and back (`there_and_back`)."""
+    return forward_loop(there_and_back(poses, fps), fps)
+
+
+def forward_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip of poses (n, nq) that passed `checked_clip`, moved to the origin and facing +x on average.
 
-    An open clip that about rests at both ends is played there and back (`there_and_back`). Another one that does not
-    close by itself is made to: over the first and last fifth of the lap its ends are led half way to each other by
-    quintics, so that value, slope and second derivative meet.
+    A clip that does not close by itself is made to: over the first and last fifth of the lap its ends are led half way
+    to each other by quintics, so that value, slope and second derivative meet.
     """
-    poses = there_and_back(poses, fps)
     s = np.linspace(0.0, 1.0, len(poses))
     placed = placed_at_origin(poses, s)
     drift = drift_of(placed)

@@ -166,6 +166,9 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
     root, segments, slope = levelled(root, segments, motion.fps)
+    if slope:  # which turns a body that does not look straight up or down the slope
+        ahead = _world_axes(segments[0, 0], _Z)
+        root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
     remarks: list[str] = []
     if slope:
