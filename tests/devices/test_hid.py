@@ -38,7 +38,7 @@ def driver(handle: FirmwareHandle, clock: Clock) -> HidPhantom:
 
 
 def test_a_device_says_who_it_is(driver: HidPhantom, firmware: Firmware) -> None:
-    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot)
+    assert driver.identity == ("Reference", "in memory", "HVF-0001", "1.0", True, True, True, firmware.boot, False)
 
 
 def test_angles_are_the_joints_to_half_a_count(driver: HidPhantom, handle: FirmwareHandle, firmware: Firmware) -> None:
