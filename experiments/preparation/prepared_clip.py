@@ -10,7 +10,6 @@ from experiments.files.kept import kept_array
 from experiments.working import working
 from models.mocap.clip import Clip
 from models.mocap.library import load
-from models.mocap.preparation.prepare import prepared
 from sim.compilation.sources import kept_folder
 
 
@@ -42,6 +41,7 @@ def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
     loaded = load(path)
     if raw or loaded.report is None:
         return PreparedClip(loaded.clip, () if loaded.report is None else loaded.report.lines())
+    from models.mocap.preparation.prepare import prepared  # brings signal processing with it
 
     def find() -> npt.NDArray[np.float64]:
         with working(f"preparing {path.name}"):

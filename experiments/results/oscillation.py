@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from controllers.safety.oscillation import OscillationDetector, shaken
 from controllers.state import Array
@@ -105,6 +104,8 @@ class _Fast:
     """Force and motion above the detector's corner, in blocks."""
 
     def __init__(self, period: float) -> None:
+        from scipy.signal import butter  # a run begins without it
+
         self._period = period
         corner = OscillationDetector(period).corner
         self._sections: Array = np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos"))
@@ -114,6 +115,8 @@ class _Fast:
         self._envelope: list[float] = []
 
     def add(self, force: Array, away: Array, found: npt.NDArray[np.bool_]) -> None:
+        from scipy.signal import sosfilt
+
         if not self._envelope:
             # A run begins with a force and a place, not with a step to them.
             for state, values in zip(self._states, (force, away), strict=True):
@@ -147,4 +150,6 @@ class _Fast:
 
 def _settled(sections: Array, value: Array) -> Array:
     """State of the filter that has seen a constant for ever."""
+    from scipy.signal import sosfilt_zi
+
     return sosfilt_zi(sections)[:, :, None] * value

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.preparation import prepared_clip
 from experiments.setups.clips import load_clips
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, load
-from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation import prepare
 from models.mocap.readers.own_bvh import write_bvh
 from tests.models.mocap.rigs import random_rig, write_rig
 
@@ -33,8 +32,8 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
             loaded = load(path).clip
             self.clip = Clip(loaded.poses[::2], loaded.fps / 2.0, loaded.name)
 
-    Made.__module__ = prepared.__module__
-    monkeypatch.setattr(prepared_clip, "prepared", Made)
+    Made.__module__ = prepare.__name__
+    monkeypatch.setattr(prepare, "prepared", Made)
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "cache"))
     return found
 
