@@ -1,10 +1,11 @@
 """What a certificate is of, and whether it still is: laws, gains, curve, clock, device, hands, clips and code.
 
-Nothing here needs CasADi, so a stored certificate is checked without starting it.
+Nothing that a check needs brings CasADi or splines: curves enter as they are given, not as they are led along.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -23,44 +24,61 @@ from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
+_Timed = Callable[[Trajectory], Trajectory]
+"""From a curve to how a field leads along it."""
+
 
 def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
-    """The curve of a run by "", and the other ones of a lifted map's file by its clips' names.
+    """The curve along which a run leads by "", and those of the other curves of a lifted map's file by clips' names.
 
     Raises
     ------
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach it, or there is no such map.
     """
-    return MAP_CURVES[config.map.kind](config, config.map)
+    from experiments.setups.pace import course_of
+
+    return MAP_CURVES[config.map.kind](config, config.map, partial(course_of, drag=leading_drag(config)))
 
 
-def _lead_curve(config: RunConfig, part: Led) -> dict[str, Trajectory]:
+def given_curves(config: RunConfig) -> dict[str, Trajectory]:
+    """The curves of `certified_curves` as the map has them: with gains and device, all that those depend on.
+
+    Raises
+    ------
+    ParameterError, SimError, OSError
+        If the map has no such curve, the Phantom does not reach a lifted one, or there is no such map.
+    """
+    return MAP_CURVES[config.map.kind](config, config.map, _as_given)
+
+
+def _as_given(curve: Trajectory) -> Trajectory:
+    return curve
+
+
+def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajectory]:
     from experiments.setups.lead import s_curve  # brings splines with it, which a check of gains does not need
 
     return {"": s_curve()}
 
 
-def _circle(config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile) -> dict[str, Trajectory]:
-    from experiments.setups.pace import course_of
-
+def _circle(
+    config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile, timed: _Timed
+) -> dict[str, Trajectory]:
     circle = Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)
-    return {"": circle if isinstance(config.mode, Rivers) else course_of(circle, leading_drag(config))}
+    return {"": circle if isinstance(config.mode, Rivers) else timed(circle)}
 
 
-def _curves_of_file(config: RunConfig, part: MapFile) -> dict[str, Trajectory]:
+def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str, Trajectory]:
     from experiments.files.map_files import Lifted, load_map
     from experiments.setups.lifted_runs import curve_number, lifted_curve
-    from experiments.setups.pace import course_of
 
     found = load_map(Path(part.file))
     if not isinstance(found, Lifted):
-        return _circle(config, part)
+        return _circle(config, part, timed)
     first = found.names[curve_number(found, part.curve)]
     names = [first, *(name for name in found.names if name != first)]
-    drag = leading_drag(config)
-    courses = [course_of(lifted_curve(found, name), drag) for name in names]
-    return {"" if name == first else f"_{name}": course for name, course in zip(names, courses, strict=True)}
+    return {"" if name == first else f"_{name}": timed(lifted_curve(found, name)) for name in names}
 
 
 MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
@@ -130,7 +148,7 @@ def certificate_inputs(
         "gains": (certified_laws(config), resolved(config).mode),
         "added": config.map if left_out(config) or governor_drag(config) else None,
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
-        "curve": certified_curves(config),
+        "curve": given_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
         "judging": judging,
         "figure": (config.figure.stature, config.figure.mass, mode.floor_scale) if isinstance(mode, Lead) else None,

@@ -5,19 +5,21 @@ is cheap: the loops of all hands do not depend on the gains and are kept, so a v
 pair of gains; the margin, which takes a search, comes after it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from controllers.certificates.loop.governed import most_drag
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import MOST_STIFFNESS, River, critical_stiffness, lap_multipliers
+from controllers.certificates.report import Outcome, Verdict, leaving_out
 from controllers.errors import ControllerError
 from experiments.certify.certify import certified_rivers
 from experiments.config.run_config import RunConfig
-from experiments.setups.certified_law import certified_laws
+from experiments.setups.certified_law import certified_laws, governor_drag, left_out
 from sim.errors import SimError
 
 
@@ -29,7 +31,7 @@ class GainVerdict(NamedTuple):
     law : str
         What it is the law of: "field", "held tube", "performance".
     verdict : {"certified", "refuted", "unknown"}
-        Of its linear stability along the curve.
+        Of its linear stability along the curve, with all that the run executes besides.
     reason : str
         In one line.
     margin : float or None
@@ -39,7 +41,7 @@ class GainVerdict(NamedTuple):
     """
 
     law: str
-    verdict: str
+    verdict: Outcome
     reason: str
     margin: float | None
     passive: str
@@ -64,12 +66,14 @@ class GainVerdicts:
                 said = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
                 yield (GainVerdict("field", "unknown", said, None, ""),)
                 return
-            rivers = certified_rivers(config)
+            rivers, drag, missing = certified_rivers(config), governor_drag(config), left_out(config)
         except (ControllerError, SimError) as error:
             yield (GainVerdict("field", "unknown", str(error), None, ""),)
             return
-        yield tuple(self._quick(name, river) for name, river in rivers.items())
-        yield tuple(self._whole(name, river) for name, river in rivers.items())
+        for judge in (self._quick, self._whole):
+            found = ((river, judge(name, river)) for name, river in rivers.items())
+            governed = (verdict if drag == 0.0 else self._governed(river, drag, verdict) for river, verdict in found)
+            yield tuple(verdict if not missing else _leaving_out(verdict, missing) for verdict in governed)
 
     def _quick(self, name: str, river: River) -> GainVerdict:
         key = (name, *_key(river), river.k_r, river.b_d)
@@ -108,6 +112,18 @@ class GainVerdicts:
             self._critical[key] = min(float(critical_stiffness(loop, river.b_d, least).min()) for loop in still)
         return quick._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _LEAST) - 1.0)
 
+    def _governed(self, river: River, drag: float, alone: GainVerdict) -> GainVerdict:
+        """The verdict on a river with a governor of some drag [N s/m], by the circle criterion alone."""
+        if alone.verdict != "certified":
+            return alone
+        certain = min(most_drag(loop, river.k_r, river.b_d) for loop in self._of_river(river)[0])
+        said = f"governor of {drag:g} N s/m, certain up to {certain:.3g}"
+        margin = None if alone.margin is None else min(alone.margin, certain / drag - 1.0)
+        if certain > drag:
+            return alone._replace(reason=f"{alone.reason}; {said}", margin=margin)
+        reason = f"{said}; hvf certify says whether it shakes; {alone.reason}"
+        return alone._replace(verdict="unknown", reason=reason, margin=margin)
+
     def _of_river(self, river: River) -> tuple[list[SampledLoop], list[SampledLoop]]:
         key = _key(river)
         if key not in self._loops:
@@ -116,6 +132,11 @@ class GainVerdicts:
             carries = river.curve.periodic and river.law.carries
             self._loops[key] = still, [SampledLoop(river.moving(hand), river.sampling) for hand in hands if carries]
         return self._loops[key]
+
+
+def _leaving_out(found: GainVerdict, laws: Sequence[str]) -> GainVerdict:
+    whole = leaving_out(Verdict(found.verdict, found.reason), laws)
+    return found._replace(verdict=whole.verdict, reason=whole.reason)
 
 
 def _key(river: River) -> tuple[object, ...]:

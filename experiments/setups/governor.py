@@ -73,7 +73,8 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
     )
 
     clip, led = animation_along(haptic_map, curve, river), curve if course is None else course
-    phases = np.interp(np.linspace(led.start, led.end, clip.n_frames), led.times, curve.times)
+    shown = np.linspace(led.start, led.end, clip.n_frames)
+    phases = np.interp(shown, np.asarray(led.times), np.asarray(curve.times))
     share = np.clip((phases - curve.start) / curve.duration, 0.0, 1.0)
     # |φ̇| when a pass takes as long as the clips do.
     recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
@@ -84,7 +85,7 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
 
 
 def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
-    """A field over a course with the governor of the animation under it, and the speed [m/s] to which that urges a hand.
+    """A field over a course with the governor of the animation under it, and the speed [m/s] to which it urges a hand.
 
     What is judged is the animation at the pace of the map's own curve: to that the Phantom's friction brings a hand
     which is led along the course.

@@ -161,7 +161,14 @@ def test_a_clips_certificate_is_kept_with_its_page_and_notices_what_it_is_judged
     assert "changed: judging;" in capsys.readouterr().err
     assert main([*check, "walk"]) == 1
     assert "changed: clip;" in capsys.readouterr().err
-    assert main([*clip, "--tolerance.gravity", "9.0", "9.81001"]) == 0
+    other = [*clip, "--tolerance.gravity", "9.0", "9.81001"]
+    assert main(other) == 2
+    assert "holds a certificate of something else" in capsys.readouterr().err
+    assert (out / CERTIFICATE).stat().st_mtime_ns == written
+    assert main([*other, "--overwrite"]) == 0
+    assert (out / CERTIFICATE).stat().st_mtime_ns != written
+    assert main([*check, "jump"]) == 1
+    assert "changed: judging;" in capsys.readouterr().err
     assert main([*clip, "--friction", "0"]) == 2
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err
     assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
