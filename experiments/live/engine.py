@@ -138,6 +138,8 @@ class Engine:
     def set_gains(self, config: RunConfig) -> None:
         """Take over the numbers of a configuration's mode, while it runs.
 
+        A curve that is bent in the memory keeps the pace that it was given: bends are kept by its phases.
+
         Raises
         ------
         ControllerError
