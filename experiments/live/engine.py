@@ -217,7 +217,7 @@ class Engine:
         self._initial = program.memory.copy()
         laws = program.ops[program.ops[:, 0] >= 0]
         for row, law in zip(laws.tolist(), program.laws, strict=True):
-            if law is self.tubes:
+            if self.tubes is not None and law is self.tubes:
                 self._record = self.tubes.record_at(row[2])
                 return row[1] + StretchyGains._fields.index("until")
         return 0
