@@ -12,6 +12,7 @@ from controllers.errors import CurveError
 from controllers.state import Array
 
 _GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grabbed phase
+_LONGEST = 10_000  # half widths in a curve: 160 000 steps, a hundred megabytes
 _SAME = 1e-9  # of a step of the grid: breaks nearer than that are one
 
 
@@ -65,11 +66,17 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     Raises
     ------
     CurveError
-        If h is not positive, or a bump would be longer than the curve, or nothing could be undone.
+        If h is not positive, or a bump would be longer than the curve or shorter than 1/10 000 of it, or nothing could
+        be undone.
     """
     if not 0.0 < width <= 0.5 * curve.duration:
         raise CurveError(
             f"a bump's half width must be above 0 s and at most half of the curve's {curve.duration:g} s, got {width}"
+        )
+    if curve.duration > _LONGEST * width:
+        raise CurveError(
+            f"a curve of {curve.duration:g} s cannot be bent by bumps of a half width of {width:g} s; expected "
+            f"{curve.duration / _LONGEST:g} s or more"
         )
     if depth < 1:
         raise CurveError(f"at least 1 edit must be undoable, got {depth}")

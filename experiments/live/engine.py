@@ -138,6 +138,8 @@ class Engine:
     def set_gains(self, config: RunConfig) -> None:
         """Take over the numbers of a configuration's mode, while it runs.
 
+        A curve that is bent in the memory keeps the pace that it was given: bends are kept by its phases.
+
         Raises
         ------
         ControllerError
@@ -215,7 +217,7 @@ class Engine:
         self._initial = program.memory.copy()
         laws = program.ops[program.ops[:, 0] >= 0]
         for row, law in zip(laws.tolist(), program.laws, strict=True):
-            if law is self.tubes:
+            if self.tubes is not None and law is self.tubes:
                 self._record = self.tubes.record_at(row[2])
                 return row[1] + StretchyGains._fields.index("until")
         return 0

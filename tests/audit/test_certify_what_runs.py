@@ -171,11 +171,11 @@ LAWS = {
         lambda: governed_stability(river(BUNNY_LAW, width=0.05), 0.0, [HandImpedance()]),
     ),
     "seek": (
-        StretchyTubes(STILL, 150.0, 150.0, 14.0),
+        StretchyTubes(STILL, 150.0, 150.0, 14.0, width=STILL.duration / 8.0),
         lambda: governed_stability(river(SEEK_LAW, 150.0, 14.0, np.inf), 0.0, [HandImpedance()]),
     ),
     "seek, too damped": (
-        StretchyTubes(STILL, 150.0, 150.0, 120.0),
+        StretchyTubes(STILL, 150.0, 150.0, 120.0, width=STILL.duration / 8.0),
         lambda: governed_stability(river(SEEK_LAW, 150.0, 120.0, np.inf), 0.0, [HandImpedance()]),
     ),
     "governor": (

@@ -221,6 +221,7 @@ def test_the_curve_read_back_has_the_coefficients_of_the_servo() -> None:
         (lambda: EditableCurve(_circle(), 0.0), "above 0 s"),
         (lambda: EditableCurve(_circle(), 2.1), "at most half of the curve's 4 s, got 2.1"),
         (lambda: EditableCurve(_circle(), np.nan), "nan"),
+        (lambda: EditableCurve(_circle(), 3e-4), "half width of 0.0003 s; expected 0.0004 s or more"),
         (lambda: EditableCurve(_circle(), 0.5, depth=0), "at least 1 edit"),
         (lambda: EditableCurve(_circle(), 0.5).carry_to([0.0, 0.0, 0.0]), "held: False"),
     ],

@@ -103,13 +103,31 @@ def test_a_bent_curve_is_performed_when_it_is_asked_for_and_not_before():
 def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
     it = engine(mode)
     for gain, value in gains_of(it.config).items():
-        it.set_gains(with_gain(it.config, gain.name, 1.25 * value))
+        # What paces a curve that can be bent: of the test below.
+        if (mode, gain.name) != ("stretch-then-follow", "damping"):
+            it.set_gains(with_gain(it.config, gain.name, 1.25 * value))
     other = engine(mode, **{gain.name: value for gain, value in gains_of(it.config).items()})
     for _ in range(60):
         it.advance()
         other.advance()
     np.testing.assert_array_equal(it.stylus, other.stylus)
     np.testing.assert_array_equal(it.logs[0].force, other.logs[0].force)
+
+
+def test_a_curve_that_can_be_bent_keeps_its_pace_while_the_damping_that_paced_it_moves():
+    it, same = engine("stretch-then-follow"), engine("stretch-then-follow")
+    other = engine("stretch-then-follow", damping=20.0)
+    record = it.tubes.record_at()
+    assert len(other.memory) != len(it.memory) or np.any(other.memory[record:] != it.memory[record:])
+    it.set_gains(with_gain(it.config, "damping", 20.0))
+    np.testing.assert_array_equal(it.memory[record:], same.memory[record:])
+    np.testing.assert_array_equal(it.memory[:record], other.memory[:record])
+    assert np.any(it.memory[:record] != same.memory[:record])
+    for one in (it, same):
+        one.perform(True)
+        run(one, 1.0)
+    assert it.tubes.edited(it.memory).duration == same.tubes.edited(same.memory).duration
+    assert np.any(it.stylus != same.stylus)
 
 
 def test_other_parts_are_no_gains():

@@ -20,7 +20,7 @@ from sim.loop.loop import Loop, make_logs, tick_channels
 from sim.loop.servo import run_block
 from sim.users.arm import Arm
 from sim.world.encoders import PEAK_TORQUE
-from sim.world.phantom_port import actuate, phantom_port, sense, true_motion
+from sim.world.phantom_port import actuate, phantom_port, sense, sense_in_motion, true_motion
 from sim.world.world import World, phantom_angles
 from tests.sim.bare_servos import Stepped
 
@@ -140,6 +140,7 @@ def test_the_device_called_from_python_does_what_the_compiled_loop_does(clips: t
     arm = Arm(pushes=CONFIG.user.pushes)
     field = stepped.servo.field
     phantom, path = Stepped(stepped.world, arm, CONFIG.device.cutoff), []
+    sense_in_motion(phantom.device.port)
     for _ in range(300):
         hand = phantom.read().vector()
         evaluate(field.units, field.ops, field.params, field.memory, hand, field.wrench)
