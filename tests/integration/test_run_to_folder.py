@@ -80,7 +80,7 @@ def test_a_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys:
     told = json.loads(capsys.readouterr().out)
     assert told["stability"]["verdict"] == "certified"
     assert told["ballistic"]["verdict"] == "certified"
-    assert set(told["ballistic"]["figures"]["clips"]) == {"cheer", "angry"}
+    assert set(told["ballistic"]["figures"]["clips"]) == {"cheer", "angry", "as played"}
     assert main([*command, "--verify", str(tmp_path / "certificate.json")]) == 0
     assert main(["certify", "--no-hand", "--verify", str(tmp_path / "certificate.json")]) == 1
     assert "changed: clips;" in capsys.readouterr().err
