@@ -113,7 +113,7 @@ def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip
             assert places[..., 2].min() > -0.007, (r, z, rows)
 
 
-# The walk's legs carry the arms of the other three: at its own pace their mean would lack 0.14 at most, 0.04 on average.
+# The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
 @pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
 def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most, usual):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
