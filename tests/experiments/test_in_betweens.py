@@ -113,8 +113,9 @@ def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip
             assert places[..., 2].min() > -0.007, (r, z, rows)
 
 
-@pytest.mark.parametrize(("clips", "most"), [(FIGURE_CLIPS, 0.04), (STANDING, 0.06)])
-def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most):
+# The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
+@pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
+def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most, usual):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
         poses = laps(maps[clips], r, z, count=1.0 + 4 / ROWS)
@@ -125,7 +126,7 @@ def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most):
         shares.append(float(np.sqrt((left**2).sum(axis=1).mean())))
     # Hicks et al. 2015: good below 5 %; where a walk has just begun to fade, a little more.
     assert max(shares) < most
-    assert np.mean(shares) < 0.025
+    assert np.mean(shares) < usual
 
 
 def test_the_nearest_supported_point_is_that_of_the_convex_hull():
