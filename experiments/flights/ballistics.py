@@ -27,6 +27,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.poses import sole_points
 from sim.body.clip_motion import clip_motion
+from sim.body.figure_state import REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, tracked_motion
 
 _LIFT = 10.0  # flown so high that nothing but gravity acts [m]
@@ -211,5 +212,5 @@ def fly(clip: Clip, fit: FlightFit, rate: float) -> FlightTrial:
         distance=float(np.linalg.norm(flown - com, axis=1).max()),
         predicted=played.distance,
         turn=float(np.linalg.norm(turn, axis=1).max()),
-        residual=float(np.abs(done.reports[:, 2:]).max()),
+        residual=float(np.abs(done.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]).max()),
     )

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 from models.humanoid.skeleton import BODIES, JOINTS, figure_model, rest_pose, torque_limit
 from sim.body.feedback import rotation_error, turned
 from sim.body.figure import CONTACTS, Figure, FigureGains
+from sim.body.figure_state import REPORT_RESIDUAL, REPORT_SATURATED, REPORT_SUPPORT
 from sim.body.stance import N_LEG, stance_response
 from sim.body.tracking import TrackingConfig, floor_world
 from sim.errors import SimError
@@ -127,7 +128,7 @@ def test_standing_takes_no_help_and_the_ground_bears_the_weight():
     for k in range(1000):
         if k % 4 == 0:
             figure.update(pose, STILL, STILL)
-            assert np.abs(figure.state.report[2:]).max() < 1.0
+            assert np.abs(figure.state.report[REPORT_RESIDUAL : REPORT_RESIDUAL + 6]).max() < 1.0
         mujoco.mj_step(model, data)
         total += data.qfrc_constraint[2] / 1000
     assert total == pytest.approx(figure.state.weight, rel=0.02)
@@ -166,7 +167,7 @@ def test_a_standing_reference_cannot_hold_a_falling_figure():
     pose[2] -= 0.3
     figure.update(pose, STILL, STILL)
     assert np.all(data.qfrc_applied == 0.0)
-    assert figure.state.report[0] == 0.0
+    assert figure.state.report[REPORT_SUPPORT] == 0.0
 
 
 def test_the_residual_stays_within_its_bounds():
@@ -189,7 +190,7 @@ def test_a_saturated_motor_keeps_its_limit_and_its_joint_gives_way():
     figure.update(pose, STILL, a_r)
     assert data.ctrl[elbow - 6 + 2] == pytest.approx(10.0)
     assert 0.0 < figure.state.acceleration[elbow + 2] < 400.0
-    assert figure.state.report[1] == 1
+    assert figure.state.report[REPORT_SATURATED] == 1
     np.testing.assert_allclose(_imbalance(model, data, figure), 0.0, atol=0.1)
 
 
