@@ -24,8 +24,8 @@ class FigureGains(NamedTuple):
     joint_rate, root_rate : float
         ω of the critically damped feedback on joints and root [1/s]. They are alike: a foot that stands hangs on
         both, and where the root comes back at another rate than the joints, one feedback moves the foot and the floor
-        holds it. `hvf track walk` has 1.0 % with 25 and 25, 12 % with 25 and 40. Stiffer ones hold more of a landing
-        against the floor: a run led by a hand has 7.9 % with 40, 6.0 with 25, 5.4 with 20.
+        holds it. `hvf track walk` has 1.2 % with 40 and 40, 12 % with 25 and 40. With 25 and 25 landings of the run are
+        softer, and a figure that is led comes back less exactly.
     joint_reach : float
         Largest error of a joint that the feedback acts on [rad]: beyond, it comes back at a steady speed, ω/2 times
         this, and its motors have torque left to stop it with.
@@ -50,8 +50,8 @@ class FigureGains(NamedTuple):
         How far ahead the reference is looked at for contact points about to be lifted [s].
     """
 
-    joint_rate: float = 25.0
-    root_rate: float = 25.0
+    joint_rate: float = 40.0
+    root_rate: float = 40.0
     joint_reach: float = 0.15
     root_pull: float = 30.0
     root_turn: float = 300.0

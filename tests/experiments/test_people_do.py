@@ -132,4 +132,4 @@ def test_who_leads_takes_the_figure_along_a_path(tmp_path: Path) -> None:
     lead = summary_of(tmp_path, mode="lead", person="median", figure="kinematic", seconds=8.0).lead
     assert lead is not None
     assert lead.length_m > 2.0
-    assert lead.slide_cm < 2.0
+    assert lead.slide_cm < 3.0  # as of any led figure
