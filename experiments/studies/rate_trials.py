@@ -33,6 +33,7 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
+from sim.world.phantom_port import sense_in_motion
 
 DRAG, TUBE = 8.0, 0.015  # of governor and river [N s/m], [m]
 SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]
@@ -124,6 +125,7 @@ class Bench:
         field = session.servo.field.of(program)
         phantom = session.servo.device
         assert isinstance(phantom, SimulatedPhantom)
+        sense_in_motion(phantom.port)  # which is none: the way begins at rest
         device = phantom.held_by(Arm(400.0, 10.0, way, STEP))
         servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
