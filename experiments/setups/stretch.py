@@ -78,7 +78,10 @@ class _Performance(NamedTuple):
 
 
 def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
-    grabs = config.user.grabs or stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
+    by_default = stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
+    if config.user.person is not None:  # who does not click where the stylus happens to be
+        by_default = tuple(grab for grab in by_default if grab.place is not None)
+    grabs = config.user.grabs or by_default
     return resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
 
 
