@@ -14,7 +14,7 @@ from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
 from experiments.setups.certified_law import governor_drag, left_out
 from experiments.setups.defaults import resolved
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 
 _SEVERITY = ("certified", "unknown", "refuted")
 
@@ -50,7 +50,7 @@ def kept_stability(config: RunConfig) -> Stability:
         inputs = certificate_inputs(config, 0.0, hands, 1.0)
     except ControllerError as error:
         return Stability("unknown", None, str(error))
-    file = CACHE_FOLDER / f"stability-{hash_of(inputs)}.json"
+    file = kept_folder(__name__) / f"stability-{hash_of(inputs)}.json"
     with suppress(OSError, ValueError, TypeError):
         return Stability(**json.loads(file.read_text(encoding="utf-8")))
     found = _found(config, hands)

@@ -7,7 +7,6 @@ stance.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from controllers.state import Array
 from experiments.files.kept import kept_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.clip import Clip
-from sim.compilation.compiled import CACHE_FOLDER
+from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] more than the clips' median: from there on they do not move alike
@@ -80,34 +79,34 @@ def moves_alike(made: Cylindrical, lap: float) -> bool:
     """
     if all(np.array_equal(poses, made.clips[0][0]) for poses, _ in made.clips):
         return True
-    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
 
     def find() -> Array:
-        return np.array([_motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
+        return np.array([motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
-    found = kept_array(CACHE_FOLDER, "alike", (made.compiled().params, np.array([lap]), code), (5, 4), find)
+    found = kept_array(kept_folder(__name__), "alike", (made.compiled().params, np.array([lap])), (5, 4), find)
     usual = np.median(found[1:], axis=0)
     return bool(found[0, 0] < usual[0] + LACKS and found[0, 2] < usual[2] + SKATES)
 
 
 def carries_alike(made: Composite, lap: float) -> bool:
     """Whether legs of a composite map lack little more under the upper bodies of other clips than under their own."""
-    code = np.frombuffer(Path(__file__).read_bytes(), dtype=np.uint8)
     lower = made.clips[0]
     own = Composite(lower, lower, lower, made.upper_joints, made.r_range, made.limbs, made.lap)
 
     def find() -> Array:
-        return np.array([_motion_at(own, _MIDDLE, lap), *(_motion_at(made, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))])
+        return np.array([motion_at(own, _MIDDLE, lap), *(motion_at(made, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))])
 
-    found = kept_array(CACHE_FOLDER, "carries", (made.compiled().params, np.array([lap]), code), (4, 4), find)
+    found = kept_array(kept_folder(__name__), "carries", (made.compiled().params, np.array([lap])), (4, 4), find)
     return bool(found[1:, 0].max() < found[0, 0] + LACKS)
 
 
-def _motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
+def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
+    """Measure a lap [s] of a map round a circle, at shares `place` of its domain in r and z; needs compiled code."""
     (r_low, r_high), (z_low, z_high) = made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)
     rows = max(64, round(_FPS * lap))
-    angles, r = 2.0 * np.pi * np.arange(rows) / rows, r_low + place[0] * (r_high - r_low)
-    stylus, poses = np.zeros((rows, 7)), np.empty((rows, made.nq))
+    # A lap ends where it began, as a closed clip does: without its last pose it would be taken for one that stops.
+    angles, r = 2.0 * np.pi * np.arange(rows + 1) / rows, r_low + place[0] * (r_high - r_low)
+    stylus, poses = np.zeros((rows + 1, 7)), np.empty((rows + 1, made.nq))
     stylus[:, 0], stylus[:, 1] = r * np.cos(angles), r * np.sin(angles)
     stylus[:, 2], stylus[:, 3] = z_low + place[1] * (z_high - z_low), 1.0
     kind, params, memory = made.compiled()

@@ -3,7 +3,7 @@
 Kernels of ``models`` and ``controllers`` are compiled as parts of units: the entry points here, and the kernels that
 are called by their address (see `sim.compilation.kernel_units`). A unit is kept under a key of what it is made of
 (`sim.compilation.unit_key`, `sim.compilation.unit_cache`), so no stale one is ever run, and none is made again for a
-change that it does not depend on. What else takes long may be kept in a folder named by a hash of all sources.
+change that it does not depend on.
 """
 
 import hashlib
@@ -39,14 +39,6 @@ def source_hash() -> str:
             digest.update(path.relative_to(_ROOT).as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Folder of what is found with these sources: under ``HVF_CACHE_DIR``, or the user's cache folder."""
-    return unit_cache.cache_folder() / source_hash()
-
-
-CACHE_FOLDER = cache_folder()
 
 
 def entry_point(function: _Function) -> _Function:

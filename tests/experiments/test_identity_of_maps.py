@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.config.words import run_config
-from experiments.setups.alike import motion_of
+from experiments.setups.alike import motion_at, motion_of
 from experiments.setups.blendable import not_blendable
 from experiments.setups.wiring import wire
 from experiments.trials.trial_log import TrialLog
@@ -41,6 +42,15 @@ def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
     assert len(said) == 2
     assert said[0].startswith("backflip turns over")
     assert said[1].startswith("jump flies for 0.")
+
+
+def test_a_lap_at_a_corner_of_a_map_lacks_what_its_clip_lacks() -> None:
+    clip = embedded("walk")
+    made = wire(run_config(clips=("walk",) * 4, lap=clip.duration, seconds=1.0)).haptic_map
+    assert isinstance(made, Cylindrical)
+    corner, own = motion_at(made, (0.0, 0.0), clip.duration), motion_of(clip.poses, clip.fps)
+    assert corner.residual == pytest.approx(own.residual, abs=0.002)
+    assert corner.skate == pytest.approx(own.skate, abs=0.005)
 
 
 def test_feet_of_the_authored_walk_neither_sink_nor_skate() -> None:
