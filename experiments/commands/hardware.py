@@ -48,7 +48,8 @@ class Doctor:
 
     def __call__(self) -> int:
         """Look, measure and say."""
-        from experiments.hardware.doctor import findings, measured_lateness, measured_link
+        from experiments.hardware.doctor import findings, measured_lateness
+        from experiments.hardware.link import measured_link
         from sim.devices.hardware_list import found_devices, open_device
 
         devices = found_devices()
