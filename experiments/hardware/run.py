@@ -21,9 +21,10 @@ from experiments.hardware.attend import attend
 from experiments.hardware.outcome import Outcome, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
-from experiments.hardware.permit import check_device, verified
+from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
+from experiments.saying import say
 from experiments.setups.defaults import resolved
 from experiments.setups.session import Session
 from models.scene import SceneConfig
@@ -81,14 +82,14 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
-        for line in (*check_device(ready.identity, make.calibration), *ready.said):
+        for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
             console.print(line, highlight=False)
         if options.view:
             stack.enter_context(_page(config, run))
         last = attend(run, config.seconds, options, console)
         ended = run.stop()
     outcome = outcome_of(options.out / RECORDING, ready, ended, last)
-    _write(outcome, options.out, console)
+    _write(outcome, options.out, options.json, console)
     return 0 if outcome.sound else 1
 
 
@@ -119,13 +120,15 @@ def _gate(config: RunConfig, options: RunHardware) -> Gate:
 
 
 def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
-    """Refuse a device with motors that has no certificate of this field.
+    """Refuse a device with motors that has no certificate of this field, and limits that are none.
 
     Raises
     ------
     CertificateError, SimError
         If it may not be armed.
     """
+    if options.name != EMULATED:
+        check_limits(options)
     if options.certificate is not None:
         found = verified(options.certificate, config, options.delay)
         console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)
@@ -167,9 +170,8 @@ def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
         page.join()
 
 
-def _write(outcome: Outcome, out: Path, console: Console) -> None:
-    for line in outcome.lines():
-        print(line)
+def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
+    say(outcome.to_json(), as_json, outcome.lines())
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
