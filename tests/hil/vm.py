@@ -1,7 +1,8 @@
 """`make hil-vm`: the HID driver on Linux's own hidraw, in a virtual machine whose kernel has uhid.
 
-Says that it skips, and why, where something is missing. Needs qemu-system-x86_64, busybox-static, a C compiler, and either a kernel with modules in /boot and /lib/modules, or
-apt-get to fetch Debian's (some 70 MB, kept in runs/hil-vm). The guest sees this machine's files and changes none.
+Says that it skips, and why, where something is missing: it needs qemu-system-x86_64, busybox-static, a C compiler, and
+either a kernel with modules in /boot and /lib/modules, or apt-get to fetch Debian's (some 70 MB, kept in runs/hil-vm).
+The guest sees this machine's files and changes none.
 """
 
 import shutil
