@@ -6,6 +6,7 @@ an Enter under force lets go, and the end of the input, such as Ctrl-D, ends the
 
 import contextlib
 import enum
+import os
 import select
 import sys
 import time
@@ -16,7 +17,7 @@ from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import link_now
 from experiments.hardware.run_options import RunHardware
-from sim.hardware.controls import HardwareRun, Look
+from sim.hardware.controls import HardwareRun, Look, Recorded
 
 _POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 _DISARMED = "Disarmed: the motors are off."
@@ -34,7 +35,7 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
     With `options.arm` there is nobody to ask: it arms at once, and a fault ends it.
     """
     terminal = sys.stdin.isatty() and not options.arm
-    until, state, look = None, None, run.poll()
+    until, state, look, recording = None, None, run.poll(), True
     if terminal:
         _forget_keys()
         console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
@@ -49,6 +50,9 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
             if not look.alive:
                 console.print("The servo has stopped; the device's watchdog lets go.")
                 return look
+            if look.recorded is not None and not look.recorded.alive and recording:
+                recording = False
+                console.print(_recording_ended(look.recorded), highlight=False)
             if look.state is not state:
                 state = look.state
                 console.print(_told(look, options.dead_man, terminal), highlight=False)
@@ -63,6 +67,11 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
                 until = until or time.monotonic() + seconds
     run.request(DISARM)
     return look
+
+
+def _recording_ended(recorded: Recorded) -> str:
+    why = f" ({os.strerror(recorded.error)})" if recorded.error else ""
+    return f"The recording has ended{why} after {recorded.rows} ticks; what it has is kept, and the run goes on."
 
 
 def _obeyed(run: HardwareRun, look: Look) -> bool:

@@ -1,5 +1,6 @@
 """What the keys of who stands beside a device do: Enter arms, and lets go; nothing that was typed before counts."""
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from rich.console import Console
 from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
 from experiments.hardware.attend import attend
-from sim.hardware.controls import Look
+from sim.hardware.controls import Look, Recorded
 from sim.hardware.gated_servo import ROW_SIZE, columns
 
 ROW = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
@@ -24,7 +25,7 @@ class Stand:
 
     def __init__(self, script: Script):
         self.script, self.looks, self.asked = script, 0, list[int]()
-        self.state, self.fault = State.DISARMED, Fault.NONE
+        self.state, self.fault, self.recorded = State.DISARMED, Fault.NONE, None
 
     def request(self, event: int) -> None:
         self.asked.append(event)
@@ -39,7 +40,7 @@ class Stand:
     def poll(self) -> Look:
         self.script.get(self.looks, lambda stand: None)(self)
         self.looks += 1
-        return Look(True, self.state, self.fault, 1.6, ROW, None)
+        return Look(True, self.state, self.fault, 1.6, ROW, self.recorded)
 
 
 @pytest.fixture
@@ -50,6 +51,17 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]
         monkeypatch.setattr(sys, "stdin", terminal)
         yield lambda typed: os.write(ours, typed)
     os.close(ours)
+
+
+def test_a_recording_that_has_ended_is_said_once_and_with_its_reason(keys, capsys) -> None:
+    stand, console = Stand({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
+    attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
+    said = capsys.readouterr().out
+    assert said.count("The recording has ended (No space left on device) after 700 ticks") == 1
+
+
+def _fills_the_disk(stand: Stand) -> None:
+    stand.recorded = Recorded(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
 
 
 def asked(script: Script, arm: bool = False) -> list[int]:

@@ -1,4 +1,4 @@
-"""A device that is wired or set up wrong, with nobody at the stylus: the gate lets go before it is fast."""
+"""A device that is wired or set up wrong, and a hand that lets go of the stylus: the gate does so before it is fast."""
 
 from collections.abc import Callable
 
@@ -55,12 +55,12 @@ def swapped(values: np.ndarray) -> np.ndarray:
 
 
 def driven(torque: Wiring, reading: Wiring, late: int = 0) -> tuple[Ticker, Miswired]:
-    """Three seconds from arming, with the limits as they are by default."""
-    driver = gated_servo().driver
+    """Four seconds from arming, with the default limits and a hand that lets go once the force is in."""
+    driver = gated_servo(holds=1.5).driver
     assert isinstance(driver, EmulatedPhantom)
     wrong = Miswired(driver, torque, reading, late)
-    ticker = Ticker(gated_servo(wrong, dead_man=False))
-    for k in range(3000):
+    ticker = Ticker(gated_servo(wrong, dead_man=False, small=2.0))
+    for k in range(4000):
         ticker.tick(k, ARM if k == 0 else -1)
         assert np.linalg.norm(ticker.gated.force) <= 4.0 + 1e-9
         assert not (ticker.fault and ticker.gated.torque.any())
