@@ -38,7 +38,7 @@ def _compared(c: Contrast) -> str:
     if not (math.isfinite(c.low) and math.isfinite(c.high)):
         return f"{held} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
     interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
-    if c.low <= 0.0 <= c.high:
+    if not c.shown:
         return f"no difference shown between {c.level} and {c.reference} ({held}; {interval})"
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
