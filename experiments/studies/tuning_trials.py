@@ -1,7 +1,7 @@
-"""Tuning against its baselines, repeated: what is gained on held-back users, with a new search and new people every time.
+"""Tuning against its baselines, repeated: the gain on held-back users, with a new search and new people every time.
 
-``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 5`` runs the tuning five times, each
-in a folder of its own, and goes on where it was stopped.
+``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 5`` runs the tuning five times,
+each in a folder of its own, and goes on where it was stopped.
 """
 
 import sys
@@ -35,7 +35,7 @@ def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned
 
 
 def told(found: Sequence[Tuned]) -> list[str]:
-    """What was chosen each time, and a line for each contender and objective: the gain, and its mean over replications."""
+    """What was chosen each time, and for each contender and objective the gain, with its mean over replications."""
     lines = [_chosen(one) for one in found]
     for first in found[0].comparisons:
         name = (first.contender, first.objective)
@@ -44,7 +44,8 @@ def told(found: Sequence[Tuned]) -> list[str]:
         low, high = t_interval(gains)
         lines.append(
             f"{name[1]} against {name[0]}: better by {np.mean(gains):.3g} (95 % interval {low:.3g} to {high:.3g} over "
-            f"{len(of)} replications), in {np.sum(gains > 0.0)} of them, shown by {sum(c.low > 0.0 for c in of)} alone: "
+            f"{len(of)} replications), in {np.sum(gains > 0.0)} of them, by its own interval in "
+            f"{sum(c.low > 0.0 for c in of)}: "
             + ", ".join(f"{c.better_by:.3g} ({c.low:.3g} to {c.high:.3g})" for c in of)
         )
     return lines

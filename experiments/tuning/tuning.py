@@ -19,6 +19,7 @@ from experiments.trials.drive import warm
 from experiments.trials.errors import StudyError
 from experiments.trials.executors import executor
 from experiments.trials.run_trial import SHELF
+from experiments.trials.where import Where
 from experiments.tuning.contenders import Contender, contenders, interval, wins
 from experiments.tuning.page import tuning_page
 from experiments.tuning.panel import Panel, panel_runs
@@ -94,9 +95,8 @@ class Tuned:
 
 
 def run_tuning(
-    config: TuneConfig, out: Path, text: str = "", threads: int | None = None, workers: int | None = None,
-    cluster: str | None = None, console: Console | None = None,
-) -> Tuned:  # fmt: skip
+    config: TuneConfig, out: Path, text: str = "", where: Where | None = None, console: Console | None = None
+) -> Tuned:
     """Search, hold what was found against others, certify it, and write a report.
 
     Parameters
@@ -107,8 +107,8 @@ def run_tuning(
         Folder; one that holds this tuning is continued.
     text : str
         The tuning's file, as the report shows it.
-    threads, workers, cluster
-        As of `experiments.trials.study.Study.run`.
+    where : Where, optional
+        Where trials run; by default on as many threads as there are processors.
     console : Console, optional
         Where progress is shown; by default stderr.
 
@@ -122,7 +122,7 @@ def run_tuning(
     with Database(out / DATABASE, identity, config.name, text) as database:
         first = panel_runs(config.config({}), config.users, 1, config.seed)[0][0]
         warm([first], SHELF, console)
-        with executor(threads, workers, cluster) as runs:
+        with executor(where or Where()) as runs:
             panel, storage = Panel(database, runs), storage_of(config.storage or out / JOURNAL)
             found = _searched(config, storage, identity, panel, config.sampler, console)
             best = chosen(found, config.directions)

@@ -4,8 +4,9 @@ Of a level of one factor and a level of another, each user has a difference of d
 
     d_i = (y_i[a, b] − y_i[a₀, b]) − (y_i[a, b₀] − y_i[a₀, b₀]),
 
-of her means in these conditions. It is held against zero by Student's t test, or, where one of the two factors is between
-users, one group's differences against the other's by Welch's (scipy). All of them are corrected together by Holm's method.
+of her means in these conditions. It is held against zero by Student's t test, or, where one of the two factors is
+between users, one group's differences against the other's by Welch's (scipy). All of them are corrected together by
+Holm's method.
 """
 
 import itertools
@@ -72,5 +73,5 @@ def _p(cells: Any, own: tuple[str, str, str], across: tuple[str, str, str], betw
         samples = ((differences[across[1]] - differences[across[2]]).dropna().to_numpy(),)
     if any(len(sample) < 3 for sample in samples) or not any(map(spreads, samples)):
         return float("nan")
-    test = ttest_ind(*samples, equal_var=False) if between else ttest_1samp(samples[0], 0.0)
+    test: Any = ttest_ind(*samples, equal_var=False) if between else ttest_1samp(samples[0], 0.0)
     return float(test.pvalue)

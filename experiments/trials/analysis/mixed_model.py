@@ -4,12 +4,12 @@ On the trials of a level and of the reference,
 
     y_ij = β₀ + β x_ij + Σ_g β_g[level] + u_i + v_i x_ij + e_ij,   (u_i, v_i) ~ N(0, Σ),   e_ij ~ N(0, σ²),
 
-with x = 1 at the level and 0 at the reference, the other factors as fixed effects, and v_i for factors within users only:
-without it a user's repetitions would count as if they were other users (D. J. Barr et al., "Random effects structure for
-confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by REML
-(statsmodels). β over its standard error is held against Student's t with the users less one, or less their groups, as
-degrees of freedom (between-within: M. D. Schluchter & J. T. Elashoff, 1990); in a balanced design that is the paired t
-test of the users' means.
+with x = 1 at the level and 0 at the reference, the other factors as fixed effects, and v_i for factors within users
+only: without it a user's repetitions would count as if they were other users (D. J. Barr et al., "Random effects
+structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by
+REML (statsmodels). β over its standard error is held against Student's t with the users less one, or less their groups,
+as degrees of freedom (between-within: M. D. Schluchter & J. T. Elashoff, 1990); in a balanced design that is the paired
+t test of the users' means.
 """
 
 import warnings

@@ -20,10 +20,10 @@ _BODY = """<p>{question}</p>
 <h2>Every measure, level against reference</h2>
 <div class="wide">{table}</div>
 <p class="note">Difference: of users' means, with its 95 % BCa bootstrap interval over users, each for itself. Model:
-estimate of a linear mixed model in which users differ in their level and in what the factor does to them, with its 95 %
-interval; p by Student's t, and corrected for all {tests} contrasts of the table by Holm's method. Effect: Cohen's d_z, mean
-over spread of users' own differences (people who are simulated alike make it large), or Hedges' g between users. Grey: no
-difference is shown. {interactions}</p>
+estimate of a linear mixed model in which users differ in their level and in what the factor does to them, with its
+95 % interval; p by Student's t, and corrected for all {tests} contrasts of the table by Holm's method. Effect: Cohen's
+d_z, mean over spread of users' own differences (people who are simulated alike make it large), or Hedges' g between
+users. Grey: no difference is shown. {interactions}</p>
 {remarks}
 {effects}
 <h2>Measures</h2>
@@ -133,7 +133,7 @@ def _interactions(found: Statistics) -> str:
         return ""
     told = ", ".join(f"{MEASURES[name].name.replace('_', ' ')} {_p(p)}" for name, p in found.interactions.items())
     return (
-        "Whether what a factor does depends on another one (least p of the differences of differences, by Holm's method): "
+        "Whether what a factor does depends on another one (least p of differences of differences, by Holm's method): "
         f"{html.escape(told)}."
     )
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g
+from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import statistics
 from experiments.trials.study_config import study_from
 

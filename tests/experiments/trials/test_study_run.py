@@ -10,7 +10,6 @@ from experiments.results import smoothness
 from experiments.trials import run_trial
 from experiments.trials.database import Database
 from experiments.trials.errors import StudyError
-from experiments.trials.executors import executor
 from experiments.trials.run_trial import Row, Shelf, Task, perform
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from sim.recording.recording import Recording
@@ -116,12 +115,13 @@ def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
     ("threads", "workers", "cluster", "says"),
     [
         (2, 2, None, "--threads and --workers contradict"),
-        (0, None, None, "--threads 0"),
-        (None, 0, None, "--workers 0"),
+        (0, None, None, "--threads is 0"),
+        (None, 0, None, "--workers is 0"),
     ],
 )
-def test_where_trials_run_is_one_place(
-    threads: int | None, workers: int | None, cluster: str | None, says: str
+def test_where_trials_run_is_one_place_and_a_contradiction_leaves_nothing_behind(
+    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, says: str
 ) -> None:
-    with pytest.raises((StudyError, ParameterError), match=says), executor(threads, workers, cluster):
-        pass
+    with pytest.raises(ParameterError, match=says):
+        small().run(tmp_path / "out", threads, workers, cluster)
+    assert not (tmp_path / "out").exists()

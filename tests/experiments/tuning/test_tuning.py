@@ -12,6 +12,7 @@ from experiments.config.words import run_config
 from experiments.trials.database import Database
 from experiments.trials.errors import StudyError
 from experiments.trials.threads import Threads
+from experiments.trials.where import Where
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of
@@ -144,7 +145,7 @@ def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain()
 @pytest.mark.slow
 def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path: Path) -> None:
     config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
-    found = run_tuning(replace(config, prune=False), tmp_path, threads=2)
+    found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
     taken = load_config(tmp_path / CHOSEN)
     assert taken.mode.stiffness == found.values["stiffness"]  # pyright: ignore
     assert kept_stability(taken).verdict == "certified"
