@@ -120,16 +120,16 @@ def run_tuning(
     console, text = console or Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
-        first = panel_runs(config.config({}), config.users, 1, config.seed)[0][0]
-        warm([first], SHELF, console)
+        warm(panel_runs(config, config.config({}), replace(config.users, number=1))[0], SHELF, console)
         with executor(where or Where()) as runs:
             panel, storage = Panel(database, runs), storage_of(config.storage or out / JOURNAL)
             found = _searched(config, storage, identity, panel, config.sampler, console)
             best = chosen(found, config.directions)
             if best is None:
+                refused = sum(c.state == "refused" for c in found)
                 raise StudyError(
-                    f"tuning {config.name!r}: none of {len(found)} candidates could be tried, as none is certified; "
-                    "expected a space with some that are, or allow_unknown = true"
+                    f"tuning {config.name!r}: none of {len(found)} candidates is left: {refused} are not certified, of "
+                    f"{len(found) - refused} a trial failed; expected another space, or allow_unknown = true"
                 )
             others: dict[str, Candidate | None] = {}
             if config.sampler != "random":
