@@ -224,8 +224,10 @@ def _sentences(
 
 def _sentence(config: TuneConfig, c: Comparison) -> str:
     unit = label_of(c.objective)
-    if not np.isfinite(c.mean):
-        return f"Against {c.contender}: that is refuted by the certificate, and was not tried."
+    if not (np.isfinite(c.mean) and np.isfinite(c.tuned)):
+        failed = "what was chosen" if np.isinf(c.tuned) else "it" if np.isinf(c.mean) else ""
+        why = f"a trial of {failed} failed" if failed else "that is refuted by the certificate, and was not tried"
+        return f"Against {c.contender}, {unit}: {why}."
     if c.objective == MARGIN:
         return f"Against {c.contender}, {unit}: {c.tuned:.3g} for {c.mean:.3g}."
     if c.better_by == 0.0:

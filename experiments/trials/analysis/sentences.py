@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from experiments.trials.analysis.effect_sizes import ALIKE
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.measures import MEASURES
 from experiments.trials.study_config import StudyConfig
@@ -43,6 +44,8 @@ def _compared(c: Contrast) -> str:
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
     agree = f", {c.agree} of {c.users} users" if c.agree else ""
+    apart = c.most - c.least > ALIKE * abs(c.difference)
+    agree += f"; {_number(c.least)} to {_number(c.most)} by condition" if apart else ""
     return (
         f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({held}; {interval}{agree})"
     )

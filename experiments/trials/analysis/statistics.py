@@ -40,6 +40,8 @@ class Contrast:
         Of these.
     low, high : float
         Its bootstrap interval.
+    least, most : float
+        Smallest and largest difference among the conditions of the other factors.
     model, model_low, model_high, p, p_holm : float
         The mixed model's estimate and interval, its p (Student's t), and that corrected; NaN where the model has none.
     effect : float
@@ -58,6 +60,8 @@ class Contrast:
     difference: float
     low: float
     high: float
+    least: float
+    most: float
     model: float
     model_low: float
     model_high: float
@@ -172,11 +176,18 @@ def _contrast(cells: Any, of: tuple[str, str, str, str], between: bool, rng: np.
         agree = int(np.sum(np.sign(samples[0]) == np.sign(np.mean(samples[0])))) if users else 0
     if not (len(one) and len(other)):
         return None
-    low, high = _bootstrapped(samples, rng)
     return Contrast(
         measure, factor, level, reference, users, float(one.mean()), float(other.mean()), float(_difference(*samples)),
-        low, high, *NO_FIT[:4], p_holm=np.nan, effect=effect, agree=agree,
+        *_bootstrapped(samples, rng), *_by_condition(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
+        effect=effect, agree=agree,
     )  # fmt: skip
+
+
+def _by_condition(table: Any, level: str, reference: str) -> tuple[float, float]:
+    others = [name for name in table.index.names if name != "user"]
+    means = table.groupby(level=others).mean() if others else table
+    differences = means[level] - means[reference] if others else means[level].mean() - means[reference].mean()
+    return float(np.min(differences)), float(np.max(differences))
 
 
 def _bootstrapped(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
