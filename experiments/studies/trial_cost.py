@@ -1,6 +1,6 @@
 """What a study costs beside its trials: overhead, threads, memory, and how soon a batch begins.
 
-``python -m experiments.studies.trial_cost 10000`` prints the overhead, and the growth of memory over so many short trials.
+``python -m experiments.studies.trial_cost 10000`` prints the overhead, and how memory grows over so many short trials.
 """
 
 import subprocess

@@ -37,7 +37,7 @@ def tremor(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "tremor", "Tremor: acceleration of a hand that holds still",
         (
-            Law("Tremor: frequency of the peak", float(np.median(peaks)), 6.0, 12.0, "Hz", "Lakie et al. 2015: 6 to 12 (a)"),
+            Law("Tremor: frequency of the peak", float(np.median(peaks)), 6.0, 12.0, "Hz", "Lakie et al. 2015 (a)"),
             Law("Tremor: amplitude at the peak", float(np.median(sizes)), 0.015, 0.34, "m/s²",
                 "Wade, Gresty & Findley 1982: 97 people, 0.0015 to 0.035 g (a)"),
         ),
