@@ -14,7 +14,7 @@ from experiments.trials.run_trial import Row, Shelf, Task, perform
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from sim.recording.recording import Recording
 
-pytest.importorskip("pandas")
+pandas = pytest.importorskip("pandas")
 pytest.importorskip("statsmodels")
 
 
@@ -35,6 +35,7 @@ def test_a_study_is_the_same_on_one_thread_on_two_and_when_it_goes_on_where_it_w
     tables = [(tmp_path / name / "trials.csv").read_bytes() for name in ("one", "grown")]
     assert tables[0] == tables[1]
     assert small().run(tmp_path / "one").ran == 0
+    assert pandas.read_parquet(tmp_path / "one" / "trials.parquet").equals(one.table)
     assert one.table["user"].value_counts().to_dict() == {0: 2, 1: 2, 2: 2}
     page = (tmp_path / "one" / REPORT).read_text(encoding="utf-8")
     assert "The median trial" in page
