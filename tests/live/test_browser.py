@@ -219,9 +219,11 @@ def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: S
 
 @pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
 def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
+    served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
     served.until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)
+    served.desk.pause(False)
     tab.get_by_role("tab", name="Play").click()
     tab.get_by_role("button", name="Run this").click()
     served.until(lambda: CAPTURE.stem in str(served.desk.built.config.map.clips), "it runs")
