@@ -120,6 +120,7 @@ class Served:
     def until(self, condition: Callable[[], bool], what: str, step: float = 0.05, patience: float = PATIENCE) -> None:
         end = time.monotonic() + patience
         while not condition():
+            assert self.thread.is_alive(), f"the page has ended before: {what}"
             assert time.monotonic() < end, f"not so after {patience:g} s: {what}; said: {self.page._said}"
             time.sleep(step)
 
