@@ -47,7 +47,7 @@ def test_the_line_in_the_plots_goes_with_the_replay_and_plots_are_zoomed(chromiu
     page, replay = opened(chromium, report, 700, 800)
     until_beyond(page, 0.2)  # it plays by itself
     until_beyond(page, seconds_shown(page))
-    replay.locator("body").press("Space")  # it stands still: drawing it takes a processor
+    replay.locator("button").first.dispatch_event("click")  # it stands still: drawing it takes a processor
     kept(page, "report")
     plot = page.locator("canvas.plot").first
     plot.scroll_into_view_if_needed()
@@ -69,7 +69,7 @@ def test_the_line_in_the_plots_goes_with_the_replay_and_plots_are_zoomed(chromiu
 
 def test_it_fits_a_phone(chromium: Any, report: Path) -> None:
     phone, replay = opened(chromium, report, 390, 780)
-    replay.locator("body").press("Space")
+    replay.locator("button").first.dispatch_event("click")
     assert phone.evaluate("document.documentElement.scrollWidth") <= 390
     kept(phone, "report-phone")
     phone.close()
