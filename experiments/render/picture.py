@@ -21,7 +21,7 @@ DEVICE_REACH = 0.8  # half width of what casts shadows on the device [m]
 DEVICE_SHARE = 0.34  # of the width
 MOMENTS = 4  # of the figure, evenly over the second half of the run
 SPACING = 1.1  # between them [m]
-GHOST_AT = np.array([-0.6, 0.35])  # from the figure: behind it, to its left [m]
+GHOST_AT = np.array([-0.95, 0.45])  # from the figure: behind it out of its reach, to its left [m]
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
 
