@@ -27,9 +27,8 @@ class ListDevices:
             print(json_text([asdict(device) for device in devices]))
             return 0
         for device in devices:
-            ids = f"{device.vendor_id:04x}:{device.product_id:04x}" if device.vendor_id else "-"
-            print(f"{device.name or '-':24} {device.bus or '-':9} {ids:9} {device.transport:7} {device.path}")
-            print(f"{'':24} {' '.join(filter(None, (device.vendor, device.product)))}: {device.note}")
+            print(f"{device.name or '-':24} {device.where()}")
+            print(f"{'':24} {device.who()}: {device.note}")
         if not devices:
             print("no device found; `hvf hardware doctor` says what may be missing")
         return 0
@@ -48,7 +47,8 @@ class Doctor:
 
     def __call__(self) -> int:
         """Look, measure and say."""
-        from experiments.hardware.doctor import findings, measured_lateness, measured_link
+        from experiments.hardware.doctor import findings, measured_lateness
+        from experiments.hardware.link import measured_link
         from sim.devices.hardware_list import found_devices, open_device
 
         devices = found_devices()
@@ -68,7 +68,8 @@ class Doctor:
             print(json_text(told))
             return 0
         for device in devices:
-            print(f"device   {device.name or device.path}: {device.vendor} {device.product}; {device.note}")
+            print(f"device   {device.name or '-'}: {device.where()}")
+            print(f"{'':9}{device.who()}: {device.note}")
         for finding in looked:
             print("\n".join(finding.lines()))
         print(

@@ -6,6 +6,7 @@ import numpy as np
 
 from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
+from experiments.files.json_text import json_text
 from experiments.hardware.run_options import EMULATED, CalibrateHardware
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame
 from models.scene import SceneConfig
@@ -39,15 +40,26 @@ def calibrate(options: CalibrateHardware) -> int:
         readings = still_readings(driver, options.seconds)
     finally:
         driver.close()
-    offset, step = readings.mean(axis=0) - np.array(options.pose), np.array(ENCODER_STEP)
-    margin = 0.5 * np.maximum(step, np.ptp(readings, axis=0))
-    save_device(calibrated_json(offset.tolist(), margin.tolist(), driver.identity, base), options.out)
+    offset, margin = zero_of(readings, np.array(options.pose))
+    content = calibrated_json(offset.tolist(), margin.tolist(), driver.identity, base)
+    save_device(content, options.out)
+    if options.json:
+        print(json_text(content))
+        return 0
     for i, (value, half) in enumerate(zip(offset, margin, strict=True), start=1):
         print(f"offset{i}  {value: .5f} ± {half:.5f} rad")
-    print(
-        f"{driver.identity.name} {driver.identity.serial}".rstrip() + f": {len(readings)} readings; in {options.out}."
-    )
+    device = f"{driver.identity.name} {driver.identity.serial}".rstrip()
+    print(f"{device}: {len(readings)} readings; in {options.out}.")
     return 0
+
+
+def zero_of(readings: Array, pose: Array) -> tuple[Array, Array]:
+    """What readings (n, 3) of a stylus at a pose (3,) are more than that, and half of an interval for it [rad].
+
+    The interval is half an encoder's count, or half of what the hand shook.
+    """
+    margin = 0.5 * np.maximum(np.array(ENCODER_STEP), np.ptp(readings, axis=0))
+    return readings.mean(axis=0) - pose, margin
 
 
 def still_readings(driver: Driver, seconds: float) -> Array:

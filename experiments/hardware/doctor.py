@@ -11,10 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
 from sim.devices.dhd import DHD
-from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, Driver
-from sim.devices.exchange import READING_SIZE
 from sim.devices.hardware_list import RULES_FILE, FoundDevice
 from sim.devices.hdapi import HDAPI
 
@@ -58,31 +55,6 @@ class Lateness(NamedTuple):
     p999: float
     worst: float
     missed: int
-
-
-class Link(NamedTuple):
-    """How a device answers, with its motors off: medians of the times [s]; NaN where it does not tell."""
-
-    seconds: float
-    readings: int
-    lost: int
-    refused: int
-    round_trip: float
-    round_trip_p99: float
-    jitter: float
-    staleness_p99: float
-
-    def lines(self) -> list[str]:
-        """In lines for a person."""
-        return [
-            f"{self.readings} readings in {self.seconds:.2f} s, {self.lost} lost, {self.refused} refused",
-            f"round trip {_us(self.round_trip)} (p99 {_us(self.round_trip_p99)}), jitter {_us(self.jitter)}, "
-            f"p99 {_us(self.staleness_p99)} later than the quickest",
-        ]
-
-
-def _us(seconds: float) -> str:
-    return "not told" if np.isnan(seconds) else f"{seconds * 1e6:.0f} µs"
 
 
 def findings(devices: list[FoundDevice]) -> list[Finding]:
@@ -199,27 +171,3 @@ def measured_lateness(seconds: float = 1.0) -> Lateness:
         k += int(behind / PERIOD)
     p50, p99, p999 = np.quantile(late, [0.5, 0.99, 0.999])
     return Lateness(len(late), float(p50), float(p99), float(p999), max(late), missed)
-
-
-def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
-    """How a device answers commands that leave its motors off."""
-    reading, told = np.zeros(READING_SIZE), driver.telemetry
-    rows: list[Array] = []
-    begin, first = time.monotonic(), told.copy()
-    while time.monotonic() - begin < seconds:
-        driver.write(np.zeros(3), False)
-        if driver.read(reading, 2.0 * PERIOD):
-            rows.append(told.copy())
-        time.sleep(0.5 * PERIOD)  # a device that waits for nothing is not asked as often as it can answer
-    spent = time.monotonic() - begin
-    counts = told - first
-    columns = np.array(rows) if rows else np.full((1, len(told)), np.nan)
-
-    def quantile(column: int, share: float) -> float:
-        known = columns[:, column][~np.isnan(columns[:, column])]
-        return float(np.quantile(known, share)) if len(known) else float("nan")
-
-    return Link(
-        spent, int(counts[READ]), int(counts[LOST]), int(counts[BAD]), quantile(ROUND_TRIP, 0.5),
-        quantile(ROUND_TRIP, 0.99), quantile(JITTER, 0.5), quantile(STALENESS, 0.99),
-    )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
+from experiments.hardware.link import Link
 from sim.hardware.controls import Look
 from sim.hardware.servo_process import Ended, Ready
 from sim.recording.recording import Recording, RecordingError
@@ -41,6 +42,8 @@ class Outcome:
         Time under full force [s].
     distance, force, heat : float
         While active: RMS distance from the curve [m], largest force [N], largest share of a motor's heat.
+    link : Link
+        How the device answered.
     apart, hand_force : float
         RMS of the twin's prediction of a tick [m], largest force of the hand as it tells it [N], while active.
     """
@@ -63,6 +66,7 @@ class Outcome:
     distance: float
     force: float
     heat: float
+    link: Link
     apart: float
     hand_force: float
 
@@ -73,7 +77,7 @@ class Outcome:
 
     def to_json(self) -> dict[str, object]:
         """All of it by name."""
-        return asdict(self)
+        return asdict(self) | {"link": self.link._asdict()}
 
     def lines(self) -> list[str]:
         """What a person wants to know, first what went wrong."""
@@ -91,6 +95,7 @@ class Outcome:
             f"{self.hand_force:.2f} N.",
             f"{self.ticks} ticks, {self.missed} deadlines missed; p50 / p99 / p99.9: computing {micro[0]} µs, late by "
             f"{micro[1]} µs.",
+            f"The device answered: {'; '.join(self.link.lines())}.",
             f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files; {self.recorded} ticks "
             f"are recorded, {self.dropped} were dropped.",
         ]
@@ -121,7 +126,7 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: Look) -
 def _recorded(path: Path) -> dict[str, Any]:
     nothing: dict[str, Any] = dict.fromkeys(
         ("recorded", "dropped", "active", "distance", "force", "heat", "apart", "hand_force"), 0
-    ) | {"let_go": ()}
+    ) | {"let_go": (), "link": Link.of(0.0, (0, 0, 0), np.full((1, 3), np.nan))}
     try:
         recording = Recording(path)
     except RecordingError:
@@ -139,6 +144,12 @@ def _recorded(path: Path) -> dict[str, Any]:
         sizes = {name: np.linalg.norm(rows[name], axis=1) for name in ("force", "hand_force")}
         some = bool(on.any())
         t, fault, value = (recording.channel("ticks", name)[:] for name in ("t", "fault", "fault_value"))
+        sequence, lost, refused, *times = (
+            recording.channel("ticks", name)[:]
+            for name in ("sequence", "lost", "refused", "round_trip", "jitter", "staleness")
+        )
+        new = np.diff(sequence, prepend=0.0) != 0.0
+        counts = np.sum(new), lost[-1], refused[-1]
         begun = np.flatnonzero((fault > 0.0) & (np.concatenate(([0.0], fault[:-1])) == 0.0))
         return {
             "let_go": tuple(f"{t[k]:.3f} s, {Fault(int(fault[k])).words(value[k])}" for k in begun),
@@ -148,4 +159,5 @@ def _recorded(path: Path) -> dict[str, Any]:
             "force": float(sizes["force"].max(initial=0.0)), "heat": float(rows["heat"].max(initial=0.0)),
             "apart": float(np.sqrt(np.mean(rows["apart"] ** 2))) if some else 0.0,
             "hand_force": float(sizes["hand_force"].max(initial=0.0)),
+            "link": Link.of(float(t[-1] - t[0]), counts, np.stack(times, axis=1)[new]),
         }  # fmt: skip

@@ -3,12 +3,16 @@
 import os
 import signal
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from controllers.safety.arming import State
+from controllers.safety.faults import Fault
 from controllers.state import Array
 from experiments.config.run_config import RunConfig
+from experiments.hardware.link import link_now
 from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
@@ -53,8 +57,16 @@ def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -
             qpos = np.concatenate([world.data.qpos, pose])
             told.read(twin)
             hand = twin[TOLD_FORCE : TOLD_FORCE + 3].copy()
-            page.show(Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan)))
+            shown = Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan))
+            page.show(shown, notes_of(tick))
         time.sleep(_PAUSE)
+
+
+def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
+    """What the page says of a tick: state, fault, and how the device answers."""
+    fault = Fault(int(tick["fault"]))
+    state = State(int(tick["state"])).name.lower()
+    return (f"{state}: {fault.words(float(tick['fault_value']))}" if fault else state, *link_now(tick).split(", "))
 
 
 def _pose(session: Session, argument: Array) -> Array:

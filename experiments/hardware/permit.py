@@ -9,12 +9,15 @@ from experiments.certify.certified_field import certificate_inputs, certified_op
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
+from experiments.hardware.run_options import RunHardware
 from experiments.setups.certified_law import of_clips
 from models.mocap.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 
 HAND_PUSH = 1.0  # the default of `hvf certify` [N]
+RAMP = 0.25
+"""Least time in which a real device's force comes in [s]: somebody who is surprised takes as long to let go."""
 
 
 def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
@@ -64,8 +67,28 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     return found
 
 
-def check_device(identity: DeviceIdentity, calibration: Calibration | None) -> list[str]:
-    """What is to be said of a device that may be armed, with the zero that its device file has.
+def check_limits(options: RunHardware) -> None:
+    """Refuse limits that are none to a hand on a real device: a person may lower them, and raise them this far.
+
+    Raises
+    ------
+    SimError
+        With the option, and how far it goes.
+    """
+    for name, most, unit in (("force", 8.5, "N, the Premium's peak"), ("speed", 2.0, "m/s"), ("small", 2.0, "N")):
+        value = getattr(options, name)
+        if value > most:
+            raise SimError(
+                f"--{name} {value:g} is too much for a hand on a real device; expected at most {most:g} {unit}"
+            )
+    if options.ramp < RAMP:
+        raise SimError(
+            f"--ramp {options.ramp:g} is too quick for a hand on a real device; expected {RAMP:g} s or more, a reaction"
+        )
+
+
+def check_device(identity: DeviceIdentity, calibration: Calibration | None, identified: bool = False) -> list[str]:
+    """What is to be said of a device that may be armed, with the zero, and the friction and inertia, of its file.
 
     Raises
     ------
@@ -84,9 +107,15 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None) -> l
             f"the device file {calibration.why_not(identity)}, this is {identity.name} {identity.serial}".rstrip()
             + "; calibrate it with hvf hardware calibrate"
         )
-    if identity.watchdog:
-        return []
-    return [
-        f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; keep "
-        "its power switch within reach"
-    ]
+    said: list[str] = []
+    if not identity.watchdog:
+        said.append(
+            f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; "
+            "keep its power switch within reach"
+        )
+    if identity.own_weight and not identified:
+        said.append(
+            f"{identity.name} is no Phantom by build, and the certificate is for the friction and inertia of one; find "
+            "out its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
+        )
+    return said

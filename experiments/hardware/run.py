@@ -2,41 +2,39 @@
 
 import contextlib
 import multiprocessing
-import select
 import socket
 import sys
-import time
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
-from controllers.safety.arming import ARM, CLEAR, DISARM, State
-from controllers.safety.faults import Fault
 from controllers.safety.gate import Gate
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
+from experiments.hardware.attend import attend
 from experiments.hardware.outcome import Outcome, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
-from experiments.hardware.permit import check_device, verified
+from experiments.hardware.permit import check_device, check_limits, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, clear_folder
+from experiments.saying import say
 from experiments.setups.defaults import resolved
+from experiments.setups.session import Session
 from models.scene import SceneConfig
 from sim.errors import SimError
-from sim.hardware.controls import HardwareRun, Look
+from sim.hardware.controls import HardwareRun
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
-
-_POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
 
 
 def run_hardware(config: RunConfig, options: RunHardware) -> int:
@@ -64,56 +62,73 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     config = resolved(config)
-    content = content_of(config.device)
     _permit(config, options, console)
-    serving = served(config)
-    session = session_of(serving, ready=lambda units: compile_once(console, units))
-    if options.view:
-        page_session(config, ready=lambda units: compile_once(console, units))  # before anybody waits for the page
-    for remark in session.remarks:
-        console.print(remark, highlight=False)
-    period = config.clock.servo_period
-    gate = Gate(
-        period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed, small=options.small,
-        ramp=options.ramp, dead_man=options.dead_man, permitted=True,
-    )  # fmt: skip
-    clear_folder(options.out)
-    (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
-    if content:
-        save_device(content, options.out / DEVICE)
+    session = _compiled(config, options, console)
+    content = content_of(config.device)
+    _begin_folder(config, content, options)
     job = RecordingJob(
         options.out / RECORDING, to_dict(config), session.static(), config.seed,
-        SceneConfig(servo_period=period, physics_step=config.clock.physics_step),
+        SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step),
     )  # fmt: skip
+    make = MakeServo(
+        served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content)
+    )
     with contextlib.ExitStack() as stack:
-        make = MakeServo(serving, options.name, gate, linkage_from(content).offset, calibration_from(content))
         if options.name == EMULATED:
             hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
             end = MakeEmulated(job.scene, start_of(session), hidden)
             packets = stack.enter_context(emulated(end, options.realtime))
             make = replace(make, packets=packets, calibrated=options.emulate is None or not any(hidden.offset))
         clock = ServoClock(late=options.late, realtime=options.realtime)
-        run = stack.enter_context(HardwareRun(make, period, clock, job))
+        run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
-        for line in (*check_device(ready.identity, make.calibration), *ready.said):
+        for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
             console.print(line, highlight=False)
         if options.view:
             stack.enter_context(_page(config, run))
-        last = _attend(run, config.seconds, options, console)
+        last = attend(run, config.seconds, options, console)
         ended = run.stop()
     outcome = outcome_of(options.out / RECORDING, ready, ended, last)
-    _write(outcome, options.out, console)
+    _write(outcome, options.out, options.json, console)
     return 0 if outcome.sound else 1
 
 
+def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Session:
+    """What the servo is to run, with all compiled that it and the page need, before anybody waits for them."""
+    session = session_of(served(config), ready=lambda units: compile_once(console, units))
+    if options.view:
+        page_session(config, ready=lambda units: compile_once(console, units))
+    for remark in session.remarks:
+        console.print(remark, highlight=False)
+    return session
+
+
+def _begin_folder(config: RunConfig, content: dict[str, Any], options: RunHardware) -> None:
+    """An empty folder but for the configuration, and the device file."""
+    clear_folder(options.out)
+    (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+    if content:
+        save_device(content, options.out / DEVICE)
+
+
+def _gate(config: RunConfig, options: RunHardware) -> Gate:
+    """The limits that are asked for, of a device that has its permit."""
+    return Gate(
+        config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
+        small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
+    )  # fmt: skip
+
+
 def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
-    """Refuse a device with motors that has no certificate of this field.
+    """Refuse a device with motors that has no certificate of this field, and limits that are none.
 
     Raises
     ------
     CertificateError, SimError
         If it may not be armed.
     """
+    if options.name != EMULATED:
+        check_limits(options)
     if options.certificate is not None:
         found = verified(options.certificate, config, options.delay)
         console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)
@@ -155,61 +170,8 @@ def _page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
         page.join()
 
 
-def _attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> Look:
-    """Arm, look, say what changes, for so many seconds from the first arming on; gives the last look with a servo."""
-    terminal = sys.stdin.isatty() and not options.arm
-    until, state, look = None, None, run.poll()
-    if terminal:
-        console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
-    else:
-        run.request(ARM)
-        until = time.monotonic() + seconds
-    with contextlib.suppress(KeyboardInterrupt):
-        while until is None or time.monotonic() < until:
-            time.sleep(_POLL)
-            look = run.poll()
-            if not look.alive:
-                console.print("The servo has stopped; the device's watchdog lets go.")
-                return look
-            if look.state is not state:
-                state = look.state
-                console.print(_told(look, options.dead_man), highlight=False)
-            if look.fault is not Fault.NONE and not terminal:
-                return look
-            if terminal and _enter():
-                if look.fault is not Fault.NONE:
-                    run.request(CLEAR)
-                    time.sleep(2.0 * _POLL)
-                run.request(ARM)
-                until = until or time.monotonic() + seconds
-    run.request(DISARM)
-    return look
-
-
-def _enter() -> bool:
-    """Whether Enter was pressed."""
-    if not select.select([sys.stdin], [], [], 0.0)[0]:
-        return False
-    sys.stdin.readline()
-    return True
-
-
-def _told(look: Look, dead_man: bool) -> str:
-    said = {
-        State.DISARMED: "Disarmed: the motors are off.",
-        State.ARMING: "Arming: no force yet"
-        + (", the switch has to be held, and" if dead_man else ";")
-        + " the force that is asked for has to be small first.",
-        State.RAMPING: "The force comes in.",
-        State.ACTIVE: "Active.",
-        State.FAULT: f"The device let go at {float(look.row['t']):.3f} s: {look.fault.words(look.value)}.",
-    }
-    return f"{float(look.row['t']):8.2f} s  {said[look.state]}"
-
-
-def _write(outcome: Outcome, out: Path, console: Console) -> None:
-    for line in outcome.lines():
-        print(line)
+def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
+    say(outcome.to_json(), as_json, outcome.lines())
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:

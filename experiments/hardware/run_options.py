@@ -7,6 +7,7 @@ import tyro
 
 from experiments.config.part import above, at_least, part
 from experiments.config.words import Options
+from experiments.saying import Json
 
 EMULATED = "emulated"
 
@@ -47,6 +48,8 @@ class RunHardware:
     """Ask the system to run the servo before everything else."""
     view: bool = False
     """Show device and figure in a browser, from a process of its own."""
+    json: Json = False
+    """Print what the run was as JSON."""
 
 
 @part
@@ -65,6 +68,8 @@ class CalibrateHardware:
     """Replace the offset that the file has."""
     emulate: Path | None = None
     """Device file of what the emulated device is."""
+    json: Json = False
+    """Print the file's content instead of a table."""
 
 
 @part
@@ -77,5 +82,5 @@ class IdentifyHardware:
     """Device file to write."""
     overwrite: bool = False
     """Replace the file if it exists."""
-    json: bool = False
+    json: Json = False
     """Print the file's content instead of a table."""

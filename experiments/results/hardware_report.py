@@ -45,7 +45,8 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     """
     (folder / FIGURES).mkdir(exist_ok=True)
     images: list[str] = []
-    for name, draw in (("forces", forces_figure), ("twin", twin_figure), ("servo", servo_figure)):
+    figures = {"forces": forces_figure, "twin": twin_figure, "servo": servo_figure, "link": link_figure}
+    for name, draw in figures.items():
         file = folder / FIGURES / f"{name}.png"
         with mpl.rc_context(STYLE):
             draw(recording).savefig(file, dpi=150)
@@ -102,6 +103,25 @@ def servo_figure(recording: Recording) -> Figure:
     axes.axvline(period, color="#222a38", lw=0.8, ls=(0, (4, 3)), label="a period")
     axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="share of ticks")
     axes.legend(loc="lower left")
+    return figure
+
+
+def link_figure(recording: Recording) -> Figure:
+    """How the device answered: round trip and staleness of its readings, and how many were lost or refused."""
+    figure, (times, counts) = _panels(2)
+    t = _thinned(recording, "t")
+    for name, color, says in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
+                              ("jitter", AXES[0], "jitter")):  # fmt: skip
+        values = 1e6 * _thinned(recording, name)
+        if np.isfinite(values).any():
+            times.plot(t, values, color=color, lw=0.8, label=says)
+    times.set(title="how the device answers", ylabel="[µs]", yscale="log")
+    for name, color in (("lost", FIELD), ("refused", AXES[1]), ("missed", "#9aa3b2")):
+        counts.plot(t, _thinned(recording, name), color=color, label="deadlines missed" if name == "missed" else name)
+    counts.set(title="readings lost and refused, and deadlines that the servo missed, so far", xlabel="t [s]")
+    for axes in (times, counts):
+        if axes.lines:
+            axes.legend(loc="upper left", ncols=3)
     return figure
 
 

@@ -8,6 +8,7 @@ servo is
 Whatever cannot be a reading raises `DriverFault`; who drives latches it, lets go, and says why.
 """
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -71,12 +72,46 @@ TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, JITTER, STALENESS, TELEMETRY_SIZE = 0,
 the arrival's jitter [s] (RFC 3550, section 6.4.1), and how much later than the quickest the last one came [s].
 What a transport cannot tell is NaN."""
 
+DRIFT = 2e-4
+"""How fast two clocks may go apart: 100 ppm each, which quartz keeps; in ten minutes that is 0.12 s."""
+
 
 def fresh_telemetry() -> Array:
     """Telemetry of a device that has told nothing yet: nothing read, lost or refused, all else not known."""
     telemetry = np.full(TELEMETRY_SIZE, np.nan)
     telemetry[[LOST, READ, BAD]] = 0.0
     return telemetry
+
+
+class Arrivals:
+    """Jitter and staleness of readings from when they came and when the device says that it made them.
+
+    The two clocks began at different times and drift: only how the difference changes means something, and the quickest
+    reading is forgotten at the rate of `DRIFT`.
+
+    Parameters
+    ----------
+    telemetry : Array
+        See `TEMPERATURE`; its jitter and staleness are written.
+    """
+
+    def __init__(self, telemetry: Array):
+        self._told, self._delay, self._quickest, self._came = telemetry, math.nan, math.nan, math.nan
+
+    def again(self) -> None:
+        """A device that began again has another clock."""
+        self._delay = math.nan
+
+    def note(self, now: float, made: float) -> None:
+        """A reading came at `now` that was made at `made`, each by its own clock [s]."""
+        delay, told = now - made, self._told
+        if math.isnan(self._delay):
+            self._quickest, told[JITTER] = delay, 0.0
+        else:
+            told[JITTER] += (abs(delay - self._delay) - told[JITTER]) / 16.0
+            self._quickest = min(delay, self._quickest + DRIFT * (now - self._came))
+        self._delay, self._came = delay, now
+        told[STALENESS] = delay - self._quickest
 
 
 class Driver(Protocol):

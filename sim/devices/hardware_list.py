@@ -68,6 +68,15 @@ class FoundDevice:
     note: str
     usable: bool
 
+    def where(self) -> str:
+        """Bus, vendor and product number, transport and path, in columns."""
+        ids = f"{self.vendor_id:04x}:{self.product_id:04x}" if self.vendor_id else "-"
+        return f"{self.bus or '-':9} {ids:9} {self.transport:7} {self.path}"
+
+    def who(self) -> str:
+        """Vendor and product, as the device tells them."""
+        return " ".join(filter(None, (self.vendor, self.product)))
+
     def udev_rule(self) -> str:
         """The rule that gives this device's node to who sits at the machine."""
         ids = f'ATTRS{{idVendor}}=="{self.vendor_id:04x}", ATTRS{{idProduct}}=="{self.product_id:04x}"'

@@ -20,12 +20,11 @@ from controllers.state import Array
 from sim.devices import hid_protocol as protocol
 from sim.devices.driver import (
     BAD,
-    JITTER,
     LOST,
     READ,
     ROUND_TRIP,
-    STALENESS,
     TEMPERATURE,
+    Arrivals,
     DeviceIdentity,
     DriverFault,
     fresh_telemetry,
@@ -88,6 +87,7 @@ class HidPhantom:
         handle.set_nonblocking(True)
         self._take_identity()
         self.telemetry = fresh_telemetry()
+        self._arrivals = Arrivals(self.telemetry)
         self._take_calibration()
         self._last: int | None = None  # number of the last input report
         self._taken = self._bad = 0
@@ -95,7 +95,6 @@ class HidPhantom:
         self._enabled_since: int | None = None  # number of the output report that switched the motors on
         self._again = False  # the motors went off while nobody was there: switch off, then on
         self._given = math.nan  # device's time of the reading that was handed out last
-        self._arrival = self._quickest = math.nan
 
     def _feature(self, number: int) -> Any:
         try:
@@ -217,7 +216,7 @@ class HidPhantom:
         if boot == before:
             return
         self._last = self._enabled_since = None
-        self._arrival = self._quickest = math.nan
+        self._arrivals.again()
         try:
             self._take_identity()
             self._take_calibration()
@@ -248,14 +247,7 @@ class HidPhantom:
             told[TEMPERATURE + i] = math.nan if celsius == protocol.NO_TEMPERATURE else celsius * _CELSIUS
         if 0 <= self._sent - report.answered < _SENT and report.answered > 0:
             told[ROUND_TRIP] = now - self._sent_at[report.answered % _SENT] - report.held_us * 1e-6
-        # The two clocks began at different times: only how the difference changes means something.
-        delay = now - report.time_us * 1e-6
-        if math.isnan(self._arrival):
-            self._quickest, told[JITTER] = delay, 0.0
-        else:
-            told[JITTER] += (abs(delay - self._arrival) - told[JITTER]) / 16.0
-        self._arrival, self._quickest = delay, min(delay, self._quickest)
-        told[STALENESS] = delay - self._quickest
+        self._arrivals.note(now, report.time_us * 1e-6)
 
     def _judge_status(self, status: int) -> None:
         hottest = -math.inf

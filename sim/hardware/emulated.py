@@ -11,7 +11,7 @@ from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
 from models.scene import SceneConfig
 from sim.compilation.compiled import entry_point
-from sim.devices.driver import READ, TELEMETRY_SIZE, TEMPERATURE, DeviceIdentity
+from sim.devices.driver import READ, DeviceIdentity, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
 from sim.errors import SimError
 from sim.users.arm import Arm
@@ -86,8 +86,7 @@ class EmulatedPhantom:
         self._applied, self._last, self._motors = np.zeros((steps, 3)), np.zeros(3), list(self.port.motor)
         self._steps, self._told = 0, 0
         self.torque = np.zeros(3)
-        self.telemetry = np.zeros(TELEMETRY_SIZE)
-        self.telemetry[TEMPERATURE : TEMPERATURE + 3] = np.nan
+        self.telemetry = fresh_telemetry()
         self.identity = emulated_identity("MuJoCo", not any(linkage.offset))
 
     @property

@@ -1,6 +1,7 @@
 """The emulated Phantom in a process of its own, behind packets, with a watchdog: what the servo's end cannot spare it.
 
-Packets carry eight-byte numbers, one whole reading or command each, as reports of USB HID do. Each command lets a servo
+Packets carry eight-byte numbers, one whole reading, with the time at which it was sent, or command each, as reports of
+USB HID do. Each command lets a servo
 period pass in the device, and is answered by a reading. When none comes for the watchdog's time, that time passes in
 the device under the last command, then its motors go off, and its time goes on by itself.
 """
@@ -17,7 +18,7 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from sim.devices.driver import LOST, READ, ROUND_TRIP, TELEMETRY_SIZE, TEMPERATURE, DriverFault
+from sim.devices.driver import LOST, READ, ROUND_TRIP, Arrivals, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
 from sim.hardware.realtime import become_realtime
@@ -25,6 +26,7 @@ from sim.hardware.shared import SharedNumbers
 
 WATCHDOG = 0.02
 """Time without a command after which the device lets go [s]: twenty periods at 1 kHz."""
+_SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # in a reading's packet: when it was sent, and how many numbers
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
 """What a bystander sees of the device: torques of its motors [N m], how often its watchdog let go, its clock [s]."""
 
@@ -44,7 +46,7 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
     device.write(np.zeros(3), False)
     if realtime:
         become_realtime()
-    reading, shown, trips, quiet = np.zeros(READING_SIZE), np.zeros(SHOWN_SIZE), 0, True
+    packet, shown, trips, quiet = np.zeros(_PACKET), np.zeros(SHOWN_SIZE), 0, True
     off, last = np.zeros(3), np.zeros(4)
     while os.getppid() == parent:
         command = _command(end.packets, end.period if quiet else WATCHDOG)
@@ -58,12 +60,13 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
         else:
             quiet, last = False, command
             device.write(command[:3], command[3] > 0.0)
-        device.read(reading, 0.0)
+        device.read(packet[:READING_SIZE], 0.0)
         shown[SHOWN_TORQUE : SHOWN_TORQUE + 3] = device.torque
         shown[SHOWN_TRIPS], shown[SHOWN_CLOCK] = trips, device.clock
         end.shown.write(shown)
+        packet[_SENT_AT] = time.monotonic()
         try:
-            end.packets.send(reading.tobytes(), socket.MSG_DONTWAIT)
+            end.packets.send(packet, socket.MSG_DONTWAIT)
         except OSError:
             if command is None:
                 time.sleep(end.period)  # nobody takes its readings, or is there
@@ -94,48 +97,49 @@ class EmulatedDriver:
     def __init__(self, packets: socket.socket, calibrated: bool = True):
         packets.setblocking(False)
         self._packets, self._sent, self._sequence = packets, time.monotonic(), 0.0
-        self._command = np.zeros(4)
-        self.telemetry = np.zeros(TELEMETRY_SIZE)
-        self.telemetry[TEMPERATURE : TEMPERATURE + 3] = np.nan
+        self._command, self._packet = np.zeros(4), np.zeros(_PACKET + 1)  # room that shows a packet that is too long
+        self.telemetry = fresh_telemetry()
+        self._arrivals = Arrivals(self.telemetry)
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`."""
-        packet = self._packet()
-        if packet is None and select.select([self._packets], [], [], timeout)[0]:
-            packet = self._packet()
-        newest = packet
-        while packet is not None:
-            newest, packet = packet, self._packet()
-        if newest is None:
+        new = self._take(reading)
+        if not new and select.select([self._packets], [], [], timeout)[0]:
+            new = self._take(reading)
+        while new and self._take(reading):
+            pass
+        if not new:
             return False
-        reading[:] = np.frombuffer(newest)
-        number = float(reading[READING_SEQUENCE])
-        self.telemetry[ROUND_TRIP] = time.monotonic() - self._sent
+        number, now = float(reading[READING_SEQUENCE]), time.monotonic()
+        self.telemetry[ROUND_TRIP] = now - self._sent
         self.telemetry[READ] += 1
         self.telemetry[LOST] += max(0.0, number - self._sequence - 1.0) if self._sequence else 0.0
+        self._arrivals.note(now, float(self._packet[_SENT_AT]))
         self._sequence = number
         return True
 
-    def _packet(self) -> bytes | None:
+    def _take(self, reading: Array) -> bool:
+        """Take the next packet; False if there is none."""
         try:
-            packet = self._packets.recv(8 * READING_SIZE)
+            size = self._packets.recv_into(self._packet)
         except BlockingIOError:
-            return None
+            return False
         except OSError:
-            packet = b""
-        if len(packet) == 0:
+            size = 0
+        if size == 0:
             raise DriverFault(Fault.UNPLUGGED)
-        if len(packet) != 8 * READING_SIZE:
-            raise DriverFault(Fault.REPORT_MALFORMED, len(packet))
-        return packet
+        if size != 8 * _PACKET:
+            raise DriverFault(Fault.REPORT_MALFORMED, size)
+        reading[:] = self._packet[:READING_SIZE]
+        return True
 
     def write(self, torque: Array, enable: bool) -> None:
         """As `sim.devices.driver.Driver`."""
         self._command[:3], self._command[3] = torque, float(enable)
         self._sent = time.monotonic()
         try:
-            self._packets.send(self._command.tobytes())
+            self._packets.send(self._command)
         except BlockingIOError:
             pass  # the device does not keep up; its readings will be stale
         except OSError:

@@ -8,7 +8,7 @@ from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import Array
-from sim.devices.driver import LOST, ROUND_TRIP, TEMPERATURE, Driver, DriverFault
+from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
 from sim.hardware.gated_tick import GateMemory, gated_tick
@@ -24,7 +24,7 @@ CHANNELS: dict[str, tuple[int, ...]] = {
     "force": (3,), "asked": (3,), "torque": (3,), "tank": (), "tank_scale": (), "phase": (), "nearest": (3,),
     "distance": (), "river": (), "fault": (), "fault_value": (), "gaps": (), "state": (), "gain": (), "share": (),
     "heat": (), "missed": (), "lateness": (), "compute": (), "sequence": (), "clock": (), "theta": (3,),
-    "gimbal": (3,), "round_trip": (), "lost": (), "temperature": (3,),
+    "gimbal": (3,), "round_trip": (), "jitter": (), "staleness": (), "lost": (), "refused": (), "temperature": (3,),
 }  # fmt: skip
 """What a tick leaves behind: the loop's, the gate's (`asked` is before it, `force` after), clock's and device's."""
 
@@ -90,13 +90,31 @@ class Ticker:
         self.gated = GateMemory.of(parts.gate, parts.driver.identity.own_weight)
         self._ticks, self._frames = make_logs(parts.servo, 1)
         self._timeout = READ_SHARE * parts.gate.period
-        self.row = np.zeros(ROW_SIZE)
-        self._tick_views = [
-            (self.row[_PLACES[name]], channel.reshape(-1))
-            for name, channel in tick_channels(self._ticks, 1).items()
-            if name in CHANNELS and name not in ("force", "torque", "fault", "fault_value", "gaps")
-        ]
+        self.row, self._number = np.zeros(ROW_SIZE), np.zeros(1)
         self._views = {name: self.row[place] for name, place in _PLACES.items()}
+        self._sources = self._row_sources()
+
+    def _row_sources(self) -> list[Array]:
+        """Where the numbers of a row come from, one after the other: views, so that keeping a row makes no memory."""
+        device, gated, told = self._device, self.gated, self.parts.driver.telemetry
+        one = {
+            "tick": (self._number, 0), "fault": (device.faults, FAULT_CODE),
+            "fault_value": (device.faults, FAULT_VALUE), "gaps": (device.faults, FAULT_GAPS),
+            "state": (gated.gate, GATE_STATE), "gain": (gated.gate, GATE_GAIN),
+            "share": (gated.gate, GATE_SHARE), "heat": (gated.told, 0), "sequence": (device.reading, READING_SEQUENCE),
+            "clock": (device.reading, READING_CLOCK), "round_trip": (told, ROUND_TRIP), "jitter": (told, JITTER),
+            "staleness": (told, STALENESS), "lost": (told, LOST), "refused": (told, BAD),
+        }  # fmt: skip
+        sources = {name: channel.reshape(-1) for name, channel in tick_channels(self._ticks, 1).items()}
+        sources |= {name: array[place : place + 1] for name, (array, place) in one.items()}
+        sources |= {
+            "asked": self.parts.servo.field.force, "force": gated.force, "torque": gated.torque,
+            "theta": device.reading[READING_THETA : READING_THETA + 3],
+            "gimbal": device.reading[READING_GIMBAL : READING_GIMBAL + 3],
+            "temperature": told[TEMPERATURE : TEMPERATURE + 3],
+            "missed": self._views["missed"], "lateness": self._views["lateness"], "compute": self._views["compute"],
+        }  # fmt: skip
+        return [sources[name] for name in CHANNELS]
 
     @property
     def state(self) -> State:
@@ -134,30 +152,8 @@ class Ticker:
             self.fail(found.fault, found.value)
         if not self.gated.pushes and device.faults[FAULT_CODE] != 0.0:
             parts.driver.let_go()
-        self._keep(number)
-
-    def _keep(self, number: int) -> None:
-        """Fill the row."""
-        device, gated, view, telemetry = self._device, self.gated, self._views, self.parts.driver.telemetry
-        for place, channel in self._tick_views:
-            place[:] = channel
-        view["tick"][0] = number
-        view["asked"][:], view["force"][:] = self.parts.servo.field.force, gated.force
-        view["torque"][:] = gated.torque
-        faults = device.faults
-        view["fault"][0], view["fault_value"][0], view["gaps"][0] = (
-            faults[FAULT_CODE],
-            faults[FAULT_VALUE],
-            faults[FAULT_GAPS],
-        )
-        view["state"][0], view["gain"][0] = gated.gate[GATE_STATE], gated.gate[GATE_GAIN]
-        view["share"][0], view["heat"][0] = gated.gate[GATE_SHARE], gated.told[0]
-        reading = device.reading
-        view["sequence"][0], view["clock"][0] = reading[READING_SEQUENCE], reading[READING_CLOCK]
-        view["theta"][:] = reading[READING_THETA : READING_THETA + 3]
-        view["gimbal"][:] = reading[READING_GIMBAL : READING_GIMBAL + 3]
-        view["round_trip"][0], view["lost"][0] = telemetry[ROUND_TRIP], telemetry[LOST]
-        view["temperature"][:] = telemetry[TEMPERATURE : TEMPERATURE + 3]
+        self._number[0] = number
+        np.concatenate(self._sources, out=self.row)
 
     def note_time(self, missed: int, lateness: float, compute: float) -> None:
         """Add to the row what the clock says: deadlines missed so far, lateness and computing time of this tick [s]."""

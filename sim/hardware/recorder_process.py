@@ -18,7 +18,8 @@ from models.scene import SceneConfig
 from sim.hardware.gated_servo import CHANNELS, ROW_SIZE, columns
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
-from sim.recording.recorder import Group, Recorder
+from sim.recording.recorder import DiskFull, Group, Recorder
+from sim.recording.recording import RecordingError
 
 TOLD_ROWS, TOLD_DROPPED, TOLD_ERROR, TOLD_FORCE, TOLD_APART, TOLD_READY, TOLD_SIZE = 0, 1, 2, 3, 6, 7, 8
 """What it tells: rows written and dropped, errno of what stopped it, the hand's force [N], twin from device [m], and
@@ -90,7 +91,8 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, told: Shar
                 time.sleep(_REST)
             recorder.flush()
             recorder.close({"rows": int(status[TOLD_ROWS]), "dropped": int(status[TOLD_DROPPED])})
-    except (OSError, RuntimeError) as error:
-        status[TOLD_ERROR] = float(getattr(error, "errno", None) or errno.EIO)
+    except (OSError, RuntimeError, RecordingError) as error:
+        full = errno.ENOSPC if isinstance(error, DiskFull) else errno.EIO
+        status[TOLD_ERROR] = float(getattr(error, "errno", None) or full)
         told.write(status)
         os._exit(1)  # HDF5 would write again on its way out

@@ -132,7 +132,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
     except (SimError, ControllerError, ModelError, OSError) as error:
         channels.told.send(Refused(str(error)))
         return
-    process = _ServoProcess(Ticker(parts), channels, clock)
+    process = ServoProcess(Ticker(parts), channels, clock)
     broken = ""
     try:
         process.begin()
@@ -149,13 +149,25 @@ def _leave(number: int, frame: object) -> None:
     raise SystemExit(0)
 
 
-class _ServoProcess:
+class ServoProcess:
+    """A servo against the clock: what `serve` runs.
+
+    Parameters
+    ----------
+    ticker : Ticker
+        What is driven.
+    channels, clock
+        Of `serve`.
+    """
+
     def __init__(self, ticker: Ticker, channels: Channels, clock: ServoClock):
         self._ticker, self._channels, self._clock = ticker, channels, clock
         self._period = ticker.parts.gate.period
         self._order = np.zeros(ORDER_SIZE)
+        self._ordered = self._order.data  # whose items are Python's numbers
         self._compute, self._lateness = Spread(), Spread()
         self._ticks = self._missed = 0
+        self._heard, self._beat, self._done = time.monotonic(), -1.0, 0.0
         self._resources = _resources()
 
     def begin(self) -> None:
@@ -166,40 +178,43 @@ class _ServoProcess:
         self._channels.told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:
-        """Tick at absolute deadlines."""
-        ticker, period, order, parent = self._ticker, self._period, self._order, os.getppid()
-        begin = heard = time.monotonic()
-        number, beat, done = 1, -1.0, 0.0
+        """Tick at absolute deadlines, until there is an order to end, or nobody who could give one."""
+        period, parent = self._period, os.getppid()
+        begin = self._heard = time.monotonic()
+        number, settled = 1, round(1.0 / period)
         while True:
             late = wait_until(begin + number * period)
             skipped = int(late / period)
             self._missed += skipped
             number += skipped
-            if late > self._clock.late:
-                ticker.fail(Fault.SERVO_LATE, late)
-            now = time.monotonic()
-            self._channels.orders.read(order)
-            if order[ORDER_STOP] > 0.0 or (self._ticks % _PARENT_EVERY == 0 and os.getppid() != parent):
+            if not self.turn(number, late) or (self._ticks % _PARENT_EVERY == 0 and os.getppid() != parent):
                 return
-            if order[ORDER_BEAT] != beat:
-                beat, heard = order[ORDER_BEAT], now
-            elif now - heard > self._clock.heartbeat:
-                ticker.fail(Fault.CONTROL_LOST, now - heard)
-            request, done = (
-                (int(order[ORDER_REQUEST]) if order[ORDER_NUMBER] != done else NO_REQUEST),
-                order[ORDER_NUMBER],
-            )
-            ticker.tick(number, request)
-            compute = time.monotonic() - now
-            ticker.note_time(self._missed, late, compute)
-            self._channels.status.write(ticker.row)
-            self._channels.rows.append(ticker.row)
-            self._compute.add(compute)
-            self._lateness.add(late)
-            self._ticks += 1
             number += 1
-            if self._ticks == round(1.0 / period):
+            if self._ticks == settled:
                 self._resources = _resources()
+
+    def turn(self, number: int, late: float) -> bool:
+        """Do tick `number`, which begins late by so much [s]; False, and none, if there is an order to end."""
+        now, order, ticker, channels = time.monotonic(), self._ordered, self._ticker, self._channels
+        channels.orders.read(self._order)
+        if order[ORDER_STOP] > 0.0:
+            return False
+        if late > self._clock.late:
+            ticker.fail(Fault.SERVO_LATE, late)
+        if order[ORDER_BEAT] != self._beat:
+            self._beat, self._heard = order[ORDER_BEAT], now
+        elif now - self._heard > self._clock.heartbeat:
+            ticker.fail(Fault.CONTROL_LOST, now - self._heard)
+        new, self._done = order[ORDER_NUMBER] != self._done, order[ORDER_NUMBER]
+        ticker.tick(number, int(order[ORDER_REQUEST]) if new else NO_REQUEST)
+        compute = time.monotonic() - now
+        ticker.note_time(self._missed, late, compute)
+        channels.status.write(ticker.row)
+        channels.rows.append(ticker.row)
+        self._compute.add(compute)
+        self._lateness.add(late)
+        self._ticks += 1
+        return True
 
     def ended(self, broken: str) -> Ended:
         """What to say at the end."""

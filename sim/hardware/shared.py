@@ -11,7 +11,7 @@ import numpy as np
 
 from controllers.state import Array
 
-_TRIES = 200
+_TRIES = 20  # so a writer that was stopped in the middle costs its reader microseconds
 
 
 class SharedNumbers:
@@ -32,8 +32,8 @@ class SharedNumbers:
     def __init__(self, size: int, name: str | None = None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (size + 1))
         self._size, self._owner = size, name is None
-        self._sequence = np.ndarray(1, np.int64, self._memory.buf)
-        self._numbers = np.ndarray(size, np.float64, self._memory.buf, 8)
+        self._sequence = self._memory.buf[:8].cast("q")
+        self._numbers, self._whole = np.ndarray(size, np.float64, self._memory.buf, 8), np.zeros(size)
         if self._owner:
             self._sequence[0] = 0
             self._numbers[:] = 0.0
@@ -48,17 +48,19 @@ class SharedNumbers:
         self._sequence[0] += 1
 
     def read(self, into: Array) -> bool:
-        """Read all of them, shape (size,); False if a writer was stopped in the middle of them."""
+        """Read all of them, shape (size,); False, and nothing, if a writer was stopped in the middle of them."""
         for _ in range(_TRIES):
-            before = int(self._sequence[0])
-            into[:] = self._numbers
-            if before % 2 == 0 and before == int(self._sequence[0]):
+            before = self._sequence[0]
+            self._whole[:] = self._numbers
+            if before % 2 == 0 and before == self._sequence[0]:
+                into[:] = self._whole
                 return True
         return False
 
     def close(self) -> None:
         """Let the memory go; who made it removes it."""
-        del self._sequence, self._numbers
+        self._sequence.release()
+        del self._numbers
         self._memory.close()
         if self._owner:
             self._memory.unlink()
@@ -78,7 +80,7 @@ class Ring:
     def __init__(self, rows: int, width: int, name: str | None = None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (rows * width + 1))
         self._shape, self._owner = (rows, width), name is None
-        self._count = np.ndarray(1, np.int64, self._memory.buf)
+        self._count = self._memory.buf[:8].cast("q")
         self._rows = np.ndarray((rows, width), np.float64, self._memory.buf, 8)
         self._taken = 0
         if self._owner:
@@ -89,7 +91,7 @@ class Ring:
 
     def append(self, row: Array) -> None:
         """Append a row, shape (width,), and count it only then."""
-        self._rows[int(self._count[0]) % self._shape[0]] = row
+        self._rows[self._count[0] % self._shape[0]] = row
         self._count[0] += 1
 
     def take(self) -> tuple[Array, int]:
@@ -102,17 +104,18 @@ class Ring:
         lost : int
             Rows before them that were overwritten.
         """
-        rows, first, count = self._shape[0], self._taken, int(self._count[0])
+        rows, first, count = self._shape[0], self._taken, self._count[0]
         begin = max(first, count - rows + 1)
         taken = self._rows[np.arange(begin, count) % rows]
         # What was written over meanwhile: the row that is being written, and those before it.
-        sound = max(begin, int(self._count[0]) - rows + 1)
+        sound = max(begin, self._count[0] - rows + 1)
         self._taken = count
         return taken[min(sound, count) - begin :], min(sound, count) - first
 
     def close(self) -> None:
         """Let the memory go; who made it removes it."""
-        del self._count, self._rows
+        self._count.release()
+        del self._rows
         self._memory.close()
         if self._owner:
             self._memory.unlink()

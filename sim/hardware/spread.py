@@ -1,5 +1,6 @@
 """How long something took, over any number of times, in memory that does not grow."""
 
+from array import array
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ class Spread:
     """Counts times by the microsecond."""
 
     def __init__(self) -> None:
-        self._counts = np.zeros(_BINS, dtype=np.int64)
+        self._counts = array("q", bytes(8 * _BINS))
         self._longest = 0.0
 
     def add(self, seconds: float) -> None:
@@ -32,7 +33,7 @@ class Spread:
 
     def quantiles(self) -> Quantiles:
         """What has been counted; zeros where nothing was."""
-        total = np.cumsum(self._counts)
+        total = np.cumsum(np.frombuffer(self._counts, np.int64))
         count = int(total[-1])
         p50, p99, p999 = (float(np.searchsorted(total, share * count) + 1) * BIN for share in (0.5, 0.99, 0.999))
         longest = self._longest

@@ -1,5 +1,6 @@
 """A page in the browser on which a run is seen while it goes on: the live stage, a clock, and where to look from."""
 
+import html
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -59,14 +60,15 @@ class LivePage:
 
         self._server.on_client_connect(lambda client: look_from(client, VIEWS["both"]))
 
-    def show(self, shown: Shown) -> None:
-        """Show a moment, unless the last one was shown less than a thirtieth of a second ago."""
+    def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
+        """Show a moment with notes below its time, unless the last was shown less than a thirtieth of a second ago."""
         now = time.monotonic()
         if now - self._shown < 1 / _FPS:
             return
         self._shown = now
         with self._server.atomic():
-            self._clock.content = f'<p style="margin:.3rem .75rem"><b>{shown.t:.2f} s</b></p>'
+            said = "".join(f"<br>{html.escape(note)}" for note in notes)
+            self._clock.content = f'<p style="margin:.3rem .75rem"><b>{shown.t:.2f} s</b>{said}</p>'
             self._stage.show(shown)
 
     def close(self) -> None:

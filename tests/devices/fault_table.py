@@ -94,6 +94,8 @@ def table() -> Iterator[str]:
         [sys.executable, "-m", "pytest", "-o", "addopts=", "-v", "-k", names, *TESTS],
         cwd=ROOT, capture_output=True, text=True, check=False,
     ).stdout  # fmt: skip
+    if "failed" in told.splitlines()[-1]:
+        print(told, file=sys.stderr)
     for process in PROCESSES:
         lines = [line for line in told.splitlines() if f"::{process.test}" in line]
         passed = bool(lines) and all("PASSED" in line for line in lines)

@@ -13,7 +13,7 @@ from tests.devices.wire_faults import INJECTIONS, ORDERS, Order, Wire, inject, s
 TWO_TICKS = 2
 
 
-def check(order: Order, seed: int, library: Path, folder: Path) -> None:
+def assert_lets_go_and_stays(order: Order, seed: int, library: Path, folder: Path) -> None:
     told = inject(order, seed, library, folder)
     assert told.fault is order.fault
     assert told.detected <= told.evident
@@ -25,14 +25,14 @@ def check(order: Order, seed: int, library: Path, folder: Path) -> None:
 
 @pytest.mark.parametrize("order", ORDERS, ids=lambda order: order.do.__name__)
 def test_the_force_is_zero_within_two_ticks_and_the_reason_is_latched(order, firmware_library, tmp_path) -> None:
-    check(order, 0, firmware_library, tmp_path)
+    assert_lets_go_and_stays(order, 0, firmware_library, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", ORDERS, ids=lambda order: order.do.__name__)
 def test_so_it_is_wherever_and_whenever_it_comes(order, firmware_library, tmp_path) -> None:
     for seed in range(1, INJECTIONS):
-        check(order, seed, firmware_library, tmp_path)
+        assert_lets_go_and_stays(order, seed, firmware_library, tmp_path)
 
 
 def test_the_table_in_the_documents_has_every_injection_and_at_least_a_hundred() -> None:
@@ -44,7 +44,7 @@ def test_the_table_in_the_documents_has_every_injection_and_at_least_a_hundred()
 
 
 @pytest.mark.parametrize("seed", range(INJECTIONS))
-def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(firmware_library, seed: int) -> None:
+def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(firmware_library, tmp_path, seed: int) -> None:
     """Losses, duplicates, reports that bunch up, and one spoiled report at a time."""
     rng, wire = np.random.default_rng([seed, 19]), Wire(firmware_library)
     wire.active(20)
@@ -72,10 +72,13 @@ def test_what_a_bus_does_now_and_then_is_counted_and_takes_no_force(firmware_lib
     assert told[BAD] == last.count("twice") + last.count("bits")
     assert told[LOST] >= last.count("lost")
     assert told[READ] > 250
+    assert wire.recorded(tmp_path / "run.h5")
 
 
 @pytest.mark.parametrize("milliseconds", [5, 50, 500])
-def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(firmware_library, milliseconds: int) -> None:
+def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(
+    firmware_library, tmp_path, milliseconds: int
+) -> None:
     wire = Wire(firmware_library)
     wire.active(300)
     for _ in range(milliseconds):
@@ -92,6 +95,7 @@ def test_a_host_that_was_away_lets_go_of_the_device_and_ramps_in_again(firmware_
     assert wire.firmware.motors.on
     assert max(forces[:5]) < 0.3 * max(forces)
     assert np.abs(np.diff(forces)).max() < 0.2
+    assert wire.recorded(tmp_path / "run.h5")
 
 
 def test_another_fault_does_not_hide_the_first(firmware_library) -> None:

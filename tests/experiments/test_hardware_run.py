@@ -67,6 +67,14 @@ def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys) -> Non
     assert "expected --certificate" in said
 
 
+@pytest.mark.parametrize("limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--ramp", "0.01")])
+def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
+    said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
+    assert limit[0] in said
+    assert "on a real device" in said
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_folder_that_holds_a_run_is_kept(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
     assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
@@ -99,6 +107,8 @@ def test_a_certificate_that_is_unknown_or_for_less_delay_arms_nothing(tmp_path: 
 def test_a_device_without_motors_or_zero_is_not_armed_and_one_without_a_watchdog_is_announced() -> None:
     assert check_device(KNOWN, None) == []
     assert "no watchdog" in check_device(KNOWN._replace(watchdog=False), None)[0]
+    assert "no Phantom by build" in check_device(KNOWN._replace(own_weight=True), None)[0]
+    assert check_device(KNOWN._replace(own_weight=True), None, identified=True) == []
     with pytest.raises(SimError, match="not calibrated"):
         check_device(KNOWN._replace(calibrated=False), None)
     with pytest.raises(SimError, match="no motors"):
@@ -175,6 +185,9 @@ def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_s
     assert told["delay"]["value"] == [1e-4]
     assert told["calibration"]["name"] == "emulated Phantom"
     assert "--overwrite" in refused(capsys, *arguments)
+    capsys.readouterr()
+    assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == read_device_file(file)
 
 
 def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:

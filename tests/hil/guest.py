@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers.safety.faults import Fault
-from experiments.hardware.doctor import measured_link
+from experiments.hardware.link import measured_link
 from sim.devices.driver import DriverFault
 from sim.devices.hardware_list import found_devices, open_device
 from tests.devices.firmware import Firmware

@@ -8,7 +8,7 @@ from controllers.safety.faults import FAULT_RAMP, Fault
 from controllers.safety.oscillation import OscillationDetector
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
-from sim.hardware.gated_servo import GatedServo, Ticker
+from sim.hardware.gated_servo import GatedServo, Ticker, columns
 from sim.world.linkage import Linkage
 from tests.sim.bare_servos import bare_servo, device_world, follow_program, simulated
 from tests.sim.bare_servos import run as run_bare
@@ -63,7 +63,7 @@ def test_disarmed_motors_are_off() -> None:
 def test_disarming_lets_go_in_its_tick() -> None:
     ticker = Ticker(gated_servo(**AT_ONCE))
     first = active(ticker)
-    assert ticker.row[21:24].any() or ticker.gated.force.any()
+    assert columns(ticker.row[None])["torque"].any()
     rows = run(ticker, 20, first, DISARM)
     assert not rows["torque"].any()
 
@@ -109,7 +109,7 @@ def test_a_memory_or_a_field_that_is_no_number(part: str, bad: float) -> None:
     ticker = Ticker(parts)
     first = active(ticker)
     getattr(parts.servo.field, part)[0 if part != "params" else slice(None)] = bad
-    _check(ticker, first, faults[part])
+    assert_faulted(ticker, first, faults[part])
 
 
 def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None:
@@ -121,7 +121,7 @@ def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None
     first = active(ticker)
     assert ticker.state is State.ACTIVE
     setattr(broken, attribute, order)
-    _check(ticker, first, fault, within)
+    assert_faulted(ticker, first, fault, within)
     assert not broken.last.any() or attribute == "write_fault"
     assert broken.let_go_calls > 0
     if attribute in ("read_fault", "write_fault"):
@@ -137,7 +137,7 @@ def assert_lets_go(attribute: str, order, fault: Fault, within: int = 2) -> None
     assert rows["force"][-1].any()
 
 
-def _check(ticker: Ticker, first: int, fault: Fault, within: int = 2) -> None:
+def assert_faulted(ticker: Ticker, first: int, fault: Fault, within: int = 2) -> None:
     rows = run(ticker, 30, first)
     assert ticker.fault is not None
     assert ticker.fault.fault is fault
@@ -162,7 +162,7 @@ def test_encoder_offsets_are_taken_off_once_also_where_no_reading_came() -> None
     before = again.row.copy()
     broken.silent = 3
     run(again, 3, 2)
-    np.testing.assert_array_equal(before[-15:-12], again.row[-15:-12])
+    np.testing.assert_array_equal(columns(before[None])["theta"], columns(again.row[None])["theta"])
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])

@@ -1,0 +1,115 @@
+"""The person beside a hardware run: Enter arms and disarms, Ctrl-C ends, and what changes is said.
+
+Enter never does more than what is on the screen: keys that were pressed before a question or a fault are thrown away,
+an Enter under force lets go, and the end of the input, such as Ctrl-D, ends the run.
+"""
+
+import contextlib
+import enum
+import os
+import select
+import sys
+import time
+
+from rich.console import Console
+
+from controllers.safety.arming import ARM, CLEAR, DISARM, State
+from controllers.safety.faults import Fault
+from experiments.hardware.link import link_now
+from experiments.hardware.run_options import RunHardware
+from sim.hardware.controls import HardwareRun, Look, Recorded
+
+_POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
+_DISARMED = "Disarmed: the motors are off."
+
+
+class _Key(enum.Enum):
+    NONE = 0
+    ENTER = 1
+    END = 2
+
+
+def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> Look:
+    """Arm, look, and say what changes, for so many seconds [s] from the first arming on; gives the last look.
+
+    With `options.arm` there is nobody to ask: it arms at once, and a fault ends it.
+    """
+    terminal = sys.stdin.isatty() and not options.arm
+    until, state, look, recording = None, None, run.poll(), True
+    if terminal:
+        _forget_keys()
+        console.print("Hold the stylus on its curve, with the switch pressed, and press Enter to arm; Ctrl-C ends.")
+    else:
+        run.request(ARM)
+        until = time.monotonic() + seconds
+    with contextlib.suppress(KeyboardInterrupt), console.status("") as line:
+        while until is None or time.monotonic() < until:
+            time.sleep(_POLL)
+            look = run.poll()
+            line.update(link_now(look.row))
+            if not look.alive:
+                console.print("The servo has stopped; the device's watchdog lets go.")
+                return look
+            if look.recorded is not None and not look.recorded.alive and recording:
+                recording = False
+                console.print(_recording_ended(look.recorded), highlight=False)
+            if look.state is not state:
+                state = look.state
+                console.print(_told(look, options.dead_man, terminal), highlight=False)
+                if terminal and state is State.FAULT:
+                    _forget_keys()
+            if look.fault is not Fault.NONE and not terminal:
+                return look
+            key = _key() if terminal else _Key.NONE
+            if key is _Key.END:
+                break
+            if key is _Key.ENTER and _obeyed(run, look):
+                until = until or time.monotonic() + seconds
+    run.request(DISARM)
+    return look
+
+
+def _recording_ended(recorded: Recorded) -> str:
+    why = f" ({os.strerror(recorded.error)})" if recorded.error else ""
+    return f"The recording has ended{why} after {recorded.rows} ticks; what it has is kept, and the run goes on."
+
+
+def _obeyed(run: HardwareRun, look: Look) -> bool:
+    """Do what Enter means in a state; whether it arms."""
+    if look.state not in (State.DISARMED, State.FAULT):
+        run.request(DISARM)
+        return False
+    if look.state is State.FAULT:
+        run.request(CLEAR)
+        time.sleep(2.0 * _POLL)
+    run.request(ARM)
+    return True
+
+
+def _key() -> _Key:
+    """What has been pressed."""
+    if not select.select([sys.stdin], [], [], 0.0)[0]:
+        return _Key.NONE
+    return _Key.ENTER if sys.stdin.readline() else _Key.END
+
+
+def _forget_keys() -> None:
+    """Throw away what was typed so far."""
+    import termios  # not on Windows
+
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+
+
+def _told(look: Look, dead_man: bool, terminal: bool) -> str:
+    again = " Enter arms it." if terminal else ""
+    said = {
+        State.DISARMED: _DISARMED + again,
+        State.ARMING: "Arming: no force yet"
+        + (", the switch has to be held, and" if dead_man else ";")
+        + " the force that is asked for has to be small first.",
+        State.RAMPING: "The force comes in.",
+        State.ACTIVE: "Active." + (" Enter lets go." if terminal else ""),
+        State.FAULT: f"The device let go at {float(look.row['t']):.3f} s: {look.fault.words(look.value)}."
+        + (" Enter clears it, and arms again." if terminal else ""),
+    }
+    return f"{float(look.row['t']):8.2f} s  {said[look.state]}"

@@ -1,0 +1,110 @@
+"""What the keys of who stands beside a device do: Enter arms, and lets go; nothing that was typed before counts."""
+
+import errno
+import os
+import sys
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from controllers.safety.arming import ARM, CLEAR, DISARM, State
+from controllers.safety.faults import Fault
+from experiments.hardware.attend import attend
+from sim.hardware.controls import Look, Recorded
+from sim.hardware.gated_servo import ROW_SIZE, columns
+
+ROW = {name: channel[0] for name, channel in columns(np.zeros((1, ROW_SIZE))).items()}
+Script = dict[int, Callable[["Stand"], object]]
+
+
+class Stand:
+    """A run without processes: what is asked for happens at once; the script has what else happens, by look."""
+
+    def __init__(self, script: Script):
+        self.script, self.looks, self.asked = script, 0, list[int]()
+        self.state, self.fault, self.recorded = State.DISARMED, Fault.NONE, None
+
+    def request(self, event: int) -> None:
+        self.asked.append(event)
+        if event == CLEAR:
+            self.state, self.fault = State.DISARMED, Fault.NONE
+        elif self.state is not State.FAULT:
+            self.state = State.ACTIVE if event == ARM else State.DISARMED
+
+    def fails(self) -> None:
+        self.state, self.fault = State.FAULT, Fault.TOO_FAST
+
+    def poll(self) -> Look:
+        self.script.get(self.looks, lambda stand: None)(self)
+        self.looks += 1
+        return Look(True, self.state, self.fault, 1.6, ROW, self.recorded)
+
+
+@pytest.fixture
+def keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
+    """A terminal in place of this one; types into it."""
+    ours, theirs = os.openpty()
+    with open(theirs, encoding="utf-8") as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        yield lambda typed: os.write(ours, typed)
+    os.close(ours)
+
+
+def test_a_recording_that_has_ended_is_said_once_and_with_its_reason(keys, capsys) -> None:
+    stand, console = Stand({5: _fills_the_disk, 30: _interrupt}), Console(force_terminal=False)
+    attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), console)  # type: ignore[arg-type]
+    said = capsys.readouterr().out
+    assert said.count("The recording has ended (No space left on device) after 700 ticks") == 1
+
+
+def _fills_the_disk(stand: Stand) -> None:
+    stand.recorded = Recorded(False, 700, 0, errno.ENOSPC, np.zeros(3), 0.0)
+
+
+def asked(script: Script, arm: bool = False) -> list[int]:
+    """What is asked of a run that the script ends with Ctrl-C, if with nothing else."""
+    stand = Stand(script | {30: _interrupt})
+    attend(stand, 60.0, SimpleNamespace(arm=arm, dead_man=True), Console(quiet=True))  # type: ignore[arg-type]
+    return stand.asked
+
+
+def _interrupt(stand: Stand) -> None:
+    raise KeyboardInterrupt
+
+
+def test_enter_arms_and_another_lets_go(keys) -> None:
+    assert asked({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
+    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]
+    assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n"), 9: lambda _: keys(b"\n")})[2] == ARM
+
+
+def test_what_was_typed_before_the_question_arms_nothing(keys) -> None:
+    keys(b"\n\n")
+    assert asked({}) == [DISARM]
+
+
+def test_an_enter_that_was_meant_for_a_force_clears_no_fault(keys) -> None:
+    def typed_and_fails(stand: Stand) -> None:
+        keys(b"\n")
+        stand.fails()
+
+    assert asked({3: lambda _: keys(b"\n"), 6: typed_and_fails}) == [ARM, DISARM]
+
+
+def test_a_fault_is_cleared_by_an_enter_after_it(keys) -> None:
+    assert asked({3: lambda _: keys(b"\n"), 6: Stand.fails, 9: lambda _: keys(b"\n")}) == [ARM, CLEAR, ARM, DISARM]
+
+
+def test_the_end_of_the_input_ends_the_run_and_is_no_enter(keys) -> None:
+    stand = Stand({3: lambda _: keys(b"\x04")})
+    attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
+    assert stand.asked == [DISARM]
+    assert stand.looks < 10
+
+
+def test_with_nobody_at_the_keys_a_fault_ends_the_run(keys) -> None:
+    keys(b"\n")
+    assert asked({4: Stand.fails}, arm=True) == [ARM]

@@ -1,0 +1,91 @@
+"""A device that is wired or set up wrong, and a hand that lets go of the stylus: the gate does so before it is fast."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from controllers.safety.arming import ARM, State
+from controllers.safety.faults import Fault
+from models.phantom.kinematics import forward_kinematics
+from sim.devices.exchange import READING_THETA
+from sim.hardware.emulated import EmulatedPhantom
+from sim.hardware.gated_servo import Ticker
+from tests.sim.hardware.emulation import PERIOD, Broken, gated_servo
+
+FASTEST = 2.0
+"""Speed of the tip that nothing may pass [m/s]: the fault's 1.5, and what 4 N add to 75 g in the filter's few ms."""
+FASTEST_UNSEEN = 4.0
+"""With encoders in each other's sockets the gate sees another linkage than there is, and a third of its speed [m/s]."""
+Wiring = Callable[[np.ndarray], np.ndarray]
+
+
+class Miswired(Broken):
+    """A driver between which and its device the torques, or the readings, are mixed up; keeps the tip's true place."""
+
+    def __init__(self, driver: EmulatedPhantom, torque: Wiring, reading: Wiring, late: int = 0):
+        super().__init__(driver)
+        self.torque, self.spoil, self.tips = torque, lambda told: _rewrite(told, reading), list[np.ndarray]()
+        self._under_way = [(np.zeros(3), False)] * late
+
+    def write(self, torque: np.ndarray, enable: bool) -> None:
+        self._under_way.append((self.torque(torque.copy()), enable))
+        super().write(*self._under_way.pop(0))
+        a, b, c = (float(self.driver.port.qpos[place]) for place in self.driver.port.arm_q)
+        self.tips.append(np.array(forward_kinematics((a, b, c))))
+
+    def top_speed(self) -> float:
+        return float(np.linalg.norm(np.diff(self.tips, axis=0), axis=1).max()) / PERIOD
+
+
+def _rewrite(told: np.ndarray, wiring: Wiring) -> None:
+    told[READING_THETA : READING_THETA + 3] = wiring(told[READING_THETA : READING_THETA + 3].copy())
+
+
+def as_it_is(values: np.ndarray) -> np.ndarray:
+    return values
+
+
+def flipped(*joints: int) -> Wiring:
+    signs = np.ones(3)
+    signs[list(joints)] = -1.0
+    return lambda values: signs * values
+
+
+def swapped(values: np.ndarray) -> np.ndarray:
+    return values[[0, 2, 1]]
+
+
+def driven(torque: Wiring, reading: Wiring, late: int = 0) -> tuple[Ticker, Miswired]:
+    """Four seconds from arming, with the default limits and a hand that lets go once the force is in."""
+    driver = gated_servo(holds=1.5).driver
+    assert isinstance(driver, EmulatedPhantom)
+    wrong = Miswired(driver, torque, reading, late)
+    ticker = Ticker(gated_servo(wrong, dead_man=False, small=2.0))
+    for k in range(4000):
+        ticker.tick(k, ARM if k == 0 else -1)
+        assert np.linalg.norm(ticker.gated.force) <= 4.0 + 1e-9
+        assert not (ticker.fault and ticker.gated.torque.any())
+    return ticker, wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", [flipped(0), flipped(1), flipped(2), flipped(0, 1, 2)])
+def test_motors_that_turn_the_wrong_way_are_let_go(torque: Wiring) -> None:
+    ticker, device = driven(torque, as_it_is)
+    assert ticker.fault is not None
+    assert ticker.fault.fault in (Fault.TOO_FAST, Fault.LEFT_WORKSPACE, Fault.OSCILLATION)
+    assert ticker.state is State.FAULT
+    assert device.top_speed() < FASTEST
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("torque", "reading", "late"),
+    [(as_it_is, flipped(0), 0), (as_it_is, flipped(1), 0), (as_it_is, flipped(2), 0), (swapped, as_it_is, 0),
+     (as_it_is, swapped, 0), (lambda torque: 3.0 * torque, as_it_is, 0), (as_it_is, as_it_is, 20)],
+    ids=["encoder 1", "encoder 2", "encoder 3", "motors swapped", "encoders swapped", "torque constant", "20 ms late"],
+)  # fmt: skip
+def test_whatever_is_mixed_up_the_stylus_is_never_fast(torque: Wiring, reading: Wiring, late: int) -> None:
+    _, device = driven(torque, reading, late)
+    assert device.top_speed() < (FASTEST_UNSEEN if reading is swapped else FASTEST)
