@@ -29,7 +29,9 @@ def residual(kind: str, name: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "name"), [("cylindrical", "walk"), ("cylindrical", "run"), ("composite", "walk")])
+@pytest.mark.parametrize(
+    ("kind", "name"), [("cylindrical", "walk"), ("cylindrical", "jump"), ("cylindrical", "run"), ("composite", "walk")]
+)
 def test_a_map_of_one_clip_costs_at_most_three_points_over_tracking_it(kind: str, name: str) -> None:
     assert residual(kind, name) < track(embedded(name), SECONDS, TrackingConfig()).residual_force + POINTS
 
