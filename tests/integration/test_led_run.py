@@ -25,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def assert_led_back(summary: dict[str, Any]) -> None:
-    """It stands, comes back within 1 cm and 3°; soles slide by less than 3 cm, the figure's by less than 4.2."""
+    """It stands, comes back within 1 cm and 3°; soles slide by less than 3 cm, the figure's by less than 4.5."""
     lead, figure = summary["lead"], summary["figure"]
     assert figure["fell_at"] is None
     assert lead["retrace_cm"] < 1.0
@@ -34,8 +34,8 @@ def assert_led_back(summary: dict[str, Any]) -> None:
     # As captures are calibrated: SNU's run 2.5°, the others 2° at most.
     assert lead["physical_retrace_deg"] < 3.0
     assert lead["slide_cm"] < 3.0
-    # Of CMU 02_03 2.80 to 2.99 cm, by the seed; of DeepMimic's run 3.4 cm.
-    assert lead["physical_slide_cm"] < 4.2
+    # Of CMU 02_03 2.80 to 2.99 cm, by the seed; of DeepMimic's run 3.4 cm, 3.69 with Nehalem's kernels.
+    assert lead["physical_slide_cm"] < 4.5
 
 
 def test_straight_back_it_retraces_its_path_within_a_centimetre_and_two_degrees(folder: Path) -> None:
