@@ -12,7 +12,7 @@ from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
 from experiments.results.folder import RECORDING, clips_of, config_of
 from experiments.results.measures import SETTLING
-from experiments.setups.clips import load_clips
+from experiments.setups.setups import clips_for
 from models.mocap.clip import Clip
 from sim.recording.recording import Recording
 
@@ -38,7 +38,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
             return config_of(recording), (*clips_of(recording), *played(recording))
     if isinstance(config.map, MapFile):
         return config, load_figure_map(Path(config.map.file))[1]
-    return config, load_clips(config.map.clips, config.map.raw)[0]
+    return config, clips_for(config.map)[0]
 
 
 def played(recording: Recording) -> tuple[Clip, ...]:

@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from experiments.saying import Json, say
+
 
 @dataclass(frozen=True)
 class Command:
@@ -35,6 +37,7 @@ class Command:
     """Frames per second [Hz]."""
     overwrite: bool = False
     """Replace the film if it exists."""
+    json: Json = False
 
     def __call__(self) -> int:
         """Render."""
@@ -43,5 +46,5 @@ class Command:
         film = Film(
             self.show, self.camera, self.ghost, self.start, self.seconds, self.width, self.height, self.fps
         )  # fmt: skip
-        render(self.folder, self.out or self.folder / "film.mp4", film, self.gif, self.overwrite)
+        say(render(self.folder, self.out or self.folder / "film.mp4", film, self.gif, self.overwrite), self.json)
         return 0

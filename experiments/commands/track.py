@@ -6,6 +6,7 @@ from tyro.conf import Positional
 
 from experiments.config.part import above, at_least, part
 from experiments.saying import Json, say
+from sim.body.figure_state import CLIP_GAINS
 
 
 @part
@@ -18,9 +19,9 @@ class Command:
     """Simulated time for each [s]."""
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
-    residual_force: Annotated[float, at_least(0.0)] = 0.1
+    residual_force: Annotated[float, at_least(0.0)] = CLIP_GAINS.force_bound
     """Largest force at the root beside ground and joints, as a share of body weight [1]."""
-    residual_moment: Annotated[float, at_least(0.0)] = 0.02
+    residual_moment: Annotated[float, at_least(0.0)] = CLIP_GAINS.moment_bound
     """Largest such moment, as a share of body weight × stature [1]."""
     json: Json = False
 

@@ -7,10 +7,11 @@ import tyro
 
 from experiments.config.part import part, whole
 from experiments.saying import Json
+from experiments.trials.where import Where
 
 
 @part
-class Command:
+class Command(Where):
     """Run a study of simulated people from a TOML file, or go on with one that was stopped, and report on it."""
 
     study: Annotated[Path, tyro.conf.Positional]
@@ -21,12 +22,6 @@ class Command:
     """How many users, in place of the study's number."""
     seed: Annotated[int | None, whole(0)] = None
     """Of population and trials, in place of the study's."""
-    threads: Annotated[int | None, whole(1)] = None
-    """Trials at a time in this process; by default as many as there are processors."""
-    workers: Annotated[int | None, whole(1)] = None
-    """Run them in so many processes of a local Dask cluster instead."""
-    cluster: str | None = None
-    """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
     json: Json = False
 
     def __call__(self) -> int:

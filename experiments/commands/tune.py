@@ -7,10 +7,11 @@ import tyro
 
 from experiments.config.part import part, whole
 from experiments.saying import Json
+from experiments.trials.where import Where
 
 
 @part
-class Command:
+class Command(Where):
     """Tune numbers of a run on simulated people, within what is certified, or go on with a tuning that was stopped."""
 
     tuning: Annotated[Path, tyro.conf.Positional]
@@ -19,12 +20,6 @@ class Command:
     """Folder of journal, database, report and the chosen configuration; one that holds this tuning is continued."""
     candidates: Annotated[int | None, whole(1)] = None
     """How many are simulated, in place of the tuning's number."""
-    threads: Annotated[int | None, whole(1)] = None
-    """Trials at a time in this process; by default as many as there are processors."""
-    workers: Annotated[int | None, whole(1)] = None
-    """Run them in so many processes of a local Dask cluster instead."""
-    cluster: str | None = None
-    """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
     json: Json = False
 
     def __call__(self) -> int:
@@ -43,7 +38,7 @@ class Command:
             missing = f"tuning needs {error.name}; expected pip install 'haptic-vector-fields[study]'"
             raise StudyError(missing) from None
         text = self.tuning.read_text(encoding="utf-8")
-        found = run_tuning(config, self.out, text, self.threads, self.workers, self.cluster)
+        found = run_tuning(config, self.out, text, self)
         written = f"Written to {self.out}: {REPORT} (open it in a browser), {CHOSEN} (for hvf run --config)."
         print(found.to_json() if self.json else f"{found}\n{written}")
         return 0

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,11 +13,12 @@ from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from controllers.haptic_map.lifting.lift import Lifting, closes, lift
 from controllers.haptic_map.lifting.motion_features import Motion
 from controllers.haptic_map.lifting.room import Room
-from controllers.motion.loops import checked_clip
+from controllers.motion.loops import checked_clip, there_and_back
 from experiments.config.maps import MAP_SUFFIX
 from experiments.files.map_files import save_map
 from experiments.lifting.in_betweens import MotionMeasure
 from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, body_weights, lap_times, measure_map
+from experiments.setups.blendable import not_blendable
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
@@ -30,9 +31,10 @@ from sim.world.world import phantom_angles
 
 @dataclass(frozen=True, eq=False)
 class LiftedClips:
-    """Clips, their lifting, and the map made of it."""
+    """Clips, which of them go there and back, their lifting, and the map made of it."""
 
     clips: tuple[Clip, ...]
+    turned: tuple[bool, ...]
     names: tuple[str, ...]
     remarks: tuple[str, ...]
     lifting: Lifting
@@ -64,11 +66,12 @@ class LiftReport(NamedTuple):
                 f"{_apart(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
                 f"(before {100 * before.stress:.0f} %)."
             ]
-        for name, clip, curve, closed in zip(
-            names, self.lifted.clips, after.curves, self.lifted.haptic_map.closed, strict=True
+        for name, clip, curve, turned, closed in zip(
+            names, self.lifted.clips, after.curves, self.lifted.turned, self.lifted.haptic_map.closed, strict=True
         ):
+            kind = "there and back" if turned else "closed" if closed else "open, the hand is held at its end"
             lines.append(
-                f"  {name}: {'closed' if closed else 'open'}, {clip.duration:.2f} s, radius of curvature from "
+                f"  {name}: {kind}, {clip.duration:.2f} s, radius of curvature from "
                 f"{1e3 * curve.radius:.0f} mm, up to {curve.speed:.2f} m/s and {curve.acceleration:.2f} m/s²"
             )
         for meeting in after.meetings:
@@ -87,6 +90,7 @@ class LiftReport(NamedTuple):
             for group in _groups(lifting.same)
         ]
         lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
+        lines += [f"  {remark}" for remark in not_blendable(self.lifted.clips)]
         quality = self.quality
         if len(names) > 1:
             on, between = quality.conditioning, quality.conditioning_between
@@ -178,7 +182,7 @@ def check_workspace(room: Room) -> None:
 def lift_clips(
     names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
 ) -> LiftedClips:
-    """Lift clips by name or file.
+    """Lift clips by name or file; an open one that about rests at both ends goes there and back (`there_and_back`).
 
     Parameters
     ----------
@@ -204,8 +208,13 @@ def lift_clips(
     if seed < 0:
         raise SimError(f"the seed is {seed}; expected 0 or more")
     check_workspace(room)
-    clips, remarks = load_clips(names, raw)
+    loaded, remarks = load_clips(names, raw)
     begin = time.perf_counter()
+    clips = tuple(
+        clip if name in cyclic else replace(clip, poses=there_and_back(clip.poses, clip.fps))
+        for clip, name in zip(loaded, names, strict=True)
+    )
+    turned = tuple(clip.n_frames > as_loaded.n_frames for clip, as_loaded in zip(clips, loaded, strict=True))
     labels = _labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
@@ -214,7 +223,7 @@ def lift_clips(
         [(clip.poses, clip.fps) for clip in clips], [motion.closed for motion in motions], lifting.angles,
         lifting.sites, figure_legs(figure_model()), labels, transitions=transitions,
     )  # fmt: skip
-    return LiftedClips(clips, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
+    return LiftedClips(clips, turned, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
 
 
 def _labels(names: Sequence[str]) -> tuple[str, ...]:

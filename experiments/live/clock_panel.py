@@ -36,7 +36,12 @@ class ClockPanel:
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
         self._pace = gui.add_dropdown("Pace", tuple(PACES))
         self._back = gui.add_slider(
-            "Look back [s]", 0.0, REMEMBERED, 0.1, 0.0, hint="Time stands still while you look back."
+            "Look back [s]",
+            -REMEMBERED,
+            0.0,
+            0.1,
+            0.0,
+            hint="Now is at the right; time stands still while you look.",
         )
         self._from = gui.add_button("Go on from there", visible=False)
         self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
@@ -73,12 +78,12 @@ class ClockPanel:
     @property
     def seconds_ago(self) -> float:
         """How far back one looks [s]."""
-        return self._back.value
+        return -self._back.value
 
     def write(self) -> None:
         """Show how it is."""
         desk = self._desk
-        self._from.visible = self._back.value > 0.0
+        self._from.visible = self.seconds_ago > 0.0
         self._rearm.visible = bool(desk.now["fault"][0] != 0.0)
         built = desk.built
         self._press.visible = built is not None and built.bends
@@ -103,6 +108,6 @@ class ClockPanel:
             self._desk.reset()
 
     def _go_on(self) -> None:
-        self._desk.go_back(self._back.value)
+        self._desk.go_back(self.seconds_ago)
         self._back.value = 0.0
         self._desk.pause(False)

@@ -59,20 +59,22 @@ class GainsPanel:
 
 
 def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
-    """The verdicts of a run, a block each: green, red or amber, with margin and reason."""
+    """The verdicts of a run, a block each: green, red or amber, with margin; the reason opens, of a red one it is open.
+
+    Short, so that the sliders stand beside it.
+    """
     if not verdicts:
         return '<p style="margin:.5rem .75rem;color:#a8700a"><b>checking…</b></p>'
     blocks: list[str] = []
     for found in verdicts:
-        margin = "" if found.margin is None else f"; {found.margin + 1.0:.3g} times k_r would be unstable"
-        more = " · checking…" if checking else ""
-        passive = (
-            f'<br><span style="color:#566072">Passivity {html.escape(found.passive)}.</span>' if found.passive else ""
-        )
+        color, reason = COLORS[found.verdict], html.escape(found.reason)
+        margin = "" if found.margin is None else f" up to {found.margin + 1.0:.3g} times k_r"
+        passive = f"Passivity {html.escape(found.passive)}." if found.passive else ""
+        said, more = ("", f"It {reason}. {passive}") if found.verdict == "certified" else (f"<br>{reason}.", passive)
+        why = f'<details><summary style="cursor:pointer">why</summary>{more}</details>' if more else ""
         blocks.append(
-            f'<div class="verdict-{found.verdict}" style="margin:.4rem .75rem;padding:.3rem .6rem;font-size:.8rem;'
-            f'border-left:6px solid {COLORS[found.verdict]}"><b style="color:{COLORS[found.verdict]}">'
-            f"{html.escape(found.law)}: {_WORDS[found.verdict]}</b>{more}<br>"
-            f"{html.escape(found.reason)}{margin}.{passive}</div>"
+            f'<div class="verdict-{found.verdict}" style="margin:.4rem .75rem;padding:.2rem .6rem;font-size:.8rem;'
+            f'border-left:6px solid {color}"><b style="color:{color}">{html.escape(found.law)}: '
+            f"{_WORDS[found.verdict]}</b>{margin}{' · checking…' if checking else ''}{said}{why}</div>"
         )
     return "".join(blocks)

@@ -20,7 +20,7 @@ FIRST_STEPS = """
 def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
     """The lines at the top; what is wrong stands there, too."""
     middle, most = 1e3 * now["cost"]
-    doing = "paused" if desk.paused else f"{now['pace'][0]:.2f} × real time"
+    doing = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
     said = [f"<b>{now['t'][0]:.2f} s</b> · {doing}"]
     if going:
         said.append(html.escape(going))

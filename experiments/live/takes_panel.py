@@ -10,10 +10,11 @@ import numpy as np
 import viser
 
 from controllers.errors import ParameterError
+from controllers.state import Array
 from experiments.live.clock_panel import Acts
 from experiments.live.desk import Desk
 from experiments.live.run_panel import configuration_text
-from experiments.live.take_mix import FPS, Region, TakeData, mixed_clip
+from experiments.live.take_mix import FPS, Region, TakeData, mixed, mixed_clip
 from experiments.results.folder import EDITED, RECORDING
 from models.mocap.readers.own_bvh import write_bvh
 from sim.viewer.take_ghosts import COLORS, TakeGhosts
@@ -34,7 +35,7 @@ class TakesPanel:
         self._desk, self._scene = desk, scene
         self._model: mujoco.MjModel | None = None
         self._ghosts: TakeGhosts | None = None
-        self._compared: tuple[TakeData, ...] = ()
+        self._poses: tuple[Array, ...] = ()
         self._regions: list[Region] = []
         self._lines: dict[str, str] = {}
         self._name = gui.add_text("Name", "take 1")
@@ -43,7 +44,9 @@ class TakesPanel:
         self._get = gui.add_button_group("Download", ("BVH", "Recording", "Configuration"))
         with gui.add_folder("Compare and mix", expand_by_default=False):
             self._other: viser.GuiDropdownHandle[Any] = gui.add_dropdown("With", (NONE,))
-            self._compare = gui.add_checkbox("Show both", False, hint="In place of the default animation.")
+            self._compare = gui.add_checkbox(
+                "Show both", False, hint="In place of the default animation; the first with what it took over."
+            )
             self._legend = gui.add_html("")
             self._plot = gui.add_uplot(
                 (np.zeros(2), np.zeros(2), np.zeros(2)),
@@ -76,11 +79,12 @@ class TakesPanel:
 
     def draw(self) -> None:
         """Draw where the takes that are compared are now: they are played again and again."""
-        if self._ghosts is None:
+        ghosts = self._ghosts
+        if ghosts is None:
             return
-        frames = max(len(take.poses) for take in self._compared)
+        frames = max(len(poses) for poses in self._poses)
         frame = int(time.monotonic() * FPS) % frames
-        self._ghosts.show([take.poses[min(frame, len(take.poses) - 1)] for take in self._compared])
+        ghosts.show([poses[min(frame, len(poses) - 1)] for poses in self._poses])
 
     def write(self) -> None:
         """Show how it is."""
@@ -112,19 +116,19 @@ class TakesPanel:
             self._on_compare()
 
     def _on_compare(self) -> None:
-        if self._ghosts is not None:
-            self._ghosts.remove()
-            self._ghosts = None
+        ghosts, self._ghosts = self._ghosts, None
+        if ghosts is not None:
+            ghosts.remove()
         self._plot.visible = False
         self._legend.content = ""
         if not self._compare.value or self._model is None:
             return
         first, second = self._pair()
-        self._compared = (first, second)
+        self._poses = mixed(first, self._regions), second.poses
         self._ghosts = TakeGhosts(self._scene, self._model, {"0": first.path, "1": second.path})
-        self._legend.content = _legend(self._compared)
+        self._legend.content = _legend((first, second))
         n = max(len(first.force), len(second.force))
-        self._plot.data = (np.arange(n) / FPS, *(_padded(take.force, n) for take in self._compared))
+        self._plot.data = (np.arange(n) / FPS, *(_padded(take.force, n) for take in (first, second)))
         self._plot.visible = True
 
     def _on_mix(self) -> None:
@@ -136,8 +140,9 @@ class TakesPanel:
             first, second = self._pair()
             start, end = self._span.value
             regions = [*self._regions, Region(float(start), float(end), second)]
-            mixed_clip(first, regions, "mix")
+            mixed(first, regions)  # refused before it is kept
             self._regions = regions
+        self._on_compare()
         said = [f"{r.start:.1f} to {r.end:.1f} s from {r.take.name}" for r in self._regions]
         self._said.content = f'<p style="margin:.3rem .75rem;font-size:.8rem">{"; ".join(said) or "no regions"}</p>'
 

@@ -1,6 +1,6 @@
 """A film of a run, from its recording: the workspace beside the stage, a frame after the other."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.render.captions import Captions, Entry, halved
 from experiments.render.film_file import FilmFile, check_target
 from experiments.render.graphics import Canvas, Image, offscreen_backend
-from experiments.render.scenes import Camera, Stage, Workspace
+from experiments.render.scenes import Camera, Clearance, Stage, Workspace
 from experiments.render.shown_world import GHOST, GHOST_WHITE, ShownWorld, mixed_with_white, shown_world
 from experiments.render.timeline import Ghost, Timeline, timeline
 from experiments.results.folder import RECORDING
@@ -150,8 +150,34 @@ def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
     return (*actors, Entry(f"#{red:02x}{green:02x}{blue:02x}", _GHOSTS[ghost]))
 
 
-def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite: bool = False) -> None:
-    """Write the film of a run, and say what of it is to be known.
+@dataclass(frozen=True)
+class Filmed:
+    """What is to be known of a film.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Written.
+    frames : int
+    clearance : mapping of str to Clearance
+        How low the figure and the ghost reach, of those that are shown.
+    """
+
+    files: tuple[str, ...]
+    frames: int
+    clearance: Mapping[str, Clearance]
+
+    def lines(self) -> list[str]:
+        """How low the figures reach, a line each."""
+        return [
+            f"The lowest point of the {name} was {1e3 * lowest:+.1f} mm from the floor at {at:.1f} s"
+            f"{', and was drawn higher by that' if lowest < 0.0 else ''}."
+            for name, (lowest, at) in self.clearance.items()
+        ]
+
+
+def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite: bool = False) -> Filmed:
+    """Write the film of a run.
 
     Parameters
     ----------
@@ -188,9 +214,9 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
         complete = recording.complete
     if not complete:
         console.print(f"The run was cut short: the film shows the {frames.moments.t[-1]:.1f} s that are recorded.")
-    for line in clearance_lines(frames.stage):
-        print(line)
     console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
+    reach = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
+    return Filmed(tuple(map(str, targets)), len(frames), reach)
 
 
 def _told(rows: range, console: Console) -> Iterator[int]:
@@ -198,13 +224,3 @@ def _told(rows: range, console: Console) -> Iterator[int]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
         yield from bar.track(rows, description="drawing")
-
-
-def clearance_lines(stage: Stage) -> list[str]:
-    """How low the figures reach, a line each."""
-    lines: list[str] = []
-    for prefix, (lowest, at) in stage.clearance.items():
-        name = "ghost" if prefix == GHOST else "figure"
-        drawn = ", and was drawn higher by that" if lowest < 0.0 else ""
-        lines.append(f"The lowest point of the {name} was {1e3 * lowest:+.1f} mm from the floor at {at:.1f} s{drawn}.")
-    return lines

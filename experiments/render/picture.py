@@ -19,10 +19,10 @@ WIDTH, HEIGHT, FPS = 1440, 600, 30.0
 FINER = 3  # times as many rows and columns are drawn
 DEVICE_REACH = 0.8  # half width of what casts shadows on the device [m]
 DEVICE_SHARE = 0.34  # of the width
-MOMENTS = 5  # of the figure, evenly over the second half of the run
+MOMENTS = 4  # of the figure, evenly over the second half of the run
 SPACING = 1.1  # between them [m]
-GHOST_AT = np.array([-0.6, 0.35])  # from the figure: behind it, to its left [m]
-_VIEW = View((-0.2, 0.1, 0.85), 6.9, 180.0, -10.0)
+GHOST_AT = np.array([-0.95, 0.45])  # from the figure: behind it out of its reach, to its left [m]
+_VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
 
 def draw_picture(folder: Path, target: Path) -> None:
@@ -49,9 +49,9 @@ def draw_picture(folder: Path, target: Path) -> None:
 
 
 def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
-    """The workspace at the hardest push."""
+    """The workspace at the hardest push across the stylus, which lies along x and would hide an arrow along it."""
     user = recording.channel("ticks", "user")
-    row = int(np.argmax([np.linalg.norm(user[int(tick)]) for tick in moments.ticks]))
+    row = int(np.argmax([np.linalg.norm(user[int(tick)][1:]) for tick in moments.ticks]))
     Stage(recording, world, moments, "front", 1.0).put(row)
     return Workspace(recording, world, moments).picture(canvas, row, width, FINER * HEIGHT)
 

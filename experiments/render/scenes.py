@@ -67,7 +67,7 @@ class Workspace:
         curve = self._p_WH + recording.array("curve")
         middle = 0.5 * (curve.min(axis=0) + curve.max(axis=0))
         size = float(np.linalg.norm(np.ptp(curve, axis=0)))
-        self._view = View(tuple(middle + np.array([0.045, 0.0, 0.035])), 0.42 + 1.6 * size, 52.0, -25.0)
+        self._view = View(tuple(middle + np.array([0.025, 0.0, 0.035])), 0.47 + 1.6 * size, 52.0, -25.0)
 
     def newtons(self, row: int) -> tuple[float, float]:
         """Forces of field and hand at a row of the film [N]."""

@@ -53,7 +53,7 @@ class OscillationSummary:
         return [
             f"It oscillates: the loop shakes from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, "
             f"with up to {self.force_max:.1f} N and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
-            "hvf certify says which gains are stable."
+            "hvf certify says which gains are stable; with those it is rounded encoders, which much damping makes felt."
         ]
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sim.body.residual import Residual
 
 _TOLD = 5  # falls that are told one by one
+_TOLD_SECONDS = 0.01  # without ground force, of which figures are told
 
 
 @dataclass(frozen=True)
@@ -213,7 +214,7 @@ class FigureSummary:
             f"{self.root_error_rms_cm:.2f} cm at the root; residual force {100 * self.residual_force_rms:.1f} % "
             f"of body weight RMS, feet on the ground {100 * self.grounded:.0f} % of stance.",
             f"Residual in stance, RMS and peak: {stance.brief()} ({stance.verdict()})."
-            + (f" {airborne}" if lost.seconds > 0.0 else ""),
+            + (f" {airborne}" if lost.seconds >= _TOLD_SECONDS else ""),
         ]
 
 

@@ -1,4 +1,4 @@
-"""What clips cannot be blended with others, and why: a mean of who flies or turns over and of who stands."""
+"""What clips cannot be blended with others, or changed over to half way, and why: who flies or turns over."""
 
 from collections.abc import Sequence
 
@@ -37,10 +37,10 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     for clip in {clip.name: clip for clip in clips}.values():
         flight, upright = longest_flight(clip), least_upright(clip)
         if upright < UPRIGHT:
-            angle = np.rad2deg(np.arccos(upright))
-            found.append(f"{clip.name} turns over (pelvis {angle:.0f}° from upright): no mean with others is a motion")
+            over = f"turns over (pelvis {np.rad2deg(np.arccos(upright)):.0f}° from upright)"
+            found.append(f"{clip.name} {over}: no motion lies between it and others")
         elif flight > LONGEST_FLIGHT:
-            found.append(f"{clip.name} flies for {flight:.2f} s: a mean with what stays on the floor cannot")
+            found.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")
     return tuple(found)
 
 

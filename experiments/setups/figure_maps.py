@@ -11,7 +11,7 @@ import numpy as np
 from controllers.blending.clip_arrays import clip_arrays
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.animation import AnimationMap, ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.composite import Composite as CompositeMap
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
@@ -81,7 +81,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     def refined() -> CylindricalMap:
         return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
 
-    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
+    return replace(_about_circle(place, made, clips), refined=refined)
 
 
 def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
@@ -100,13 +100,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     def refined() -> CompositeMap:
         return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
 
-    return replace(_about_circle(place, made, clips), refined=refined).said(_warnings(clips, made, lap))
-
-
-def _warnings(clips: tuple[Clip, ...], made: CylindricalMap | CompositeMap, lap: float) -> tuple[str, ...]:
-    """What of different clips will not go well, and why, a line each."""
-    played = [clips[i % len(clips)] for i in range(len(made.loops))]
-    return (*not_blendable(clips), *off_pace(played, made.loops, lap))
+    return replace(_about_circle(place, made, clips), refined=refined)
 
 
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
@@ -175,27 +169,31 @@ MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
 """What each kind of map gives a run."""
 
 
-def _about_circle(place: Place, made: ClipMap, clips: tuple[Clip, ...]) -> ClipMapParts:
+def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> ClipMapParts:
     curve, reach = place.curve, place.reach
+    played = [clips[i % len(clips)] for i in range(len(made.loops))]
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=lambda damping: course_of(curve, damping), moves=True, expressive=place.expressive,
-        held_seconds=made.lap_seconds,
+        held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off_pace(played, made.loops, curve.duration)),
     )  # fmt: skip
 
 
 def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapParts:
     curve = lifted_curve(made, part.curve)
-    ends = f"the clip is open: its curve, and with it the animation, ends after {curve.duration:.1f} s"
+    ends = (
+        f"the clip is open: the hand, and with it the figure, is held at its curve's end after {curve.duration:.1f} s"
+    )
+    between = not_blendable(clips)
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
         course=lambda damping: course_of(curve, damping),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
-        remarks=() if curve.periodic else (ends,),
+        remarks=between if curve.periodic else (ends, *between),
     )  # fmt: skip
 
 

@@ -4,13 +4,12 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.leading import Gait, Leading
 from controllers.haptic_map.led import Led
-from controllers.legs.grounded import runs
+from controllers.legs.grounded import Mask, runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
 from controllers.safety.limiter import ForceLimiter
@@ -21,6 +20,7 @@ from experiments.config.run_config import RunConfig
 from experiments.results.lead_measures import lead_summary
 from experiments.results.summary import RunSummary
 from experiments.setups.budget import SPAN, fastest, tank_for
+from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import participant
 from experiments.setups.led_balance import balanced_on_ground, led_gains
@@ -32,8 +32,6 @@ from models.mocap.laps import CLOSES, lap_of
 from sim.users.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
-
-IntArray = npt.NDArray[np.int64]
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
 PAUSE, BACK_PACE = 0.8, 0.5
@@ -51,25 +49,58 @@ _FLYING_LATERAL = 1.2
 _RUNNING_FORWARD = 1.0
 
 
+def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+    """The clip that is led, and what has to be said about it: prepared, but as captured if it then flies.
+
+    The flights of a prepared run are ballistic at the run's own pace, and a figure that is led goes at others: it
+    lands early or late. As captured it is led by steps (`gait_remark`). Embedded clips are the same either way.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or a file cannot be read.
+    """
+    clips, remarks = load_clips(part.clips, part.raw)
+    if part.raw or all(contacts(clip).planted.any(axis=1).all() for clip in clips):
+        return clips, remarks
+    captured, remarks_captured = load_clips(part.clips, raw=True)
+    if all(np.array_equal(clip.poses, raw.poses) for clip, raw in zip(clips, captured, strict=True)):
+        return clips, remarks
+    names = ", ".join(clip.name for clip in captured)
+    return captured, (*remarks_captured, f"{names}: flies when prepared, and is led as captured, by steps")
+
+
 def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
     """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
+
+    What closes was made for the floor and is led as it is, unless it leaps too far to go without flights as well; then,
+    as what does not close, it is led as a capture is: its feet are held.
 
     Raises
     ------
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    clip, made = lap_of(clip).clip, clip.closes(CLOSES)
+    clip, closes = lap_of(clip).clip, clip.closes(CLOSES)
     marks = contacts(clip)
+    if not closes:
+        return _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+    made = _led(clip, legs, marks.planted[:-1], None)
+    if made[0].flies and not made[0].grounds:
+        steps = _led(clip, legs, stances(marks, clip.fps), Capture(CONTACT_RADIUS))
+        return steps if steps[0].grounds else made
+    return made
+
+
+def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
+    """The same of a lap, in whose frames but the last feet stand as `stands` says."""
     phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
-    frames = np.round(phases * steps).astype(int) % steps
-    # What closes was made for the floor and is led as it is; a capture's feet have to be held.
-    standing = marks.planted[frames] if made else stances(marks, clip.fps)
-    support = (standing if made else standing[frames]).sum(axis=1).astype(np.int64)
+    sampled = stands[np.round(phases * steps).astype(int) % steps]
+    support = sampled.sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], standing, None if made else Capture(CONTACT_RADIUS))
+    led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stands, capture)
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
@@ -91,7 +122,7 @@ def lap_remark(clip: Clip) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def stances(marks: Contacts, fps: float) -> npt.NDArray[np.bool_]:
+def stances(marks: Contacts, fps: float) -> Mask:
     """Which feet of a capture stand, shape (n − 1, 2), of n frames whose last is the first of the next lap.
 
     A foot that is up for less than a swing lasts stood all the time, and so did one of two that are up for less than a
@@ -131,7 +162,7 @@ def gait_remark(name: str, led: Led) -> tuple[str, ...]:
     return ()
 
 
-def _middle_of_longest(mask: npt.NDArray[np.bool_]) -> int:
+def _middle_of_longest(mask: Mask) -> int:
     """Middle of the longest run of a mask that goes round."""
     n = len(mask)
     if mask.all():

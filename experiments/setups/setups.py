@@ -5,12 +5,13 @@ from typing import Any
 
 import mujoco
 
+from experiments.config.maps import Map
 from experiments.config.run_config import RunConfig
 from experiments.setups.bunny import bunny_parts
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_maps import MAP_SETUPS
 from experiments.setups.follow import follow_parts
-from experiments.setups.lead import lead_parts, led_parts
+from experiments.setups.lead import lead_parts, led_clips, led_parts
 from experiments.setups.parts import MapParts, Parts
 from experiments.setups.rivers import rivers_parts
 from experiments.setups.stretch import stretch_parts, stretch_then_follow_parts
@@ -27,6 +28,17 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
 """From configuration, mode and map to the parts of a run, by kind of mode."""
 
 
+def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+    """Clips that a map names, and what has to be said about them.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or a file cannot be read.
+    """
+    return led_clips(part) if part.kind == "led" else load_clips(part.clips, part.raw)
+
+
 def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
     """What the map of a configuration gives a run: of clips that are given, or those that it names.
 
@@ -35,12 +47,9 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
     ModelError, ControllerError, SimError
         If there is no such clip, file or curve, or the Phantom does not reach the curve.
     """
-    remarks: tuple[str, ...] = ()
-    if clips is None:
-        clips, remarks = load_clips(config.map.clips, config.map.raw)
+    played, remarks = clips_for(config.map) if clips is None else (clips, ())
     setups: dict[str, Callable[..., MapParts[Any]]] = {**MAP_SETUPS, "led": led_parts}
-    setup = setups[config.map.kind]
-    return setup(config, config.map, clips, figure).said(remarks)
+    return setups[config.map.kind](config, config.map, played, figure).said(remarks)
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:

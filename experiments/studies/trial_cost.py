@@ -1,4 +1,7 @@
-"""What a study costs beside its trials: overhead, threads, memory, and how soon a batch begins."""
+"""What a study costs beside its trials: overhead, threads, memory, and how soon a batch begins.
+
+``python -m experiments.studies.trial_cost 10000`` prints the overhead, and how memory grows over so many short trials.
+"""
 
 import subprocess
 import sys
@@ -46,16 +49,25 @@ class TrialCost(NamedTuple):
 def trial_cost() -> TrialCost:
     """Measure; wall-clock times, so for a machine that does nothing else."""
     quiet = Console(stderr=True, quiet=True)
-    warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, quiet)
-    begin = time.process_time()
-    own, one = _run(_study(6, 5.0), 1, quiet)
-    overhead = (time.process_time() - begin) / own - 1.0
+    more, one = overhead(6, 5.0, quiet)
     _, two = _run(_study(6, 5.0), _THREADS, quiet)
-    _run(_study(100, _SHORT), 1, quiet)
+    return TrialCost(more, one / (_THREADS * two), grown(_MANY, quiet), start_seconds())
+
+
+def overhead(users: int, seconds: float, console: Console) -> tuple[float, float]:
+    """Processor time of planning, driving and database over that of the trials, and the time of all of it [s]."""
+    warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, console)
+    begin = time.process_time()
+    own, whole = _run(_study(users, seconds), 1, console)
+    return (time.process_time() - begin) / own - 1.0, whole
+
+
+def grown(trials: int, console: Console) -> float:
+    """Memory of this process after so many short trials, over that after a fifth of them."""
+    _run(_study(trials // 20, _SHORT), 1, console)
     before = psutil.Process().memory_info().rss
-    _run(_study(_MANY // 4, _SHORT), 1, quiet)
-    grown = psutil.Process().memory_info().rss / before
-    return TrialCost(overhead, one / (_THREADS * two), grown, start_seconds())
+    _run(_study(trials // 4, _SHORT), 1, console)
+    return psutil.Process().memory_info().rss / before
 
 
 def start_seconds() -> float:
@@ -90,3 +102,13 @@ def _run(study: StudyConfig, threads: int, console: Console) -> tuple[float, flo
         told = {trial.key: {"user": trial.meeting.user} for trial in trials}
         run_missing(trials, database, Threads(threads), "", console, told)
         return sum(row.seconds for row in database.rows()), time.perf_counter() - begin
+
+
+def _main(trials: int) -> None:
+    quiet = Console(stderr=True, quiet=True)
+    print(f"a study beside its trials: {100.0 * overhead(6, 5.0, quiet)[0]:.2f} % of processor time")
+    print(f"memory after {trials} short trials, over that after {trials // 5}: {grown(trials, quiet):.3f}")
+
+
+if __name__ == "__main__":
+    _main(int(sys.argv[1]))

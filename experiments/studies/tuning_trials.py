@@ -1,7 +1,7 @@
-"""Tuning against its baselines over several seeds of the search: what is gained on held-back users, every time anew.
+"""Tuning against its baselines, repeated: the gain on held-back users, with a new search and new people every time.
 
-``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 5`` runs the tuning with the seeds
-1 to 5, each in a folder of its own, and goes on where it was stopped.
+``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 5`` runs the tuning five times,
+each in a folder of its own, and goes on where it was stopped.
 """
 
 import sys
@@ -11,31 +11,61 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.tuning.contenders import interval
-from experiments.tuning.tune_config import read_tuning
+from controllers.state import Array
+from experiments.tuning.tune_config import TuneConfig, read_tuning
 from experiments.tuning.tuning import Tuned, run_tuning
 
+LEVEL = 0.95
 
-def tuning_trials(tuning: Path, out: Path, seeds: Sequence[int]) -> list[Tuned]:
-    """Run a tuning with each seed of the search and of the trials, on the panel and the held-back users of its file."""
+
+def replication(config: TuneConfig, number: int) -> TuneConfig:
+    """The same tuning with another seed of search and trials, and with people that no other replication has.
+
+    The first one has the people of the file; panels and held-back users of all are different populations.
+    """
+    further = 2 * (number - 1)
+    panel, held_back = (replace(users, seed=users.seed + further) for users in (config.users, config.held_back))
+    return replace(config, seed=number, users=panel, held_back=held_back)
+
+
+def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned]:
+    """Run the replications of these numbers of a tuning's file."""
     config = read_tuning(tuning)
-    return [run_tuning(replace(config, seed=seed), out / f"seed-{seed}") for seed in seeds]
+    return [run_tuning(replication(config, number), out / f"{number}") for number in numbers]
 
 
 def told(found: Sequence[Tuned]) -> list[str]:
-    """A line for each contender and objective: the gain by seed, and its mean with a bootstrap interval over seeds."""
-    lines: list[str] = []
+    """What was chosen each time, and for each contender and objective the gain, with its mean over replications."""
+    lines = [_chosen(one) for one in found]
     for first in found[0].comparisons:
         name = (first.contender, first.objective)
         of = [c for one in found for c in one.comparisons if (c.contender, c.objective) == name]
-        gains, shown = np.array([c.better_by for c in of]), sum(c.low > 0.0 for c in of)
-        low, high = interval(gains, 1)
+        gains = np.array([c.better_by for c in of])
+        low, high = t_interval(gains)
         lines.append(
-            f"{name[1]} against {name[0]}: better by {np.mean(gains):.3g} ({low:.3g} to {high:.3g} over {len(of)} "
-            f"searches), shown by {shown} of them alone: "
+            f"{name[1]} against {name[0]}: better by {np.mean(gains):.3g} (95 % interval {low:.3g} to {high:.3g} over "
+            f"{len(of)} replications), in {np.sum(gains > 0.0)} of them, by its own interval in "
+            f"{sum(c.low > 0.0 for c in of)}: "
             + ", ".join(f"{c.better_by:.3g} ({c.low:.3g} to {c.high:.3g})" for c in of)
         )
     return lines
+
+
+def t_interval(values: Array) -> tuple[float, float]:
+    """Student's interval of a mean: of a handful of replications a bootstrap's is too narrow; NaN of less than two."""
+    from scipy.stats import t
+
+    if len(values) < 2:
+        return float("nan"), float("nan")
+    half = float(t.ppf(0.5 + 0.5 * LEVEL, len(values) - 1)) * float(np.std(values, ddof=1)) / len(values) ** 0.5
+    return float(np.mean(values)) - half, float(np.mean(values)) + half
+
+
+def _chosen(one: Tuned) -> str:
+    (best,) = [c for c in one.candidates if c.state == "tried" and c.values == one.values][:1]
+    margin = "no margin" if best.margin is None else f"margin {best.margin:.3g}"
+    values = ", ".join(f"{word} {value:.4g}" for word, value in one.values.items())
+    return f"{one.folder.name}: {values}; {best.verdict}, {margin}"
 
 
 if __name__ == "__main__":

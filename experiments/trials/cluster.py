@@ -14,6 +14,7 @@ from experiments.trials.run_trial import Row, Task, perform
 
 AHEAD = 3  # tasks that wait for each thread of a worker: one more than a thread's, for the way there and back
 DEATHS = 50  # of workers with the same trial on them, after which the trial is taken to be the cause
+STARTS = 5  # of a local cluster, of which a worker may be killed before it is there
 _BUSY = "120s"  # for what is on this machine: one that does much else may leave it waiting
 _WAIT = "30s"  # for a scheduler, and for a first worker
 
@@ -93,7 +94,13 @@ class Cluster:
 
 @contextmanager
 def local_cluster(workers: int) -> Generator[Cluster]:
-    """A cluster of so many processes of this machine, a trial at a time each; it ends with the block."""
+    """A cluster of so many processes of this machine, a trial at a time each; it ends with the block.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be started.
+    """
     distributed = _distributed()
     import dask
 
@@ -103,12 +110,23 @@ def local_cluster(workers: int) -> Generator[Cluster]:
     }  # fmt: skip
     with (
         dask.config.set(settings),  # pyright: ignore[reportPrivateImportUsage]
-        distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_QUIET
-        ) as cluster,
+        _processes(distributed, workers) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield Cluster(client, f"{workers} local workers")
+
+
+def _processes(distributed: Any, workers: int) -> Any:
+    """Dask's local cluster: of one whose worker dies while it starts, Dask gives up all, and so it is started again."""
+    said = ""
+    for _ in range(STARTS):
+        try:
+            return distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_QUIET
+            )
+        except RuntimeError as error:
+            said = str(error.__cause__ or error).splitlines()[0]
+    raise StudyError(f"{workers} local workers do not start ({said}); expected fewer --workers, or --threads instead")
 
 
 @contextmanager

@@ -5,7 +5,10 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from experiments.trials.errors import StudyError
+from experiments.trials.measures import MEASURES
 from experiments.trials.study_config import StudyConfig, Words
+
+_TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
 
 
 class Condition(NamedTuple):
@@ -112,6 +115,11 @@ def _check(study: StudyConfig) -> None:
     if not study.factors:
         raise StudyError(f"{where} has no factors; expected one or more, such as stiffness = [100, 300]")
     for name, levels in study.factors.items():
+        if name in _TAKEN:
+            raise StudyError(
+                f"{where}: factor {name!r} has the name of another column of the table; expected another one, with "
+                "levels that say what they set"
+            )
         if len(levels) < 2:
             had = f"one level, {next(iter(levels))!r}" if levels else "no levels"
             raise StudyError(f"{where}: factor {name!r} has {had}; expected two or more, or its words under [run]")

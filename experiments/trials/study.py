@@ -23,6 +23,7 @@ from experiments.trials.measures import MEASURES, measures_of
 from experiments.trials.plan import Trial, planned
 from experiments.trials.run_trial import SHELF, Row
 from experiments.trials.study_config import StudyConfig, read_toml, study_from
+from experiments.trials.where import Where
 
 DATABASE, SUMMARY, REPORT, CONTRASTS = "study.sqlite", "summary.json", "report.html", "contrasts.csv"
 
@@ -134,11 +135,15 @@ class Study:
         ModelError, ControllerError, SimError, OSError
             If the study contradicts itself, or cannot go on; what was done is kept.
         """
-        console, folder = console or Console(stderr=True), Path(out)
+        console, folder, where = (
+            console or Console(stderr=True),
+            Path(out),
+            Where(threads=threads, workers=workers, cluster=cluster),
+        )
         measures, trials = self._measures(), self.trials
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             warm((trial.config for trial in trials), SHELF, console)
-            with executor(threads, workers, cluster) as runs:
+            with executor(where) as runs:
                 ran = run_missing(trials, database, runs, self.config.recordings, console, _told(trials))
             rows = {row.key: row for row in database.rows()}
         frame = table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})

@@ -16,7 +16,7 @@ from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import RunConfig
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
-from experiments.tuning.tune_config import MARGIN, TuneConfig
+from experiments.tuning.tune_config import TuneConfig
 
 HALF = 0.5  # of the critical gain: J. G. Ziegler and N. B. Nichols, "Optimum settings for automatic controllers", 1942
 RESAMPLES = 4999
@@ -95,16 +95,11 @@ def half_critical(config: TuneConfig) -> dict[str, float] | None:
 def _judged(config: TuneConfig, name: str, values: dict[str, float], panel: Panel) -> Contender:
     made = config.config(values)
     stability = kept_stability(made)
-    count = config.held_back.number
     if violation_of(config, stability) > 0.0 and stability.verdict == "refuted":
-        return Contender(name, values, made, stability, np.full((count, len(config.objectives)), np.nan))
-    measures = [objective for objective in config.objectives if objective != MARGIN]
-    runs = panel_runs(made, config.held_back, config.repetitions, config.seed)
-    found = panel.measured([run for by in runs for run in by], measures).reshape(count, -1, len(measures)).mean(axis=1)
-    margins = np.full(count, stability.margin or 0.0)
-    columns = dict(zip(measures, found.T, strict=True))
-    by_user = np.column_stack([margins if o == MARGIN else columns[o] for o in config.objectives])
-    return Contender(name, values, made, stability, by_user)
+        never = np.full((config.held_back.number, len(config.objectives)), np.nan)
+        return Contender(name, values, made, stability, never)
+    runs = panel_runs(config, made, config.held_back)
+    return Contender(name, values, made, stability, panel.objectives(config, runs, stability.margin))
 
 
 def interval(differences: Array, seed: int) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """What a panel of users makes of a candidate: trials that are run once, and kept."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,19 +10,26 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
 from experiments.trials.database import Database
 from experiments.trials.drive import Executor
+from experiments.trials.errors import StudyError
 from experiments.trials.participants import participants
 from experiments.trials.plan import key_of
 from experiments.trials.run_trial import Row, Task
 from experiments.trials.study_config import Users
+from experiments.tuning.tune_config import MARGIN, TuneConfig
 
 
-def panel_runs(config: RunConfig, users: Users, repetitions: int, seed: int) -> list[list[RunConfig]]:
+def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[list[RunConfig]]:
     """Runs of a candidate by user, with the same seeds for every candidate: what differs between them is theirs."""
     runs: list[list[RunConfig]] = []
     for number, person in enumerate(participants(users)):
-        user = User(does=users.does, person=person)  # pyright: ignore[reportArgumentType]
-        seeds = [np.random.SeedSequence((seed, users.seed, number, k)) for k in range(repetitions)]
-        runs.append([replace(config, user=user, seed=int(s.generate_state(1, np.uint32)[0])) for s in seeds])
+        own: list[RunConfig] = []
+        for k, does in enumerate(config.tasks or (users.does,)):
+            user = User(does=does, person=person)  # pyright: ignore[reportArgumentType]
+            for repetition in range(config.repetitions):
+                entropy = (config.seed, users.seed, number, k * config.repetitions + repetition)
+                seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
+                own.append(replace(candidate, user=user, seed=seed))
+        runs.append(own)
     return runs
 
 
@@ -41,15 +48,38 @@ class Panel:
         self._database, self._executor = database, executor
         self._rows = {row.key: row for row in database.rows()}
 
-    def measured(self, runs: Iterable[RunConfig], measures: Sequence[str]) -> Array:
-        """Measures of runs, shape (runs, measures); NaN of one that failed."""
-        wanted = {key_of(config): config for config in runs}
-        missing = [Task(key, to_json(config)) for key, config in wanted.items() if key not in self._rows]
+    def objectives(self, config: TuneConfig, runs: Sequence[Sequence[RunConfig]], margin: float | None) -> Array:
+        """Objectives by user, shape (users, objectives): the mean over a user's trials that have the measure.
+
+        Infinite if one of the user's trials failed: what is better with some of them is no candidate.
+
+        Raises
+        ------
+        StudyError
+            If no trial has a measure.
+        """
+        keys = [[key_of(run) for run in own] for own in runs]
+        wanted = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}
+        missing = [Task(key, to_json(run)) for key, run in wanted.items() if key not in self._rows]
         for row in self._executor.rows(missing) if missing else ():
             self._database.add(row, {})
             self._rows[row.key] = row
-        return np.array([_numbers(self._rows[key], measures) for key in wanted])
+        by_user = [[self._rows[key] for key in of] for of in keys]
+        found = np.array([[_mean(rows, name, margin) for name in config.objectives] for rows in by_user])
+        lacking = [name for k, name in enumerate(config.objectives) if np.all(np.isnan(found[:, k]))]
+        if lacking:
+            raise StudyError(
+                f"tuning {config.name!r}: no trial of its users has {lacking[0]!r}; expected tasks that have it, such "
+                "as tasks = ['trace', 'exaggerate']"
+            )
+        return found
 
 
-def _numbers(row: Row, measures: Sequence[str]) -> list[float]:
-    return [row.measures.get(name, float("nan")) for name in measures]
+def _mean(rows: Sequence[Row], objective: str, margin: float | None) -> float:
+    if objective == MARGIN:
+        return margin or 0.0
+    if any(row.state == "failed" for row in rows):
+        return float("inf")
+    values = np.array([row.measures.get(objective, np.nan) for row in rows])
+    values = values[np.isfinite(values)]
+    return float(np.mean(values)) if len(values) else float("nan")

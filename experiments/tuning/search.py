@@ -10,7 +10,7 @@ from optuna.trial import TrialState
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.samplers import STARTUP, sampler_of
-from experiments.tuning.tune_config import MARGIN, TuneConfig
+from experiments.tuning.tune_config import TuneConfig
 
 _TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
 REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
@@ -119,19 +119,17 @@ def violation_of(config: TuneConfig, stability: Stability) -> float:
 
 def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability: Stability) -> list[float] | None:
     """Means over the panel; None of a candidate that is given up after part of it."""
-    measures = [name for name in config.objectives if name != MARGIN]
-    by_user = panel_runs(config.config(trial.params), config.users, config.repetitions, config.seed)
-    halfway = max(1, len(by_user) // 3)
-    parts = [by_user[:halfway], by_user[halfway:]] if config.prune and len(config.objectives) == 1 else [by_user]
-    found = np.empty((0, len(measures)))
+    by_user = panel_runs(config, config.config(trial.params), config.users)
+    third = max(1, len(by_user) // 3)
+    parts = [by_user[:third], by_user[third:]] if config.prune and len(config.objectives) == 1 else [by_user]
+    found = np.empty((0, len(config.objectives)))
     for step, part in enumerate(parts):
-        found = np.vstack((found, panel.measured([run for runs in part for run in runs], measures)))
+        found = np.vstack((found, panel.objectives(config, part, stability.margin)))
         if step + 1 < len(parts):
             trial.report(float(np.mean(found)), step + 1)
             if trial.should_prune():
                 return None
-    means = dict(zip(measures, np.mean(found, axis=0), strict=True))
-    return [float(stability.margin or 0.0) if name == MARGIN else float(means[name]) for name in config.objectives]
+    return [float(mean) for mean in np.mean(found, axis=0)]
 
 
 def candidates_of(study: optuna.Study) -> list[Candidate]:

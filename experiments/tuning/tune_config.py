@@ -12,6 +12,7 @@ from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.errors import StudyError
 from experiments.trials.measures import MEASURES, OF_CONDITIONS, measures_of
+from experiments.trials.participants import participants
 from experiments.trials.study_config import Users, Words, read_toml
 
 MARGIN = "margin"
@@ -54,8 +55,11 @@ class TuneConfig:
         The panel.
     held_back : Users
         Whom the result is judged on; of another seed.
+    tasks : tuple of str
+        What every user does in turn, as ``hvf run --user`` has it, where one task does not have all objectives: who
+        traces expresses nothing. By default what `users` and `held_back` say.
     repetitions : int
-        Trials of a candidate with every user.
+        Trials of a candidate with every user and task.
     seconds : float
         Simulated time of a trial [s].
     candidates : int
@@ -71,8 +75,8 @@ class TuneConfig:
     seed : int
         Of the search and of the trials.
     storage : str
-        URL of a database that SQLAlchemy knows and that keeps the search, such as ``sqlite:///tune.db``; by default a
-        journal file in the folder.
+        URL of a database that SQLAlchemy knows and that keeps the search, such as ``sqlite:///tune.db``, or another
+        file for its journal than the one in the folder.
     """
 
     name: str
@@ -81,6 +85,7 @@ class TuneConfig:
     run: Words = Field(default_factory=dict)
     users: Users = Users(number=6, seed=1)
     held_back: Users = Users(number=12, seed=2)
+    tasks: tuple[str, ...] = ()
     repetitions: int = whole(1, default=1)
     seconds: float = above(0.0, default=6.0, unit="s")
     candidates: int = whole(1, default=40)
@@ -96,9 +101,11 @@ class TuneConfig:
         """Of the objectives."""
         return tuple("maximize" if more_is_better(name) else "minimize" for name in self.objectives)
 
-    def config(self, values: Mapping[str, float]) -> RunConfig:
-        """The run of a candidate, with nobody at the stylus yet."""
+    def config(self, values: Mapping[str, float], does: str | None = None) -> RunConfig:
+        """The run of a candidate, with nobody at the stylus yet, or with the first of the panel who does something."""
         words: Words = self.run | dict(values) | {"seconds": self.seconds}
+        if does is not None:
+            words |= {"user": does, "person": participants(replace(self.users, number=1))[0]}
         return run_config(**words)
 
 
@@ -134,6 +141,17 @@ def check_tuning(config: TuneConfig) -> None:
         If it does.
     """
     where = f"tuning {config.name!r}"
+    _check_space(config, where)
+    _check_objectives(config, where)
+    if config.users.seed == config.held_back.seed:
+        raise StudyError(f"{where}: panel and held-back users are of the same seed {config.users.seed}; expected two")
+    if config.sampler == "cma-es" and (len(config.objectives) > 1 or len(config.space) < 2):
+        raise StudyError(f"{where}: CMA-ES needs one objective and two numbers or more; expected sampler = 'tpe'")
+    for does in config.tasks or (config.users.does, config.held_back.does):
+        config.config({}, does)
+
+
+def _check_space(config: TuneConfig, where: str) -> None:
     if not config.space:
         raise StudyError(f"{where} has an empty space; expected a word of a run with its low and high")
     for word, span in config.space.items():
@@ -143,23 +161,19 @@ def check_tuning(config: TuneConfig) -> None:
             )
         if word in ("seed", "seconds"):
             raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
+
+
+def _check_objectives(config: TuneConfig, where: str) -> None:
     every = [name for name in MEASURES if name not in OF_CONDITIONS]
     for name in config.objectives:
         if name != MARGIN and name not in every:
             raise StudyError(f"{where}: no objective {name!r}; there are {', '.join([*every, MARGIN])}")
     if not config.objectives or set(config.objectives) == {MARGIN}:
         raise StudyError(f"{where} has no measure among its objectives; expected one, such as tracking_error")
-    if config.users.seed == config.held_back.seed:
-        raise StudyError(f"{where}: panel and held-back users are of the same seed {config.users.seed}; expected two")
-    if config.sampler == "cma-es" and (len(config.objectives) > 1 or len(config.space) < 2):
-        raise StudyError(f"{where}: CMA-ES needs one objective and two numbers or more; expected sampler = 'tpe'")
+    if len(set(config.objectives)) < len(config.objectives):
+        raise StudyError(f"{where}: an objective stands twice; expected {', '.join(dict.fromkeys(config.objectives))}")
     for end in ("low", "high"):
         made = config.config({word: getattr(span, end) for word, span in config.space.items()})
         lacking = [n for n in config.objectives if n != MARGIN and n not in measures_of(made.figure.kind)]
         if lacking:
             raise StudyError(f"{where}: {lacking[0]!r} needs a figure that is {MEASURES[lacking[0]].figure}")
-
-
-def judged(config: TuneConfig) -> TuneConfig:
-    """The same with the held-back users as its panel."""
-    return replace(config, users=config.held_back)

@@ -19,6 +19,7 @@ from experiments.trials.drive import warm
 from experiments.trials.errors import StudyError
 from experiments.trials.executors import executor
 from experiments.trials.run_trial import SHELF
+from experiments.trials.where import Where
 from experiments.tuning.contenders import Contender, contenders, interval, wins
 from experiments.tuning.page import tuning_page
 from experiments.tuning.panel import Panel, panel_runs
@@ -94,9 +95,8 @@ class Tuned:
 
 
 def run_tuning(
-    config: TuneConfig, out: Path, text: str = "", threads: int | None = None, workers: int | None = None,
-    cluster: str | None = None, console: Console | None = None,
-) -> Tuned:  # fmt: skip
+    config: TuneConfig, out: Path, text: str = "", where: Where | None = None, console: Console | None = None
+) -> Tuned:
     """Search, hold what was found against others, certify it, and write a report.
 
     Parameters
@@ -107,8 +107,8 @@ def run_tuning(
         Folder; one that holds this tuning is continued.
     text : str
         The tuning's file, as the report shows it.
-    threads, workers, cluster
-        As of `experiments.trials.study.Study.run`.
+    where : Where, optional
+        Where trials run; by default on as many threads as there are processors.
     console : Console, optional
         Where progress is shown; by default stderr.
 
@@ -120,16 +120,16 @@ def run_tuning(
     console, text = console or Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
-        first = panel_runs(config.config({}), config.users, 1, config.seed)[0][0]
-        warm([first], SHELF, console)
-        with executor(threads, workers, cluster) as runs:
+        warm(panel_runs(config, config.config({}), replace(config.users, number=1))[0], SHELF, console)
+        with executor(where or Where()) as runs:
             panel, storage = Panel(database, runs), storage_of(config.storage or out / JOURNAL)
             found = _searched(config, storage, identity, panel, config.sampler, console)
             best = chosen(found, config.directions)
             if best is None:
+                refused = sum(c.state == "refused" for c in found)
                 raise StudyError(
-                    f"tuning {config.name!r}: none of {len(found)} candidates could be tried, as none is certified; "
-                    "expected a space with some that are, or allow_unknown = true"
+                    f"tuning {config.name!r}: none of {len(found)} candidates is left: {refused} are not certified, of "
+                    f"{len(found) - refused} a trial failed; expected another space, or allow_unknown = true"
                 )
             others: dict[str, Candidate | None] = {}
             if config.sampler != "random":
@@ -224,8 +224,10 @@ def _sentences(
 
 def _sentence(config: TuneConfig, c: Comparison) -> str:
     unit = label_of(c.objective)
-    if not np.isfinite(c.mean):
-        return f"Against {c.contender}: that is refuted by the certificate, and was not tried."
+    if not (np.isfinite(c.mean) and np.isfinite(c.tuned)):
+        failed = "what was chosen" if np.isinf(c.tuned) else "it" if np.isinf(c.mean) else ""
+        why = f"a trial of {failed} failed" if failed else "that is refuted by the certificate, and was not tried"
+        return f"Against {c.contender}, {unit}: {why}."
     if c.objective == MARGIN:
         return f"Against {c.contender}, {unit}: {c.tuned:.3g} for {c.mean:.3g}."
     if c.better_by == 0.0:

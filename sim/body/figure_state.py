@@ -68,6 +68,10 @@ class FigureGains(NamedTuple):
     lift_time: float = 0.02
 
 
+CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)
+"""Of a clip at its own pace: the least help on which the embedded ones stand (docs/validation/residual-bounds.md)."""
+
+
 class FigureState(NamedTuple):
     """Views of the world's MjData, restricted to the figure, and scratch memory.
 

@@ -19,7 +19,7 @@ from sim.viewer.shapes import body_shapes, coarser, tube
 from sim.viewer.shown import Shown
 
 MAGNIFICATION = 8.0
-PHANTOM_AT = np.array([1.45, -0.6, 1.2])  # where the origin of the hand frame is drawn [m]
+PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # where the origin of the hand frame is drawn, out of the figure's reach [m]
 GHOST_AT = np.array([-0.75, 0.45, 0.0])  # the ghost's distance from the figure [m]
 METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] below which a force is not drawn

@@ -1,5 +1,7 @@
 """What is measured of a led run, on motions whose answer is known; and what of a configuration is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,15 +9,19 @@ from controllers.errors import ParameterError
 from controllers.fields.leading import Gait
 from controllers.haptic_map.led import Led
 from experiments.cli import main
+from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.words import run_config
+from experiments.preparation.prepared_clip import PreparedClip
 from experiments.results.lead_measures import LeadSummary, _Retrace, support_at
 from experiments.results.soles import Soles
+from experiments.setups import clips
 from experiments.setups.figure_legs import figure_legs
-from experiments.setups.lead import gait_remark, leading, leading_hand, led_map, s_curve, walker_argument
+from experiments.setups.lead import gait_remark, leading, leading_hand, led_clips, led_map, s_curve, walker_argument
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import Clip, PlanarDisplacement
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.scene import SceneConfig
 from sim.world.world import phantom_angles
@@ -138,6 +144,38 @@ def test_who_leads_a_clip_that_flies_is_told_so() -> None:
     standing[:4, 0] = True
     hop = Led((embedded("run").poses, embedded("run").fps), legs, 0.0, standing)
     assert "may fall where it is slow" in gait_remark("hop", hop)[0]
+
+
+def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.MonkeyPatch) -> None:
+    flying, walking = embedded("run"), embedded("walk")
+    captured = {name: Clip(clip.poses[1:], clip.fps, name) for name, clip in (("a", flying), ("b", walking))}
+    prepared = {"a": flying, "b": walking}
+
+    def loaded(path: Path, raw: bool = False) -> PreparedClip:
+        return PreparedClip((captured if raw else prepared)[path.stem], (f"raw {raw}",))
+
+    monkeypatch.setattr(clips, "prepared_clip", loaded)
+    (clip,), remarks = led_clips(LedMap(clips=("a.bvh",)))
+    assert clip is captured["a"]
+    assert remarks == ("raw True", "a: flies when prepared, and is led as captured, by steps")
+    assert led_clips(LedMap(clips=("b.bvh",))) == ((walking,), ("raw False",))
+    assert led_clips(LedMap(clips=("a.bvh",), raw=True)) == ((captured["a"],), ("raw True",))
+    (clip,), remarks = led_clips(LedMap(clips=("run",)))
+    np.testing.assert_array_equal(clip.poses, flying.poses)
+    assert remarks == ()
+
+
+def test_what_leaps_too_far_to_stay_on_the_ground_is_led_by_steps_though_it_closes() -> None:
+    run = embedded("run")
+    # Each flight goes 1 m further: a root so low that both feet reached the floor would lie on it.
+    flies = ~contacts(run).planted.any(axis=1)
+    far, flights = run.poses.copy(), np.count_nonzero(flies[1:] & ~flies[:-1])
+    far[:, 0] += np.cumsum(flies) * flights / flies.sum()
+    led, gait = led_map(Clip(far, run.fps, "leaps"), figure_legs(figure_model()))
+    assert not led.flies
+    assert led.grounds
+    assert gait.grounded
+    assert gait.stride < run.displacement.x + flights
 
 
 def test_the_lines_tell_it() -> None:

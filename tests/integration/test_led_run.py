@@ -77,20 +77,20 @@ def test_soles_keep_their_contacts_and_support_bounds_the_turn(folder: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("file", "raw", "residual"),
+    ("file", "residual"),
     [
-        ("cmu_amc/02_01.amc", False, 0.08),
-        ("xia/dme_example.bvh", False, 0.14),
-        # A run that is prepared flies, and does not come back; as captured it is led by steps.
-        ("cmu_amc/02_03.amc", True, 0.14),
-        ("snu/run.bvh", True, 0.10),
-        ("deepmimic/humanoid3d_run.txt", True, 0.14),
+        ("cmu_amc/02_01.amc", 0.08),
+        ("xia/dme_example.bvh", 0.14),
+        # What flies when it is prepared is led as captured, by steps.
+        ("cmu_amc/02_03.amc", 0.14),
+        ("snu/run.bvh", 0.10),
+        ("deepmimic/humanoid3d_run.txt", 0.14),
     ],
 )
-def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, raw: bool, residual: float) -> None:
+def test_captured_walks_and_runs_stand_and_come_back(tmp_path: Path, file: str, residual: float) -> None:
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
-    run(run_config(mode="lead", clips=(str(MOCAP / file),), raw=raw, seconds=19.0), tmp_path / "run", False, 0.0)
+    run(run_config(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)
     assert summary["figure"]["residual_force_rms"] < residual
@@ -102,7 +102,7 @@ def test_a_run_that_steps_comes_back_along_a_wider_s(tmp_path: Path, monkeypatch
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
     monkeypatch.setattr(lead, "_BEND", 0.4 * np.pi)
     clip = str(MOCAP / "deepmimic/humanoid3d_run.txt")
-    run(run_config(mode="lead", clips=(clip,), raw=True, seconds=19.0), tmp_path / "run", False, 0.0)
+    run(run_config(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))
 
 

@@ -7,10 +7,14 @@ import pytest
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
+from controllers.haptic_map.lifting.room import Room
+from experiments.lifting.lift import lift_clips
 from experiments.setups.figure_legs import figure_legs
 from models.errors import ModelError
+from models.humanoid.skeleton import BODIES, rest_pose
 from models.mocap.clip import Clip, pose_difference
 from models.mocap.library import embedded, embedded_names, load_clip
+from models.mocap.readers.own_bvh import write_bvh
 from models.scene import SceneConfig
 from sim.reference.reference import poses_along
 from sim.world.world import World
@@ -97,3 +101,23 @@ def test_recorded_clips_alone_and_ten_together_are_exact_at_every_frame():
     for clip in clips:
         assert worst_at_frames(lifted([clip])) < 1e-6
     assert worst_at_frames(lifted(clips[:10])) < 1e-6
+
+
+@pytest.mark.slow
+def test_a_clip_that_rests_at_both_ends_is_lifted_there_and_back_and_one_that_goes_on_stays_open(
+    tmp_path: Path,
+) -> None:
+    bow, share = np.tile(rest_pose(), (61, 1)), 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 61))
+    abdomen = 7 + 4 * (BODIES.index("abdomen") - 1)
+    bow[:, abdomen], bow[:, abdomen + 2] = np.cos(0.3 * share), np.sin(0.3 * share)
+    walk = embedded("walk")
+    steps = Clip(walk.poses[: walk.n_frames // 3], walk.fps, "steps")
+    for clip in (Clip(bow, 50.0, "bow"), steps):
+        write_bvh(clip, tmp_path / f"{clip.name}.bvh")
+    lifted = lift_clips([str(tmp_path / "bow.bvh"), str(tmp_path / "steps.bvh")], Room())
+    assert lifted.turned == lifted.haptic_map.closed == (True, False)
+    there = lifted.clips[0]
+    assert there.n_frames % 2 == 1
+    np.testing.assert_array_equal(there.poses, there.poses[::-1])
+    assert np.abs(pose_difference(there.poses[there.n_frames // 2], bow[-1])).max() < 1e-4
+    assert worst_at_frames(lifted.haptic_map) < 1e-6

@@ -1,6 +1,7 @@
 """A live page in this process, and Debian's chromium that looks at it."""
 
 import contextlib
+import math
 import os
 import shutil
 import threading
@@ -18,7 +19,13 @@ from sim.viewer.live_stage import drawn_at
 from sim.viewer.views import FIELD_OF_VIEW, VIEWS, camera_of, screen_axes
 
 CHROMIUM = shutil.which("chromium")
-ARGUMENTS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+ARGUMENTS = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+]
 PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing else
 WIDTH, HEIGHT = 900, 520
 PICTURES = os.environ.get("HVF_SCREENSHOTS", "")
@@ -59,19 +66,33 @@ def choose(tab: Any, label: str, option: str) -> None:
 
 
 @contextlib.contextmanager
-def drag(tab: Any, start: tuple[float, float], by: tuple[float, float]) -> Iterator[None]:
-    """The left button pressed at a place and moved by so many pixels, then let go."""
-    tab.mouse.move(*start)
-    _drawn(tab)
+def drag(
+    tab: Any, where: Callable[[], tuple[float, float]], by: tuple[float, float], patience: float = PATIENCE
+) -> Iterator[None]:
+    """The left button pressed over what can be dragged somewhere and moved by so many pixels, then let go."""
+    x, y = _over(tab, where, patience)
     tab.mouse.down()
     _drawn(tab)
     for share in (0.3, 1.0):
-        tab.mouse.move(start[0] + share * by[0], start[1] + share * by[1])
+        tab.mouse.move(x + share * by[0], y + share * by[1])
         _drawn(tab)
     try:
         yield
     finally:
         tab.mouse.up()
+
+
+def _over(tab: Any, where: Callable[[], tuple[float, float]], patience: float) -> tuple[float, float]:
+    """Move the mouse to a place until its cursor says that something there can be dragged; where that was."""
+    end, k = time.monotonic() + patience, 0
+    while True:
+        x, y = where()
+        tab.mouse.move(x + k % 2, y)  # it is looked for where the mouse moves
+        _drawn(tab)
+        if tab.evaluate("[...document.querySelectorAll('canvas')].some(one => one.style.cursor === 'pointer')"):
+            return x + k % 2, y
+        assert time.monotonic() < end, f"nothing to be dragged at {x:.0f}, {y:.0f} after {patience:g} s"
+        k += 1
 
 
 def _drawn(tab: Any) -> None:
@@ -86,7 +107,7 @@ class Served:
         self.page = Page(config, folder, port=0, shadows=False)
         self.thread = threading.Thread(target=self.page.serve, daemon=True)
         self.thread.start()
-        self.until(lambda: self.page.stage is not None, "the run is put together")
+        self.until(lambda: self.page.stage is not None, "the run is compiled and put together", patience=4.0 * PATIENCE)
 
     @property
     def desk(self) -> Any:
@@ -96,16 +117,23 @@ class Served:
     def address(self) -> str:
         return f"http://127.0.0.1:{self.page.port}"
 
-    def until(self, condition: Callable[[], bool], what: str, step: float = 0.05) -> None:
-        end = time.monotonic() + PATIENCE
+    def until(self, condition: Callable[[], bool], what: str, step: float = 0.05, patience: float = PATIENCE) -> None:
+        end = time.monotonic() + patience
         while not condition():
-            assert time.monotonic() < end, f"not so after {PATIENCE:g} s: {what}; said: {self.page._said}"
+            assert self.thread.is_alive(), f"the page has ended before: {what}"
+            assert time.monotonic() < end, f"not so after {patience:g} s: {what}; said: {self.page._said}"
             time.sleep(step)
 
     def settled(self) -> dict[str, np.ndarray]:
-        """What is shown once time stands still, and the browser has drawn it."""
-        self.until(lambda: self.desk.paused, "time stands still")
-        time.sleep(1.5)
+        """What is shown once time stands still."""
+        self.until(lambda: self.desk.paused, "time is stopped")
+        seen = [math.nan]
+
+        def still() -> bool:
+            seen.append(float(self.desk.now["t"][0]))
+            return seen[-1] == seen[-2]
+
+        self.until(still, "time stands still", step=0.3)  # [s], of blocks of 8 ms
         return self.desk.now
 
     def close(self) -> None:

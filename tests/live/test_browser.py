@@ -15,6 +15,7 @@ from experiments.live.hand_keys import STEP
 from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording
+from sim.viewer.live_stage import LiveStage
 from tests.devices.test_spacemouse import Cap
 from tests.live.browser import PATIENCE, Served, choose, chromium, drag, kept, new_tab, on_screen
 
@@ -49,20 +50,25 @@ def goes_on(served: Served) -> Iterator[None]:
     served.page.say("—")
 
 
+def arrow_of(stage: LiveStage) -> float:
+    """Drawn length of the hand's arrow [m], 0 where none is drawn."""
+    shaft = np.diff(stage._arrows["user"].points[0], axis=0)
+    return float(np.linalg.norm(shaft)) if stage._arrows["user"].visible else 0.0
+
+
 def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, served: Served) -> None:
     desk, stage = served.desk, served.page.stage
     assert stage is not None
     desk.pause(True)
     drawn = served.settled()
     pose, place = drawn["reference"].copy(), drawn["p"].copy()
-    with drag(tab, on_screen(place), (0, -60)):
+    assert arrow_of(stage) == 0.0
+    with drag(tab, lambda: on_screen(place), (0, -60)):
         served.until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
         served.until(lambda: desk.now["p"][2] - place[2] > 0.004, "it comes along")
-        served.until(lambda: bool(stage._arrows["user"].visible), "the arrow of the hand is drawn")
-        shaft = np.diff(stage._arrows["user"].points[0], axis=0)
-        assert np.linalg.norm(shaft) > 0.05
-        assert np.abs(desk.now["reference"] - pose).max() > 1e-3
+        served.until(lambda: arrow_of(stage) > 0.05, "the arrow of the hand has grown")
+        served.until(lambda: float(np.abs(desk.now["reference"] - pose).max()) > 1e-3, "the figure's pose changes")
         kept(tab, "dragged")
     served.until(lambda: not desk.holds, "it is let go")
 
@@ -73,7 +79,7 @@ def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -
     desk.pause(True)
     place = served.settled()["p"].copy()
     tab.keyboard.down("Shift")
-    with drag(tab, on_screen(place), (0, -60)):
+    with drag(tab, lambda: on_screen(place), (0, -60)):
         served.until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
         served.until(lambda: desk.now["p"][2] - place[2] > 0.01, "it comes along")
@@ -157,7 +163,7 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     served.until(lambda: served.page._takes._list.value == "take 2", "it is chosen")
     assert load(downloaded(tab, "BVH", tmp_path / "edited.bvh")).clip.duration > 1.0
     with Recording(downloaded(tab, "Recording", tmp_path / "recording.h5")) as recording:
-        assert recording.duration > 1.0
+        assert recording.channel("ticks", "t")[-1] > 1.0
     assert '"stretch"' in downloaded(tab, "Configuration", tmp_path / "config.json").read_text()
     tab.get_by_text("Compare and mix").click()
     tab.get_by_label("Show both").click()
@@ -196,9 +202,10 @@ def upload(tab: Any, file: Any) -> None:
     chooser.value.set_files(file)
 
 
-def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any) -> None:
+def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
     upload(tab, {"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"})
-    tab.get_by_text("broken.bvh:", exact=False).last.wait_for()
+    tab.get_by_text("broken.bvh:3: found 'oh'", exact=False).last.wait_for()
+    served.until(lambda: served.desk.preparing is None, "the next one can come")
     kept(tab, "refused")
 
 
@@ -212,9 +219,11 @@ def test_an_upload_that_is_too_large_is_answered_in_the_page(tab: Any, served: S
 
 @pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
 def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> None:
+    served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
-    served.until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared")
+    served.until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)
+    served.desk.pause(False)
     tab.get_by_role("tab", name="Play").click()
     tab.get_by_role("button", name="Run this").click()
     served.until(lambda: CAPTURE.stem in str(served.desk.built.config.map.clips), "it runs")

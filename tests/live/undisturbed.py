@@ -2,9 +2,10 @@
 
 Stretches with and without a browser take turns, so that what else goes on on the machine falls on both. Of each the
 99th percentile of the processor time of a tick is taken (of blocks of 8), and how much of real time the engine kept;
-what is printed is the ratio of the medians over the stretches.
+what is printed is the ratio of the medians over the stretches, of which an argument says how many.
 """
 
+import contextlib
 import sys
 import tempfile
 import time
@@ -45,14 +46,16 @@ def watched(served: Served, seconds: float, doing: Callable[[], None]) -> Stretc
     return Stretch(float(most), float(middle), pace, (served.page.pictures - pictures) / passed)
 
 
-def used(served: Served, browser: Any) -> Stretch:
-    """The same with a page that is dragged, and loaded anew."""
+def used(served: Served, browser: Any, took_hold: list[bool]) -> Stretch:
+    """The same with a page that is dragged, and loaded anew; and of each drag whether it took hold of the stylus."""
     tab = new_tab(browser, served.address)
 
     def doing() -> None:
         for way in ((40, -30), (-40, 30)):
-            with drag(tab, on_screen(served.desk.now["p"]), way):
+            # The ball moves on between the look at it and the press: a drag that misses turns the view.
+            with contextlib.suppress(AssertionError), drag(tab, lambda: on_screen(served.desk.now["p"]), way, 3.0):
                 time.sleep(0.5)
+                took_hold.append(served.desk.holds)
         tab.reload()
         tab.get_by_role("button", name="Pause").wait_for()
 
@@ -67,27 +70,31 @@ def main() -> int:
     from playwright.sync_api import sync_playwright
 
     served = Served(run_config(mode="follow", seconds=86400.0), Path(tempfile.mkdtemp()))
+    stretches = int(sys.argv[1]) if len(sys.argv) > 1 else STRETCHES
     alone: list[Stretch] = []
+    took_hold: list[bool] = []
     with_page: list[Stretch] = []
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-            for _ in range(STRETCHES):
+            for _ in range(stretches):
                 alone.append(watched(served, ALONE, lambda: time.sleep(0.25)))
-                with_page.append(used(served, browser))
-                for name, (most, middle, pace) in (("alone", alone[-1]), ("with the page", with_page[-1])):
+                with_page.append(used(served, browser, took_hold))
+                for name, (most, middle, pace, pictures) in (("alone", alone[-1]), ("with the page", with_page[-1])):
                     print(
-                        f"{name:14s} p99 {1e6 * most:6.0f} µs, median {1e6 * middle:5.0f} µs, pace {pace:.2f}",
+                        f"{name:14s} p99 {1e6 * most:6.0f} µs, median {1e6 * middle:5.0f} µs, pace {pace:.2f}, "
+                        f"{pictures:.0f} pictures/s",
                         flush=True,
                     )
             browser.close()
     finally:
         served.close()
     ratio = np.median(with_page, axis=0) / np.median(alone, axis=0)
+    print(f"{sum(took_hold)} of {len(took_hold)} drags took hold of the stylus")
     print(
         f"with the page / alone: p99 {ratio[0]:.3f}, median {ratio[1]:.3f}, pace {ratio[2]:.3f}; limit of p99 {LIMIT}"
     )
-    return 0 if ratio[0] <= LIMIT else 1
+    return 0 if ratio[0] <= LIMIT and any(took_hold) else 1
 
 
 if __name__ == "__main__":

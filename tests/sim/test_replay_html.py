@@ -254,14 +254,11 @@ def test_a_browser_plays_it_from_disk_without_a_network(tmp_path, model):
         page = browser.new_page(viewport={"width": 640, "height": 400})
         page.on("request", lambda request: asked.append(request.url))
         page.on("pageerror", lambda error: failed.append(str(error)))
+        page.set_default_timeout(240_000)  # a processor that draws in software may be busy with other tests
         page.goto((tmp_path / "replay.html").as_uri())
-        page.locator("input").first.wait_for(timeout=60_000)
         clock = page.locator("input").first
-        before = clock.input_value()
-        page.wait_for_function(f"document.querySelector('input').value != '{before}'", timeout=20_000)
-        clock.fill("0.5")
-        clock.press("Enter")
-        page.wait_for_timeout(2000)
+        clock.wait_for()
+        page.wait_for_function(f"document.querySelector('input').value != '{clock.input_value()}'")
         picture = page.screenshot()
         browser.close()
     assert failed == []

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.device import kinematics_function
-from controllers.certificates.loop.injected import BANDS, injection
+from controllers.certificates.loop.injected import BANDS, Injection, injection
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
@@ -107,6 +107,50 @@ def distance_bound(river: River, gain: float, force: float) -> float:
     return float("inf")
 
 
+class Pushed(NamedTuple):
+    """What a hand that pushes does to a river.
+
+    Attributes
+    ----------
+    river : River
+    gain : PeakGain
+    own : float
+        What the lap itself asks for, `own_force` at most [N].
+    ceiling : float
+        Force that the limiter lets through [N].
+    """
+
+    river: River
+    gain: PeakGain
+    own: float
+    ceiling: float
+
+    @property
+    def room(self) -> float:
+        """Distance within which the nearest point is unique, and in the tube [m]."""
+        return min(self.river.width, self.river.curve.reach)
+
+    def bounds(self, push: float) -> tuple[float, float]:
+        """Distance [m] and force of the river [N] at most for a push [N]; infinite without a bound."""
+        if not np.isfinite(self.gain.distance):
+            return float("inf"), float("inf")
+        distance = distance_bound(self.river, self.gain.distance, push + self.own)
+        return distance, self.gain.force * distance / self.gain.distance if np.isfinite(distance) else float("inf")
+
+    def holds(self, push: float) -> bool:
+        """Whether the bounds lie within what there is."""
+        distance, felt = self.bounds(push)
+        return distance < self.room and felt < self.ceiling
+
+    def most(self) -> float:
+        """Largest push [N] that holds, by bisection."""
+        allowed, beyond = 0.0, self.ceiling
+        for _ in range(40):
+            middle = 0.5 * (allowed + beyond)
+            allowed, beyond = (middle, beyond) if self.holds(middle) else (allowed, middle)
+        return allowed
+
+
 def energy(river: River, push: float, ceiling: float) -> Verdict:
     """Verdict on the distance from the curve of a hand that pushes with at most `push` newtons, with FOLLOW.
 
@@ -115,37 +159,13 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     """
     moving = river.moving()
     gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
-    own, room = float(own_force(river, moving).max()), min(river.width, river.curve.reach)
-
-    def bounds(force: float) -> tuple[float, float]:
-        distance = distance_bound(river, gain.distance, force + own) if np.isfinite(gain.distance) else float("inf")
-        return distance, gain.force * distance / gain.distance if np.isfinite(distance) else float("inf")
-
-    def holds(force: float) -> bool:
-        distance, felt = bounds(force)
-        return distance < room and felt < ceiling
-
-    allowed, beyond = 0.0, ceiling
-    for _ in range(40):
-        middle = 0.5 * (allowed + beyond)
-        allowed, beyond = (middle, beyond) if holds(middle) else (allowed, middle)
-    distance, felt = bounds(push)
-    pace, speed, friction = np.linalg.norm(moving.velocity, axis=1), terminal_speed(river, moving), drag(river, moving)
-    lap, executed = river.curve.duration, injection(river, moving)
-    figures: dict[str, object] = {
-        "phases": river.phases(),
-        "pace": pace,
-        "terminal_speed": speed,
-        "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
-        "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
-        "power_bound": river_power(river.b_d, float(np.max(pace))),
-        "passive_below": executed.passive_below,
-        **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
-        "rounding_force": executed.rounding,
-        "speed_bound": float(np.max(pace)) + push / river.b_d if river.b_d > 0.0 else None,
+    pushed, executed = Pushed(river, gain, float(own_force(river, moving).max()), ceiling), injection(river, moving)
+    allowed, (distance, felt) = pushed.most(), pushed.bounds(push)
+    figures = _powers(river, moving, executed) | {
+        "speed_bound": float(_pace(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,
         "peak_gain": gain.distance,
         "force_gain": gain.force,
-        "own_force": own,
+        "own_force": pushed.own,
         "push": push,
         "push_allowed": allowed,
         "distance_bound": distance,
@@ -158,14 +178,36 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
         "kinematics and inertia off the curve are those on it; the hand's force is bounded and has no impedance",
         f"the limiter lets {ceiling:g} N through: the motors are not yet warm",
     )
-    said = (
-        f"|U| ≤ {push:g} N moves the hand by at most {1e3 * distance:.3g} mm, the river answers with at most "
-        f"{felt:.3g} N; this holds up to {allowed:.3g} N"
-    )
-    if holds(push):
-        return Verdict("certified", said, allowed - push, assumptions, {}, figures)
+    if pushed.holds(push):
+        reason = (
+            f"|U| ≤ {push:g} N moves the hand by at most {1e3 * distance:.3g} mm, the river answers with at most "
+            f"{felt:.3g} N; this holds up to {allowed:.3g} N"
+        )
+        return Verdict("certified", reason, allowed - push, assumptions, {}, figures)
     reason = (
-        f"no bound for |U| ≤ {push:g} N within {1e3 * room:.3g} mm of the curve and {ceiling:g} N; "
+        f"no bound for |U| ≤ {push:g} N within {1e3 * pushed.room:.3g} mm of the curve and {ceiling:g} N; "
         f"there is one up to {allowed:.3g} N"
     )
     return Verdict("unknown", reason, allowed - push, assumptions, {}, figures)
+
+
+def _powers(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
+    """What a lap takes and gives, of the ideal law and of the executed one."""
+    pace, speed, friction = _pace(moving), terminal_speed(river, moving), drag(river, moving)
+    lap = river.curve.duration
+    return {
+        "phases": river.phases(),
+        "pace": pace,
+        "terminal_speed": speed,
+        "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
+        "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
+        "power_bound": river_power(river.b_d, float(np.max(pace))),
+        "passive_below": executed.passive_below,
+        **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
+        "rounding_force": executed.rounding,
+    }
+
+
+def _pace(linear: LinearLoop) -> Array:
+    """|φ̇| at every phase [m/s]."""
+    return np.linalg.norm(linear.velocity, axis=1)

@@ -122,6 +122,52 @@ def lap_multipliers(river: River, linear: LinearLoop) -> Array:
     return SampledLoop(linear.lap(river.curve, n), river.sampling).multipliers(river.k_r, river.b_d, periods)
 
 
+class _WithHands(NamedTuple):
+    """The loop with every one of some hands.
+
+    Attributes
+    ----------
+    critical : Array
+        Critical k_r at every phase [N/m], shape (hands, phases).
+    bound : float
+        Largest spectral radius at a phase, with its change to the next one.
+    cut : float
+        Largest spectral radius where the limiter cuts the force to one of `CUTS`.
+    multiplier : float or None
+        Largest Floquet multiplier of a lap; None where the hand is not carried round a closed curve.
+    """
+
+    critical: Array
+    bound: float
+    cut: float
+    multiplier: float | None
+
+    def worst(self, hands: Sequence[HandImpedance]) -> tuple[float, HandImpedance, int]:
+        """Least critical k_r [N/m], with which hand, and at which phase."""
+        who, at = divmod(int(self.critical.argmin()), self.critical.shape[1])
+        least = float(self.critical[who, at])
+        return least, hands[who] if np.isfinite(least) else NO_HAND, at
+
+    def change(self, periodic: bool) -> float:
+        """Largest change of the critical k_r from a phase to the next [N/m]."""
+        here, following = neighbours(np.minimum(self.critical, MOST_STIFFNESS), periodic)
+        return float(np.abs(following - here).max())
+
+
+def _with_hands(river: River, hands: Sequence[HandImpedance]) -> _WithHands:
+    """Look at the loop with every hand."""
+    critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
+    for hand in hands:
+        loop = SampledLoop(river.still(hand), river.sampling)
+        critical.append(critical_stiffness(loop, river.b_d, max(river.k_r, 1e-3)))
+        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
+        here, following = neighbours(loop.radius(river.k_r, river.b_d), river.curve.periodic)
+        bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
+        if river.curve.periodic and river.law.carries:
+            multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
+    return _WithHands(np.array(critical), max(bounds), cut, max(multipliers, default=None))
+
+
 def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on the river's linear stability along its curve, for every one of some hands.
 
@@ -130,61 +176,55 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     changes; and where the hand is carried round a closed curve, the Floquet multipliers of the lap lie inside the unit
     circle; and with all gains lowered alike, as by the limiter, it is stable too. The margin is (critical k_r)/k_r − 1.
     """
-    critical, multipliers, bounds, cut = [], [], [], 0.0
-    worst = (np.inf, NO_HAND, 0)
-    for hand in hands:
-        loop = SampledLoop(river.still(hand), river.sampling)
-        onset = critical_stiffness(loop, river.b_d, max(river.k_r, 1e-3))
-        if onset.min() < worst[0]:
-            worst = (float(onset.min()), hand, int(onset.argmin()))
-        critical.append(onset)
-        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
-        radii = loop.radius(river.k_r, river.b_d)
-        here, following = neighbours(radii, river.curve.periodic)
-        bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
-        if river.curve.periodic and river.law.carries:
-            multipliers.append(float(np.abs(lap_multipliers(river, river.moving(hand))[0])))
-    bare = SampledLoop(river.still(), river.sampling)
-    onsets = np.array(critical)
-    capped = np.minimum(onsets, MOST_STIFFNESS)
-    here, following = neighbours(capped, river.curve.periodic)
-    change = float(np.abs(following - here).max())
-    least, hand, at = worst
+    found = _with_hands(river, hands)
+    least, hand, at = found.worst(hands)
     margin = min(least, MOST_STIFFNESS) / max(river.k_r, 1e-3) - 1.0
-    radius = bare.radius(river.k_r, river.b_d)
-    figures: dict[str, object] = {
-        "phases": river.phases(),
-        "radius": radius,
-        "radius_bound": max(bounds),
-        "decay_rate": -np.log(np.maximum(radius, 1e-12)) / river.sampling.period,
-        "critical_stiffness": onsets.min(axis=0),
-        "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
-        "delay_margin": delay_margin(bare, river.k_r, river.b_d),
-        "multiplier": max(multipliers, default=None),
-        "radius_cut": cut,
-    }
+    figures = _figures(river, found)
     assumptions = (
         "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
         f"lower gains, down to {CUTS[0]:.0%} of them, and its slew is not reached",
-        f"phases: {onsets.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
+        f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
-    said = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; critical k_r = {least:.4g} N/m with {hand}"
+    gains = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m"
     if least <= max(river.k_r, 1e-3):
         below = critical_stiffness(SampledLoop(river.still(hand), river.sampling), river.b_d, 1e-3)[at]
-        said = said.replace(f"critical k_r = {least:.4g}", f"critical k_r = {below:.4g}")
         margin = min(float(below) / max(river.k_r, 1e-3), 1.0) - 1.0
-        return Verdict("refuted", f"unstable: {said}", margin, assumptions, unstable_start(river, hand, at), figures)
-    if multipliers and max(multipliers) >= 1.0:
-        reason = f"stable with the phase held, but a multiplier of the lap is {max(multipliers):.4g}; {said}"
-        return Verdict("unknown", reason, margin, assumptions, {}, figures)
-    if cut >= 1.0:
-        reason = f"stable, but not where the limiter cuts the force: a factor of {cut:.4g} a period; {said}"
-        return Verdict("unknown", reason, margin, assumptions, {}, figures)
-    if least - change <= river.k_r and max(bounds) >= 1.0:
-        reason = f"the critical k_r changes by {change:.4g} N/m from phase to phase, too coarse a grid; {said}"
-        return Verdict("unknown", reason, margin, assumptions, {}, figures)
+        reason = f"unstable: {gains}; critical k_r = {below:.4g} N/m with {hand}"
+        return Verdict("refuted", reason, margin, assumptions, unstable_start(river, hand, at), figures)
+    said, doubt = f"{gains}; critical k_r = {least:.4g} N/m with {hand}", _doubt(river, found, least)
+    if doubt is not None:
+        return Verdict("unknown", f"{doubt}; {said}", margin, assumptions, {}, figures)
     return Verdict("certified", f"stable: {said}", margin, assumptions, {}, figures)
+
+
+def _doubt(river: River, found: _WithHands, least: float) -> str | None:
+    """Why a river whose k_r is below the least critical one is not certified, if it is not."""
+    if found.multiplier is not None and found.multiplier >= 1.0:
+        return f"stable with the phase held, but a multiplier of the lap is {found.multiplier:.4g}"
+    if found.cut >= 1.0:
+        return f"stable, but not where the limiter cuts the force: a factor of {found.cut:.4g} a period"
+    change = found.change(river.curve.periodic)
+    if least - change <= river.k_r and found.bound >= 1.0:
+        return f"the critical k_r changes by {change:.4g} N/m from phase to phase, too coarse a grid"
+    return None
+
+
+def _figures(river: River, found: _WithHands) -> dict[str, object]:
+    """What is kept beside the verdict; what no hand is named with is of a stylus without one."""
+    bare = SampledLoop(river.still(), river.sampling)
+    radius = bare.radius(river.k_r, river.b_d)
+    return {
+        "phases": river.phases(),
+        "radius": radius,
+        "radius_bound": found.bound,
+        "decay_rate": -np.log(np.maximum(radius, 1e-12)) / river.sampling.period,
+        "critical_stiffness": found.critical.min(axis=0),
+        "critical_damping": float(critical_damping(bare, river.k_r, max(river.b_d, 1e-3)).min()),
+        "delay_margin": delay_margin(bare, river.k_r, river.b_d),
+        "multiplier": found.multiplier,
+        "radius_cut": found.cut,
+    }
 
 
 def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, object]:

@@ -2,15 +2,16 @@ r"""Common quadratic Lyapunov function of several linear maps: a certificate of 
 
 If P > 0 and A_iᵀ P A_i ≤ ρ² P for every i, then |A x|_P ≤ ρ |x|_P for every A in the convex hull of the maps, since
 A ↦ Aᵀ P A is convex: however fast one switches or blends, the state decays as ρ^k (Liberzon, *Switching in Systems and
-Control*, 2003, section 2.1). There is no solver of semidefinite programs here: P = L Lᵀ and the decrease P − A_iᵀ P A_i
-− t = R_i R_iᵀ with t as large as it gets is a smooth program for IPOPT (Burer & Monteiro 2003). What it finds is a
-proposal; `contraction` judges it by itself.
+Control*, 2003, section 2.1). The one with the largest least decrease is a semidefinite program (Boyd et al., *Linear
+Matrix Inequalities in System and Control Theory*, 1994, section 5.1), solved by Clarabel. What it finds is a proposal;
+`contraction` judges it by itself.
 """
 
+import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
-import casadi
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
@@ -54,7 +55,8 @@ def contraction(p: Array, maps: Sequence[Array]) -> float:
 def common_lyapunov(maps: Sequence[Array]) -> Common | None:
     """Common quadratic Lyapunov function of stable maps, or None if none was found.
 
-    Tried first is the mean of the maps' own functions; where that does not decrease along all, IPOPT goes on from it.
+    Tried first is the mean of the maps' own functions; where that does not decrease along all, a semidefinite
+    program is solved in its coordinates.
 
     Parameters
     ----------
@@ -81,31 +83,15 @@ def common_lyapunov(maps: Sequence[Array]) -> Common | None:
 
 
 def _improved(maps: Sequence[Array]) -> Array:
-    """P of mean diagonal 1 with the largest least decrease that IPOPT finds from the unit matrix."""
+    """P of trace n with the largest least decrease t, P − A_iᵀ P A_i ≥ t; the unit matrix if none is found."""
+    import cvxpy  # takes a second, which a certificate without it need not wait
+
     n = len(maps[0])
-    rows, columns = np.tril_indices(n)
-    size = len(rows)
-    variables = casadi.SX.sym("x", size * (len(maps) + 1) + 1)
-
-    def triangle(k: int) -> casadi.SX:
-        matrix = casadi.SX(n, n)
-        for entry, (i, j) in enumerate(zip(rows, columns, strict=True)):
-            matrix[int(i), int(j)] = variables[size * k + entry]
-        return matrix
-
-    factor, least = triangle(0), variables[size * (len(maps) + 1)]
-    p = factor @ factor.T
-    equations = [casadi.trace(p) - n]
-    for k, a in enumerate(maps):
-        root = triangle(k + 1)
-        gap = p - casadi.DM(a.T) @ p @ casadi.DM(a) - root @ root.T - least * casadi.DM.eye(n)
-        equations += [gap[int(i), int(j)] for i, j in zip(rows, columns, strict=True)]
-    options = {"ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}, "print_time": False}
-    problem = {"x": variables, "f": -least, "g": casadi.vertcat(*equations)}
-    solver = casadi.nlpsol("common_lyapunov", "ipopt", problem, options)
-    unit = np.eye(n)[rows, columns]
-    begin = np.concatenate([unit, *(0.3 * unit for _ in maps), [0.0]])
-    values = np.array(solver(x0=begin, lbg=0.0, ubg=0.0)["x"]).ravel()
-    lower = np.zeros((n, n))
-    lower[rows, columns] = values[:size]
-    return lower @ lower.T
+    p, least = cvxpy.Variable((n, n), PSD=True), cvxpy.Variable()
+    decrease = [p - a.T @ p @ a - least * np.eye(n) for a in maps]
+    constraints: list[cvxpy.Constraint] = [cvxpy.PSD(0.5 * (gap + gap.T)) for gap in decrease]
+    constraints.append(cvxpy.Zero(cvxpy.trace(p) - n))
+    with warnings.catch_warnings(), suppress(cvxpy.SolverError):
+        warnings.simplefilter("ignore", UserWarning)  # of a solution that is inaccurate: it is judged
+        cvxpy.Problem(cvxpy.Maximize(least), constraints).solve(solver=cvxpy.CLARABEL)
+    return np.eye(n) if p.value is None else 0.5 * (p.value + p.value.T)

@@ -16,7 +16,7 @@ TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes t
 AFTER = 0.1  # [s] after a click in which a movement may still come to rest
 MOVES = 14  # from side to side; the first two are practice
 _PRACTICE = 2
-_MOST_SECONDS = 25.0
+_SECONDS = (11.0, 22.0)  # in which nearly everybody has made all moves, and in which the slowest have
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
@@ -94,6 +94,7 @@ def _conditions() -> list[tuple[float, float]]:
 def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((MOVES + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    seconds = min(_MOST_SECONDS, 1.6 * MOVES)
-    trace = trial(person, targets(points, width), seconds, seed, points[0])
+    trace = trial(person, targets(points, width), _SECONDS[0], seed, points[0])
+    if len(trace.clicks) <= MOVES:  # the longer run begins with the shorter one
+        trace = trial(person, targets(points, width), _SECONDS[1], seed, points[0])
     return trace._replace(clicks=trace.clicks[: MOVES + 1])

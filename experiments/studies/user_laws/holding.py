@@ -37,9 +37,9 @@ def tremor(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "tremor", "Tremor: acceleration of a hand that holds still",
         (
-            Law("Tremor: frequency of the peak", float(np.median(peaks)), 6.0, 12.0, "Hz", "Lakie et al. 2015"),
+            Law("Tremor: frequency of the peak", float(np.median(peaks)), 6.0, 12.0, "Hz", "Lakie et al. 2015 (a)"),
             Law("Tremor: amplitude at the peak", float(np.median(sizes)), 0.015, 0.34, "m/s²",
-                "97 people, 0.0015 to 0.035 g: Arch Neurol 39:358, 1982"),
+                "Wade, Gresty & Findley 1982: 97 people, 0.0015 to 0.035 g (a)"),
         ),
         f[shown], np.mean(spectra, axis=0)[shown], ("frequency [Hz]", "power of the acceleration [m²/s⁴/Hz]"),
         log=True, joined=True,
@@ -98,6 +98,6 @@ def grip(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "grip", "Stiffness at the stylus over grip",
         (Law("Grip: exponent of stiffness", float(slope), 0.1, 1.0, "",
-             "Hasser & Cutkosky 2002: rises with grip; below proportion: Hajian & Howe 1997 (m)", built_in=True),),
+             "Hasser & Cutkosky 2002: rises with grip (a); below proportion: Hajian & Howe 1997 (m)", built_in=True),),
         x, y, ("grip [N]", "stiffness [N/m]"), (float(slope), float(intercept)), log=True,
     )  # fmt: skip

@@ -21,7 +21,8 @@ class Law:
     unit : str
         Of all three.
     source : str
-        Of the interval; "(m)" marks a paper quoted from memory.
+        Of the interval; "(a)" marks a paper of which the abstract was read, "(q)" one as it is quoted by who read it,
+        and "(m)" one quoted from memory.
     built_in : bool
         Whether the person is made by this very law, so that only what arm and device leave of it is tested.
     """

@@ -74,10 +74,10 @@ def endurance(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "endurance", "Endurance: time that a force is held, over its share of the strength",
         (
-            Law("Endurance: time at half the strength", half, 50.0, 150.0, "s",
-                "Frey Law & Avin 2010: a power of the load, by joint; grip: some 100 s (m)", True),
-            Law("Endurance: exponent", -float(slope), 1.5, 2.4, "",
-                "Frey Law & Avin 2010: 1.6 grip, 2.2 elbow (m)", True),
+            Law("Endurance: time at half the strength", half, 53.0, 145.0, "s",
+                "Frey Law & Avin 2010, Table 2: b₀ f^b₁, shoulder to ankle, grip 102 (q)", True),
+            Law("Endurance: exponent", -float(slope), 1.61, 2.27, "",
+                "Frey Law & Avin 2010, Table 2: grip to trunk (q)", True),
         ),
         x, y, ("force over strength", "time [s]"), (float(slope), float(intercept)), log=True,
     )  # fmt: skip

@@ -19,10 +19,11 @@ _BODY = """<p>{question}</p>
 {plots}
 <h2>Every measure, level against reference</h2>
 <div class="wide">{table}</div>
-<p class="note">Difference: of users' means, with its 95 % BCa bootstrap interval over users. Model: estimate of a
-linear mixed model with a random intercept by user, with its 95 % interval; p by Wald, and corrected for all {tests}
-contrasts of the table by Holm's method. Effect: Cohen's d_z of paired differences, Hedges' g between users. Grey: the
-corrected p is 0.05 or more. {interactions}</p>
+<p class="note">Difference: of users' means, with its 95 % BCa bootstrap interval over users, each for itself. Model:
+estimate of a linear mixed model in which users differ in their level and in what the factor does to them, with its
+95 % interval; p by Student's t, and corrected for all {tests} contrasts of the table by Holm's method. Effect: Cohen's
+d_z, mean over spread of users' own differences (people who are simulated alike make it large), or Hedges' g between
+users. Grey: no difference is shown. {interactions}</p>
 {remarks}
 {effects}
 <h2>Measures</h2>
@@ -112,7 +113,7 @@ def _row(c: Contrast) -> str:
         short(c.mean), short(c.reference_mean), _between(c.difference, c.low, c.high),
         _between(c.model, c.model_low, c.model_high), _p(c.p), _p(c.p_holm), short(c.effect), agree,
     )  # fmt: skip
-    weak = " class=weak" if not c.p_holm < 0.05 else ""
+    weak = "" if c.shown else " class=weak"
     cells = "".join(f"<td>{number}</td>" for number in numbers)
     names = f"<td>{html.escape(MEASURES[c.measure].label)}</td><td class=l>{html.escape(c.level)}</td>"
     return f"<tr{weak}>{names}<td class=l>{html.escape(c.reference)}</td>{cells}</tr>"
@@ -131,7 +132,10 @@ def _interactions(found: Statistics) -> str:
     if not found.interactions:
         return ""
     told = ", ".join(f"{MEASURES[name].name.replace('_', ' ')} {_p(p)}" for name, p in found.interactions.items())
-    return f"Interactions of the factors, p by likelihood ratio, not corrected: {html.escape(told)}."
+    return (
+        "Whether what a factor does depends on another one (least p of differences of differences, by Holm's method): "
+        f"{html.escape(told)}."
+    )
 
 
 def _measure_row(name: str) -> str:

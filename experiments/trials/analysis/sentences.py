@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from experiments.trials.analysis.effect_sizes import ALIKE
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.measures import MEASURES
 from experiments.trials.study_config import StudyConfig
@@ -38,11 +39,13 @@ def _compared(c: Contrast) -> str:
     if not (math.isfinite(c.low) and math.isfinite(c.high)):
         return f"{held} with {c.level} and {c.reference}; no interval, for the users are too few or all alike"
     interval = f"95 % interval of the difference {_number(c.low)} to {_number(c.high)}{unit}"
-    if c.low <= 0.0 <= c.high:
+    if not c.shown:
         return f"no difference shown between {c.level} and {c.reference} ({held}; {interval})"
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
     agree = f", {c.agree} of {c.users} users" if c.agree else ""
+    apart = c.most - c.least > ALIKE * abs(c.difference)
+    agree += f"; {_number(c.least)} to {_number(c.most)} by condition" if apart else ""
     return (
         f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({held}; {interval}{agree})"
     )

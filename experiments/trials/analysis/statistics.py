@@ -1,29 +1,27 @@
 """What the factors of a study do to its measures: mixed models, bootstrap intervals, effect sizes, Holm's correction.
 
-For every measure one linear mixed model with the factors as fixed effects and a random intercept by user,
+The first level of a factor is what the others are held against. For every level of every factor and every measure: the
+difference of users' means with its BCa bootstrap interval over users (scipy); beside it a linear mixed model
+(`experiments.trials.analysis.mixed_model`); and the standardised difference: Cohen's d_z of paired differences within
+users, Hedges' g between them. The p values of all contrasts of all measures together are corrected by Holm's method.
 
-    y_ij = β₀ + Σ_f β_f[level] + u_i + e_ij,   u_i ~ N(0, σ_u²),   e_ij ~ N(0, σ²)
-
-(statsmodels, REML); the first level of a factor is what the others are held against. Beside it, without a model: the
-difference of users' means with its BCa bootstrap interval over users (scipy), and the standardised difference: Cohen's
-d_z of paired differences within users, Hedges' g between them. The p values of all contrasts of all measures together
-are corrected by Holm's method.
+A user's mean is of the means of the conditions that have both levels, so that a trial that failed does not weigh one
+condition more at one level than at the other.
 """
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from controllers.state import Array
+from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g, spreads
+from experiments.trials.analysis.interactions import interactions_of
+from experiments.trials.analysis.mixed_model import LEVEL, NO_FIT, Fit, fitted
 
-LEVEL = 0.95
 RESAMPLES = 4999
-ALIKE = (
-    1e-6  # spread over size of differences that are one number, written many times: nothing is known of their spread
-)
 
 
 @dataclass(frozen=True)
@@ -42,8 +40,10 @@ class Contrast:
         Of these.
     low, high : float
         Its bootstrap interval.
+    least, most : float
+        Smallest and largest difference among the conditions of the other factors.
     model, model_low, model_high, p, p_holm : float
-        The mixed model's estimate and interval, its p (Wald), and that corrected; NaN where the model has none.
+        The mixed model's estimate and interval, its p (Student's t), and that corrected; NaN where the model has none.
     effect : float
         d_z or g.
     agree : int
@@ -60,6 +60,8 @@ class Contrast:
     difference: float
     low: float
     high: float
+    least: float
+    most: float
     model: float
     model_low: float
     model_high: float
@@ -67,6 +69,12 @@ class Contrast:
     p_holm: float
     effect: float
     agree: int
+
+    @property
+    def shown(self) -> bool:
+        """Whether there is a difference, by the interval and by the corrected p where the model has one."""
+        apart = np.isfinite(self.low) and np.isfinite(self.high) and not self.low <= 0.0 <= self.high
+        return bool(apart and not self.p_holm >= 1.0 - LEVEL)
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,7 @@ class Statistics:
     contrasts : tuple of Contrast
         By measure, factor and level.
     interactions : dict of str to float
-        By measure, p of the likelihood ratio of the factors' interactions (maximum likelihood).
+        By measure, the least corrected p of an interaction; see `experiments.trials.analysis.interactions`.
     remarks : tuple of str
         Where a model did not converge, and the like.
     """
@@ -111,99 +119,86 @@ def statistics(
         Of the bootstrap.
     """
     found: list[Contrast] = []
-    interactions: dict[str, float] = {}
+    cells_of: dict[str, Any] = {}
     remarks: dict[str, list[str]] = {}
     for measure in measures:
         rows = frame[frame["state"].eq("done") & frame[measure].notna()]
         if len(rows) < 3 or not np.ptp(rows[measure].to_numpy()) > 0.0:
             continue
-        varied = {name: levels for name, levels in factors.items() if rows[name].nunique() > 1}
-        fits, interaction = _models(rows, measure, varied, remarks) if varied else ({}, None)
-        if interaction is not None:
-            interactions[measure] = interaction
-        for factor, levels in varied.items():
-            for level in levels[1:]:
-                fit = fits.get((factor, level), (np.nan, np.nan, np.nan, np.nan))
+        varied = [name for name in factors if rows[name].nunique() > 1]
+        cells_of[measure] = cells = rows.groupby([*varied, "user"])[measure].mean()
+        for factor in varied:
+            for level in factors[factor][1:]:
+                of = (measure, factor, level, factors[factor][0])
                 rng = np.random.default_rng([seed, len(found)])
-                made = _contrast(rows, (measure, factor, level, levels[0]), factor in between, fit, rng)
+                made = _contrast(cells, of, factor in between, rng)
                 if made is not None:
-                    found.append(made)
+                    found.append(_modelled(made, rows, varied, between, remarks))
     told = tuple(f"{', '.join(names).replace('_', ' ')}: {remark}" for remark, names in remarks.items())
+    interactions = interactions_of(cells_of, factors, between)
     return Statistics(_corrected(found), interactions, told)
 
 
-_Fit = tuple[float, float, float, float]
-_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap intervals stand alone"
-_DOUBTFUL = "the mixed model did not converge well, or finds no variance between users; believe the bootstrap intervals"
+_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
+_DOUBTFUL = "the mixed model did not converge; believe the bootstrap interval"
 
 
-def _models(
-    rows: Any, measure: str, factors: Mapping[str, Sequence[str]], remarks: dict[str, list[str]]
-) -> tuple[dict[tuple[str, str], _Fit], float | None]:
-    """Estimate, interval and p by factor and level, and p of the interactions."""
-    import statsmodels.formula.api as smf
-    from scipy.stats import chi2
-
-    values = rows[measure].to_numpy()
-    centre, scale = float(values.mean()), float(values.std())
-    data = rows.assign(_y=(values - centre) / scale)
-    terms = {name: f"C(Q({name!r}), Treatment({levels[0]!r}))" for name, levels in factors.items()}
-    try:
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            model = smf.mixedlm("_y ~ " + " + ".join(terms.values()), data, groups="user").fit(reml=True)
-            ends = model.conf_int(1.0 - LEVEL)
-            interaction = _interaction(data, list(terms.values()), smf, chi2) if len(terms) > 1 else None
-    except (np.linalg.LinAlgError, ValueError):
-        remarks.setdefault(_NO_MODEL, []).append(measure)
-        return {}, None
-    if told:
-        remarks.setdefault(_DOUBTFUL, []).append(measure)
-    fits: dict[tuple[str, str], _Fit] = {}
-    for factor, levels in factors.items():
-        for level in levels[1:]:
-            name = f"{terms[factor]}[T.{level}]"
-            if name in model.params.index:
-                low, high = (scale * float(end) for end in ends.loc[name])
-                fits[factor, level] = (scale * float(model.params[name]), low, high, float(model.pvalues[name]))
-    return fits, interaction
-
-
-def _interaction(data: Any, terms: Sequence[str], smf: Any, chi2: Any) -> float:
-    whole, main = (
-        smf.mixedlm("_y ~ " + sign.join(terms), data, groups="user").fit(reml=False) for sign in (" * ", " + ")
+def _modelled(
+    c: Contrast, rows: Any, varied: Sequence[str], between: Sequence[str], remarks: dict[str, list[str]]
+) -> Contrast:
+    """A contrast with what the mixed model says of it."""
+    groups = rows.groupby([name for name in varied if name in between]).ngroups if c.factor in between else 1
+    others = [name for name in varied if name != c.factor]
+    fit: Fit = fitted(
+        rows, c.measure, c.factor, (c.level, c.reference), others, c.users - groups, c.factor not in between
     )
-    freedom = len(whole.fe_params) - len(main.fe_params)
-    return float(chi2.sf(max(0.0, 2.0 * (whole.llf - main.llf)), freedom))
+    remark = _NO_MODEL if not np.isfinite(fit.p) else _DOUBTFUL if fit.doubtful else ""
+    if remark:
+        remarks.setdefault(remark, []).append(f"{c.measure} with {c.level}")
+    return replace(c, model=fit.estimate, model_low=fit.low, model_high=fit.high, p=fit.p)
 
 
-def _contrast(
-    rows: Any, of: tuple[str, str, str, str], between: bool, fit: _Fit, rng: np.random.Generator
-) -> Contrast | None:
+def _contrast(cells: Any, of: tuple[str, str, str, str], between: bool, rng: np.random.Generator) -> Contrast | None:
+    """Difference, interval and effect size, from users' means of every condition."""
+    measure, factor, level, reference = of
+    table = cells.unstack(factor)
+    if level not in table or reference not in table:
+        return None
+    if between:
+        one, other = (table[name].dropna().groupby(level="user").mean() for name in (level, reference))
+        samples: tuple[Array, ...] = (one.to_numpy(), other.to_numpy())
+        effect, agree, users = hedges_g(*samples), 0, len(one) + len(other)
+    else:
+        pairs = table[[level, reference]].dropna().groupby(level="user").mean()
+        one, other = pairs[level], pairs[reference]
+        samples = ((one - other).to_numpy(),)
+        effect, users = cohen_dz(samples[0]), len(one)
+        agree = int(np.sum(np.sign(samples[0]) == np.sign(np.mean(samples[0])))) if users else 0
+    if not (len(one) and len(other)):
+        return None
+    return Contrast(
+        measure, factor, level, reference, users, float(one.mean()), float(other.mean()), float(_difference(*samples)),
+        *_bootstrapped(samples, rng), *_by_condition(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
+        effect=effect, agree=agree,
+    )  # fmt: skip
+
+
+def _by_condition(table: Any, level: str, reference: str) -> tuple[float, float]:
+    others = [name for name in table.index.names if name != "user"]
+    means = table.groupby(level=others).mean() if others else table
+    differences = means[level] - means[reference] if others else means[level].mean() - means[reference].mean()
+    return float(np.min(differences)), float(np.max(differences))
+
+
+def _bootstrapped(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
     from scipy.stats import bootstrap
 
-    measure, factor, level, reference = of
-    means = rows.groupby([factor, "user"])[measure].mean()
-    if level not in means.index or reference not in means.index:
-        return None
-    one, other = means[level], means[reference]
-    samples: tuple[Array, ...] = (one.to_numpy(), other.to_numpy()) if between else ((one - other).dropna().to_numpy(),)
-    if between:
-        effect, agree = hedges_g(*samples), 0
-    else:
-        effect, agree = cohen_dz(samples[0]), int(np.sum(np.sign(samples[0]) == np.sign(np.mean(samples[0]))))
-    difference = float(_difference(*samples))
-    low = high = np.nan
-    if all(len(sample) > 2 for sample in samples) and any(map(_spreads, samples)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a degenerate sample, whose interval is then NaN and shown as such
-            ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
-        low, high = (float(end) for end in ends.confidence_interval)
-    users = len(samples[0]) if not between else len(one) + len(other)
-    return Contrast(
-        measure, factor, level, reference, users, float(one.mean()), float(other.mean()), difference, low, high, *fit,
-        p_holm=np.nan, effect=effect, agree=agree,
-    )  # fmt: skip
+    if not (all(len(sample) > 2 for sample in samples) and any(map(spreads, samples))):
+        return float("nan"), float("nan")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a degenerate sample, whose interval is then NaN and shown as such
+        ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
+    return float(ends.confidence_interval.low), float(ends.confidence_interval.high)
 
 
 def _difference(*samples: Array, axis: int = -1) -> Array:
@@ -212,31 +207,7 @@ def _difference(*samples: Array, axis: int = -1) -> Array:
     return means[0] if len(means) == 1 else means[0] - means[1]
 
 
-def _spreads(sample: Array) -> bool:
-    return bool(np.ptp(sample) > ALIKE * np.max(np.abs(sample)))
-
-
-def cohen_dz(differences: Array) -> float:
-    """Mean over standard deviation of paired differences (J. Cohen, *Statistical Power Analysis*, 1988)."""
-    spread = float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
-    mean = float(np.mean(differences)) if len(differences) else 0.0
-    return mean / spread if spread > ALIKE * abs(mean) else float("nan")
-
-
-def hedges_g(one: Array, other: Array) -> float:
-    """Difference of means over the pooled standard deviation, corrected for small samples (L. V. Hedges, 1981)."""
-    freedom = len(one) + len(other) - 2
-    if freedom < 1:
-        return float("nan")
-    pooled = np.sqrt(((len(one) - 1) * np.var(one, ddof=1) + (len(other) - 1) * np.var(other, ddof=1)) / freedom)
-    return (
-        float((np.mean(one) - np.mean(other)) / pooled * (1.0 - 3.0 / (4.0 * freedom - 1.0))) if pooled > 0 else np.nan
-    )
-
-
 def _corrected(found: Sequence[Contrast]) -> tuple[Contrast, ...]:
-    from dataclasses import replace
-
     from statsmodels.stats.multitest import multipletests
 
     tested = [k for k, contrast in enumerate(found) if np.isfinite(contrast.p)]

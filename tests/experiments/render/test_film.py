@@ -1,5 +1,6 @@
 """Films: from any kind of run, whole or not at all, with nobody seen below the floor."""
 
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from experiments.files.json_text import json_text
 from experiments.render.film import Film, Frames, Show, render
 from experiments.render.film_file import FilmFile, check_target
 from experiments.render.graphics import NoGraphics, offscreen_backend
@@ -156,10 +158,10 @@ def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
 ) -> None:
     pytest.importorskip("imageio_ffmpeg")
     run = write_run(tmp_path / "run", Told(complete=False))
-    render(run, tmp_path / "film.mp4", SMALL)
-    said = capsys.readouterr()
-    assert "cut short" in said.err
-    assert "lowest point of the figure" in said.out
+    filmed = render(run, tmp_path / "film.mp4", SMALL)
+    assert "cut short" in capsys.readouterr().err
+    assert any("lowest point of the figure" in line for line in filmed.lines())
+    assert json.loads(json_text(filmed))["clearance"]["figure"]["lowest"] == filmed.clearance["figure"].lowest
     with Recording(run / "run.h5") as recording:
         frames = Frames(recording, run, SMALL, backend)
         assert frames.moments.kind == "animation"

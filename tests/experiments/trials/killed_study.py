@@ -65,7 +65,8 @@ def workers_of(driver: subprocess.Popen[bytes]) -> list[psutil.Process]:
 def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str, int]:
     """Kill driver and workers in turn at random moments of a study with two workers, then let it finish.
 
-    Returns how often each was killed: fewer than asked for if the study was done before.
+    The first worker is killed as soon as it is there, before it has started. Returns how often each was killed: fewer
+    than asked for if the study was done before.
     """
     rng, killed, orphans = random.Random(seed), {"worker": 0, "driver": 0}, list[psutil.Process]()
     driver = start(study, out, "--workers", "2")
@@ -81,7 +82,7 @@ def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str,
                 continue
             while not workers_of(driver) and driver.poll() is None:
                 time.sleep(0.1)
-            time.sleep(rng.uniform(0.0, 4.0))
+            time.sleep(rng.uniform(0.0, 4.0) if sum(killed.values()) else 0.0)
             workers = workers_of(driver)
             if driver.poll() is not None or not workers:
                 break  # it is done before all the kills
@@ -92,7 +93,7 @@ def killed_at_random(study: Path, out: Path, kills: int, seed: int) -> dict[str,
     finally:
         driver.kill()
         driver.communicate()
-        _, alive = psutil.wait_procs(orphans, timeout=30)
+        _, alive = psutil.wait_procs(orphans, timeout=120)  # a busy machine is slow to notice
         for process in alive:
             process.kill()
     assert not alive, "workers outlive their driver"

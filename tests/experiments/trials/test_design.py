@@ -62,6 +62,9 @@ def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
         ({"factors": {"guidance": {"none": {}, "river": {"mode": "flood"}}}}, "flood"),
         ({"factors": {"stiffness": [1, 2], "k": {"a": {"stiffness": 3}, "b": {"damping": 1}}}}, "both set 'stiffness'"),
         ({"factors": {"gain": {"a": {"stiffness": 3}, "b": {"stiffness": 3.0}}}}, "are the same"),
+        ({"factors": {"user": ["trace", "exaggerate"]}}, "'user' has the name of another column"),
+        ({"factors": {"effort": {"a": {"stiffness": 3}, "b": {"stiffness": 4}}}}, "'effort' has the name of another"),
+        ({"users": {"does": "fly"}}, "no user 'fly'"),
         ({"between": ["map"]}, "no factor 'map'"),
         ({"between": ["stiffness"], "users": {"number": 1}}, "2 groups between users and 1 users"),
         ({"run": {"seconds": 3}}, "sets 'seconds' as a word of its runs"),
@@ -76,11 +79,20 @@ def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str,
 
 @pytest.mark.parametrize(
     ("values", "says"),
-    [({"repetitions": 0}, "--repetitions"), ({"order": "random"}, "--order"), ({"subjects": 3}, "subjects")],
+    [
+        ({"repetitions": 0}, "--repetitions"),
+        ({"order": "random"}, "--order"),
+        ({"subjects": 3}, "subjects"),
+        ({"factors": "map"}, "factors is 'map'"),
+        ({"factors": {"map": {"a": 3, "b": 4}}}, "factors.map.a is 3"),
+        ({"users": 3}, "users is 3"),
+        ({"between": "map"}, "between is 'map'"),
+    ],
 )
 def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says: str) -> None:
-    with pytest.raises(ParameterError, match=says):
+    with pytest.raises(ParameterError, match=says) as raised:
         study(**values)
+    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(

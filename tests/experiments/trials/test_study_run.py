@@ -10,12 +10,11 @@ from experiments.results import smoothness
 from experiments.trials import run_trial
 from experiments.trials.database import Database
 from experiments.trials.errors import StudyError
-from experiments.trials.executors import executor
 from experiments.trials.run_trial import Row, Shelf, Task, perform
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from sim.recording.recording import Recording
 
-pytest.importorskip("pandas")
+pandas = pytest.importorskip("pandas")
 pytest.importorskip("statsmodels")
 
 
@@ -36,6 +35,7 @@ def test_a_study_is_the_same_on_one_thread_on_two_and_when_it_goes_on_where_it_w
     tables = [(tmp_path / name / "trials.csv").read_bytes() for name in ("one", "grown")]
     assert tables[0] == tables[1]
     assert small().run(tmp_path / "one").ran == 0
+    assert pandas.read_parquet(tmp_path / "one" / "trials.parquet").equals(one.table)
     assert one.table["user"].value_counts().to_dict() == {0: 2, 1: 2, 2: 2}
     page = (tmp_path / "one" / REPORT).read_text(encoding="utf-8")
     assert "The median trial" in page
@@ -116,12 +116,13 @@ def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
     ("threads", "workers", "cluster", "says"),
     [
         (2, 2, None, "--threads and --workers contradict"),
-        (0, None, None, "--threads 0"),
-        (None, 0, None, "--workers 0"),
+        (0, None, None, "--threads is 0"),
+        (None, 0, None, "--workers is 0"),
     ],
 )
-def test_where_trials_run_is_one_place(
-    threads: int | None, workers: int | None, cluster: str | None, says: str
+def test_where_trials_run_is_one_place_and_a_contradiction_leaves_nothing_behind(
+    tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, says: str
 ) -> None:
-    with pytest.raises((StudyError, ParameterError), match=says), executor(threads, workers, cluster):
-        pass
+    with pytest.raises(ParameterError, match=says):
+        small().run(tmp_path / "out", threads, workers, cluster)
+    assert not (tmp_path / "out").exists()

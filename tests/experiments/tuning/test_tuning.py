@@ -1,3 +1,4 @@
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from experiments.config.run_config import load_config
 from experiments.config.words import run_config
 from experiments.trials.database import Database
 from experiments.trials.errors import StudyError
+from experiments.trials.run_trial import Row, Task
 from experiments.trials.threads import Threads
+from experiments.trials.where import Where
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of
@@ -67,6 +70,34 @@ def test_a_search_that_is_stopped_goes_on_as_it_would_have(tmp_path: Path, sampl
 
 
 @pytest.mark.usefixtures("certificates")
+def test_objectives_of_several_tasks_are_each_of_the_trials_that_have_them(tmp_path: Path) -> None:
+    trade = {"objectives": ["tracking_error", "expressiveness"], "run": {"figure": "kinematic"}, "candidates": 1}
+    both = searched(tuning(tasks=["trace", "exaggerate"], **trade), tmp_path / "both")
+    assert both[0].objectives is not None
+    assert all(value > 0.0 for value in both[0].objectives)
+    with pytest.raises(StudyError, match=r"no trial of its users has 'expressiveness'; expected tasks"):
+        searched(tuning(**trade), tmp_path / "one")
+
+
+class _Failing:
+    """An executor whose second trial fails."""
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        for k, task in enumerate(tasks):
+            state, measures = ("failed", {}) if k == 1 else ("done", {"tracking_error": 1e-9})
+            yield Row(task.key, state, "", measures, 0.0, "", "")
+
+
+@pytest.mark.usefixtures("certificates")
+def test_a_candidate_of_which_a_trial_failed_is_not_chosen_for_the_others(tmp_path: Path) -> None:
+    with Database(tmp_path / "tune.sqlite", "identity", "t", "") as database:
+        config, storage = tuning(candidates=1, prune=False), storage_of(tmp_path / "journal")
+        found = search(config, storage, "identity", Panel(database, _Failing()), "random", lambda n: None)
+    assert chosen(found, config.directions) is None
+    assert found[-1].state == "given up"
+
+
+@pytest.mark.usefixtures("certificates")
 def test_a_search_in_a_database_is_that_of_a_journal_and_goes_on(tmp_path: Path) -> None:
     whole, kept = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
     searched(tuning(candidates=2, storage=kept), tmp_path / "database")
@@ -115,6 +146,9 @@ def test_the_front_is_what_nothing_else_beats_and_the_choice_lies_in_its_middle(
         ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "low > 0 for log|log of > 0"),
         ({"objectives": ["speed"]}, "no objective 'speed'"),
         ({"objectives": ["margin"]}, "no measure among its objectives"),
+        ({"objectives": ["effort", "effort"]}, "an objective stands twice"),
+        ({"tasks": ["trace", "fly"]}, "no user 'fly'"),
+        ({"held_back": {"number": 3, "seed": 2, "does": "fly"}}, "no user 'fly'"),
         ({"objectives": ["expressiveness"]}, "kinematic"),
         ({"held_back": {"number": 3, "seed": 1}}, "same seed"),
         ({"sampler": "cma-es", "objectives": ["tracking_error", "effort"]}, "CMA-ES needs one objective"),
@@ -144,7 +178,7 @@ def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain()
 @pytest.mark.slow
 def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path: Path) -> None:
     config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
-    found = run_tuning(replace(config, prune=False), tmp_path, threads=2)
+    found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
     taken = load_config(tmp_path / CHOSEN)
     assert taken.mode.stiffness == found.values["stiffness"]  # pyright: ignore
     assert kept_stability(taken).verdict == "certified"

@@ -1,0 +1,30 @@
+"""Standardised differences."""
+
+import numpy as np
+
+from controllers.state import Array
+
+ALIKE = 1e-6  # spread over size of differences that are one number, written many times
+
+
+def spreads(sample: Array) -> bool:
+    """Whether anything is known of a sample's spread."""
+    return bool(np.ptp(sample) > ALIKE * np.max(np.abs(sample)))
+
+
+def cohen_dz(differences: Array) -> float:
+    """Mean over standard deviation of paired differences (J. Cohen, *Statistical Power Analysis*, 1988)."""
+    spread = float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
+    mean = float(np.mean(differences)) if len(differences) else 0.0
+    return mean / spread if spread > ALIKE * abs(mean) else float("nan")
+
+
+def hedges_g(one: Array, other: Array) -> float:
+    """Difference of means over the pooled standard deviation, corrected for small samples (L. V. Hedges, 1981)."""
+    freedom = len(one) + len(other) - 2
+    if freedom < 1:
+        return float("nan")
+    pooled = np.sqrt(((len(one) - 1) * np.var(one, ddof=1) + (len(other) - 1) * np.var(other, ddof=1)) / freedom)
+    if not pooled > 0.0:
+        return float("nan")
+    return float((np.mean(one) - np.mean(other)) / pooled * (1.0 - 3.0 / (4.0 * freedom - 1.0)))

@@ -1,0 +1,77 @@
+"""Interactions: whether what a level does depends on the level of another factor.
+
+Of a level of one factor and a level of another, each user has a difference of differences,
+
+    d_i = (y_i[a, b] − y_i[a₀, b]) − (y_i[a, b₀] − y_i[a₀, b₀]),
+
+of her means in these conditions. It is held against zero by Student's t test, or, where one of the two factors is
+between users, one group's differences against the other's by Welch's (scipy). All of them are corrected together by
+Holm's method.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from controllers.state import Array
+from experiments.trials.analysis.effect_sizes import spreads
+
+
+def interactions_of(
+    cells_of: Mapping[str, Any], factors: Mapping[str, Sequence[str]], between: Sequence[str]
+) -> dict[str, float]:
+    """By measure, the least corrected p of its interactions of two factors; measures without any are left out.
+
+    Parameters
+    ----------
+    cells_of : mapping of str to pandas.Series
+        By measure, users' means of every condition, indexed by the factors that vary and the user.
+    factors : mapping of str to sequence of str
+        Names of levels, the reference first.
+    between : sequence of str
+        Factors between users.
+    """
+    from statsmodels.stats.multitest import multipletests
+
+    found: list[tuple[str, float]] = []
+    for measure, cells in cells_of.items():
+        varied = [name for name in cells.index.names if name != "user"]
+        for one, other in itertools.combinations(varied, 2):
+            if one in between and other in between:
+                continue
+            own, across = (other, one) if one in between else (one, other)
+            for level, at in itertools.product(factors[own][1:], factors[across][1:]):
+                p = _p(cells, (own, level, factors[own][0]), (across, at, factors[across][0]), across in between)
+                found += [(measure, p)] if np.isfinite(p) else []
+    if not found:
+        return {}
+    corrected = np.asarray(multipletests([p for _, p in found], method="holm")[1], dtype=np.float64)
+    least: dict[str, float] = {}
+    for (measure, _), p in zip(found, corrected, strict=True):
+        least[measure] = min(float(p), least.get(measure, 1.0))
+    return least
+
+
+def _p(cells: Any, own: tuple[str, str, str], across: tuple[str, str, str], between: bool) -> float:
+    from scipy.stats import ttest_1samp, ttest_ind
+
+    factor, level, reference = own
+    table = cells.unstack(factor)
+    if level not in table or reference not in table:
+        return float("nan")
+    differences = (
+        (table[level] - table[reference]).dropna().groupby(level=[across[0], "user"]).mean().unstack(across[0])
+    )
+    if across[1] not in differences or across[2] not in differences:
+        return float("nan")
+    samples: tuple[Array, ...]
+    if between:
+        samples = tuple(differences[name].dropna().to_numpy() for name in across[1:])
+    else:
+        samples = ((differences[across[1]] - differences[across[2]]).dropna().to_numpy(),)
+    if any(len(sample) < 3 for sample in samples) or not any(map(spreads, samples)):
+        return float("nan")
+    test: Any = ttest_ind(*samples, equal_var=False) if between else ttest_1samp(samples[0], 0.0)
+    return float(test.pvalue)

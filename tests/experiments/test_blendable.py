@@ -1,0 +1,42 @@
+"""What cannot be blended, or is off its pace, is said before a run, on every map."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifted import Lifted
+from experiments.config.words import run_config
+from experiments.files.map_files import save_map
+from experiments.setups.blendable import not_blendable
+from experiments.setups.setups import map_parts
+from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
+
+
+def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
+    walk, jump, flip = embedded("walk"), embedded("jump"), embedded("backflip")
+    assert not_blendable((walk, walk)) == not_blendable((flip, flip)) == ()
+    said = not_blendable((walk, flip, jump))
+    assert len(said) == 2
+    assert said[0].startswith("backflip turns over")
+    assert said[1].startswith("jump flies for 0.")
+
+
+@pytest.mark.parametrize(("kind", "mode"), [("composite", "follow"), ("rivers", "rivers")])
+def test_maps_of_clips_name_what_flies_and_what_is_off_its_pace(kind: str, mode: str) -> None:
+    config = run_config(map=kind, mode=mode, clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
+    flies, paced = map_parts(config, figure_model()).remarks
+    assert flies.startswith("jump flies for 0.")
+    assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its own pace")
+
+
+def test_a_lifted_map_names_what_lies_next_to_no_motion(tmp_path: Path) -> None:
+    clips = [embedded(name) for name in ("walk", "backflip")]
+    angles = [2.0 * np.pi * np.linspace(0.0, 1.0, clip.n_frames) for clip in clips]
+    sites = np.tile([[0.045, 0.0], [0.055, 0.0]], (16, 1, 1))
+    made = Lifted([(clip.poses, clip.fps) for clip in clips], [True] * 2, angles, sites, names=["walk", "backflip"])
+    save_map(made, tmp_path / "map.npz")
+    remarks = map_parts(run_config(map=str(tmp_path / "map.npz"), seconds=1.0), figure_model()).remarks
+    assert any(remark.startswith("backflip turns over") for remark in remarks)
+    assert not any("walk" in remark and "flies" in remark for remark in remarks)
