@@ -77,7 +77,7 @@ class Outcome:
 
     def to_json(self) -> dict[str, object]:
         """All of it by name."""
-        return asdict(self) | {"link": self.link._asdict()}
+        return {**asdict(self), "link": self.link._asdict()}
 
     def lines(self) -> list[str]:
         """What a person wants to know, first what went wrong."""

@@ -66,7 +66,7 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
         end.shown.write(shown)
         packet[_SENT_AT] = time.monotonic()
         try:
-            end.packets.send(packet, socket.MSG_DONTWAIT)
+            end.packets.send(packet.data, socket.MSG_DONTWAIT)
         except OSError:
             if command is None:
                 time.sleep(end.period)  # nobody takes its readings, or is there
@@ -122,7 +122,7 @@ class EmulatedDriver:
     def _take(self, reading: Array) -> bool:
         """Take the next packet; False if there is none."""
         try:
-            size = self._packets.recv_into(self._packet)
+            size = self._packets.recv_into(self._packet.data)
         except BlockingIOError:
             return False
         except OSError:
@@ -139,7 +139,7 @@ class EmulatedDriver:
         self._command[:3], self._command[3] = torque, float(enable)
         self._sent = time.monotonic()
         try:
-            self._packets.send(self._command)
+            self._packets.send(self._command.data)
         except BlockingIOError:
             pass  # the device does not keep up; its readings will be stale
         except OSError:

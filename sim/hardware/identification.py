@@ -53,13 +53,15 @@ _HOP = 0.25  # of a window, from one to the next
 _SMOOTH = 4  # readings on either side, over which the rate is taken that tells friction's direction
 _SLOWEST = 0.05  # [rad/s] below which that direction is not sure
 _STEPS = 12  # of Gauss–Newton
+_LONGEST = 1.999  # periods of delay for which there are torques in the equations
 _LAGS = 8  # windows that share noise with one: four overlap
 CONFIDENCE = 0.95
 """Of all intervals together."""
-HIDDEN = 0.05
-"""Share of what is left that may be hidden in the parameters: with it all intervals of simulated devices (seeds 3000 to
-3011) hold, by factors of 1.0 to 1.7. Most of what is hidden there is the physics' step: torques act half of its 125 µs
-early, and the delay is found 33 µs too short."""
+HIDDEN = 0.15
+"""Share of what is left that may be hidden in the parameters. What the equations leave out is another torque in every
+motion: in simulation half a step of the physics, by which torques act early, and a Coulomb friction that sets in softly
+and is taken for a viscous one. A third of this share covers the curve of the tests (devices of seeds 3000 to 3008), but
+it takes five sixths for two laps of a level circle with a wave."""
 
 
 class Motion(NamedTuple):
@@ -170,7 +172,12 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
         rows, targets = _stacked(equations, sensitivity, left, scale)
         step = np.linalg.lstsq(rows, -targets, rcond=None)[0]
         values = values + step
-        values[_DELAY] = max(-1e-3, values[_DELAY])
+        values[_DELAY] = np.clip(values[_DELAY], -equations.period, _LONGEST * equations.period)
+    if not -equations.period < values[_DELAY] < _LONGEST * equations.period:
+        raise SimError(
+            f"the delay found is {values[_DELAY]:.2g} s, the end of what is looked for, {-equations.period:g} to "
+            f"{_LONGEST * equations.period:.2g} s; expected motions that are faster, or a device that answers sooner"
+        )
     left, sensitivity = _residuals(equations, values)
     quantile = float(ndtri(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
     noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, left, scale)))

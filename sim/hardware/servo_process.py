@@ -21,7 +21,7 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.safety.arming import NO_REQUEST
 from controllers.safety.faults import Fault
 from models.errors import ModelError
-from sim.devices.driver import DeviceIdentity
+from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.gated_servo import GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
@@ -175,6 +175,8 @@ class ServoProcess:
         for _ in range(3):
             self._ticker.tick(0)
         said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
+        self._ticker.tick(0)
+        self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # what came while nobody was there to read
         self._channels.told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:

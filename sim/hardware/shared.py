@@ -5,13 +5,18 @@ lock of this kind needs barriers that Python does not have.
 """
 
 from multiprocessing.shared_memory import SharedMemory
-from typing import Self
+from typing import Self, cast
 
 import numpy as np
 
 from controllers.state import Array
 
 _TRIES = 20  # so a writer that was stopped in the middle costs its reader microseconds
+
+
+def _counter(memory: SharedMemory) -> "memoryview[int]":
+    """The whole number that the memory begins with; an item of a memoryview is one of Python's, with no array made."""
+    return cast("memoryview[int]", memory.buf)[:8].cast("q")
 
 
 class SharedNumbers:
@@ -32,7 +37,7 @@ class SharedNumbers:
     def __init__(self, size: int, name: str | None = None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (size + 1))
         self._size, self._owner = size, name is None
-        self._sequence = self._memory.buf[:8].cast("q")
+        self._sequence = _counter(self._memory)
         self._numbers, self._whole = np.ndarray(size, np.float64, self._memory.buf, 8), np.zeros(size)
         if self._owner:
             self._sequence[0] = 0
@@ -80,7 +85,7 @@ class Ring:
     def __init__(self, rows: int, width: int, name: str | None = None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (rows * width + 1))
         self._shape, self._owner = (rows, width), name is None
-        self._count = self._memory.buf[:8].cast("q")
+        self._count = _counter(self._memory)
         self._rows = np.ndarray((rows, width), np.float64, self._memory.buf, 8)
         self._taken = 0
         if self._owner:

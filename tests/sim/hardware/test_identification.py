@@ -40,8 +40,8 @@ def curve(lap: float) -> Trajectory:
     return Trajectory(np.linspace(0.0, lap, 97), points, periodic=True)
 
 
-def moved(linkage: Linkage, heavier: float, lap: float) -> Motion:
-    program = Follow(curve(lap), k_r=300.0, b_d=8.0).program()
+def moved(linkage: Linkage, heavier: float, along: Trajectory) -> Motion:
+    program = Follow(along, k_r=300.0, b_d=8.0).program()
     parts = gated_servo(linkage=linkage, program=program, **AT_ONCE)
     model = parts.driver.world.model
     for name, arm, axes in (("be", PREMIUM_1_5.l5, (0, 1)), ("df", PREMIUM_1_5.l6, (0, 2))):
@@ -67,7 +67,7 @@ def truth(linkage: Linkage, heavier: float) -> np.ndarray:
 def identified(seed: int) -> tuple[Identified, np.ndarray]:
     """What is found of a device, and what is true of it."""
     linkage, heavier = drawn(np.random.default_rng(seed))
-    return identify_linkage([moved(linkage, heavier, lap) for lap in LAPS]), truth(linkage, heavier)
+    return identify_linkage([moved(linkage, heavier, curve(lap)) for lap in LAPS]), truth(linkage, heavier)
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +91,23 @@ def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_interv
 def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
     result, hidden = found
     margins = dict(zip(NAMES, result.margins, strict=True))
-    assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.01
-    assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.5 * PREMIUM_1_5.viscous_friction[0]
-    assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.02
-    assert margins["delay"] < 5e-4
+    assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.005
+    assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.2 * PREMIUM_1_5.viscous_friction[0]
+    assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.005
+    assert margins["delay"] < 2e-4
     assert result.unexplained < 0.005
+
+
+@pytest.mark.slow
+def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_up() -> None:
+    """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
+    linkage, heavier = drawn(np.random.default_rng(5000))
+    s = np.linspace(0.0, 2.0 * np.pi, 97)
+    points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.02 * np.sin(2.0 * s)], axis=1)
+    points[-1] = points[0]
+    saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (4.0, 2.5)]
+    with pytest.raises(SimError, match="the end of what is looked for"):
+        identify_linkage([moved(linkage, heavier, saddle) for saddle in saddles])
 
 
 def test_stretches_with_gaps_and_short_ones_are_left_out() -> None:
