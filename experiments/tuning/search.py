@@ -137,8 +137,9 @@ def candidates_of(study: optuna.Study) -> list[Candidate]:
     made: list[Candidate] = []
     for t in study.get_trials(deepcopy=False, states=_TOLD):
         attributes: dict[str, Any] = t.user_attrs
-        state = "refused" if attributes["violation"] > 0.0 else "tried" if t.values is not None else "given up"
-        values = None if t.values is None else tuple(t.values)
+        complete = t.state == TrialState.COMPLETE  # one that is given up has the value of part of the panel
+        state = "refused" if attributes["violation"] > 0.0 else "tried" if complete else "given up"
+        values = tuple(t.values) if complete else None
         made.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
     return made
 

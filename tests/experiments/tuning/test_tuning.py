@@ -111,6 +111,19 @@ def test_a_database_that_does_not_answer_is_a_line() -> None:
         assert "\n" not in str(raised.value)
 
 
+def test_a_candidate_that_was_given_up_is_not_judged_by_part_of_the_panel() -> None:
+    import optuna
+
+    study = optuna.create_study()
+    trial = study.ask({"stiffness": optuna.distributions.FloatDistribution(1.0, 2.0)})
+    for name, value in (("verdict", "certified"), ("margin", 2.0), ("violation", 0.0)):
+        trial.set_user_attr(name, value)
+    trial.report(0.1, 1)
+    study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+    (found,) = searching.candidates_of(study)
+    assert (found.state, found.objectives) == ("given up", None)
+
+
 def _begin_one_and_die(folder: Path, sampler: str) -> None:
     import optuna
 
