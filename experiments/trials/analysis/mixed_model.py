@@ -2,14 +2,15 @@
 
 On the trials of a level and of the reference,
 
-    y_ij = β₀ + β x_ij + Σ_g β_g[level] + u_i + v_i x_ij + e_ij,   (u_i, v_i) ~ N(0, Σ),   e_ij ~ N(0, σ²),
+    y_ij = β₀ + β x_ij + γ[c_ij] + δ[c_ij] x_ij + u_i + v_i x_ij + e_ij,   (u_i, v_i) ~ N(0, Σ),   e_ij ~ N(0, σ²),
 
-with x = 1 at the level and 0 at the reference, the other factors as fixed effects, and v_i for factors within users
-only: without it a user's repetitions would count as if they were other users (D. J. Barr et al., "Random effects
-structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by
-REML (statsmodels). β over its standard error is held against Student's t with the users less one, or less their groups,
-as degrees of freedom (between-within: M. D. Schluchter & J. T. Elashoff, 1990); in a balanced design that is the paired
-t test of the users' means.
+with x = 1 at the level and 0 at the reference; c is the condition of the other factors, with Σ_c γ = Σ_c δ = 0, so
+that β is the mean over these conditions, whatever interacts; v_i is for factors within users only: without it a user's
+repetitions would count as if they were other users (D. J. Barr et al., "Random effects structure for confirmatory
+hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by REML (statsmodels). β over
+its standard error is held against Student's t with the users less one, or less their groups, as degrees of freedom
+(between-within: M. D. Schluchter & J. T. Elashoff, 1990); in a balanced design that is the paired t test of the users'
+means, or a wider one where the users' variance comes out as zero.
 """
 
 import warnings
@@ -31,7 +32,7 @@ class Fit(NamedTuple):
     p : float
         Of β = 0, two-sided.
     doubtful : bool
-        Whether the fit did not converge well, or a variance was found to be zero.
+        Whether the fit did not converge.
     """
 
     estimate: float
@@ -67,17 +68,18 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     from scipy.stats import t
 
     data = rows[rows[factor].isin(levels)]
-    centre, scale = float(data[measure].mean()), float(data[measure].std())
+    data = data.assign(_c=data[list(others)].astype(str).agg(" × ".join, axis=1) if others else "")
+    data = data[data.groupby("_c")[factor].transform("nunique") == len(levels)]
+    scale = float(data[measure].std())
     if freedom < 1 or not scale > 0.0:
         return NO_FIT
+    centre = float(data[measure].mean())
     data = data.assign(_y=(data[measure] - centre) / scale, _x=(data[factor] == levels[0]).astype(float))
-    terms = ["_x", *(f"C(Q({name!r}))" for name in others if data[name].nunique() > 1)]
+    fixed = "_y ~ _x * C(_c, Sum)" if data["_c"].nunique() > 1 else "_y ~ _x"
     try:
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            model = smf.mixedlm(
-                "_y ~ " + " + ".join(terms), data, groups="user", re_formula="~_x" if within else "~1"
-            ).fit(reml=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a variance at zero, where it belongs for people who are alike
+            model = smf.mixedlm(fixed, data, groups="user", re_formula="~_x" if within else "~1").fit(reml=True)
             estimate, error = scale * float(model.params["_x"]), scale * float(model.bse["_x"])
     except (np.linalg.LinAlgError, ValueError):
         return NO_FIT
@@ -85,4 +87,4 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
         return NO_FIT
     reach = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * error
     p = 2.0 * float(t.sf(abs(estimate) / error, freedom))
-    return Fit(estimate, estimate - reach, estimate + reach, p, bool(told))
+    return Fit(estimate, estimate - reach, estimate + reach, p, not model.converged)

@@ -53,7 +53,9 @@ def effects_figure(found: Statistics, factor: str) -> Figure | None:
     axis.invert_yaxis()
     axis.axvline(0.0, color="#333", lw=0.8)
     axis.set_xscale("symlog", linthresh=1.0)
-    axis.set_xlabel(f"standardised difference from {contrasts[0].reference!r} (linear within ±1)")
+    axis.set_xlabel(
+        f"d_z or g, from {contrasts[0].reference!r} (linear within ±1; large where simulated users are alike)"
+    )
     axis.legend(frameon=False, fontsize=9)
     axis.grid(axis="x", alpha=0.3)
     return figure

@@ -139,8 +139,8 @@ def statistics(
     return Statistics(_corrected(found), interactions, told)
 
 
-_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap intervals stand alone"
-_DOUBTFUL = "a mixed model did not converge well, or finds no variance between users; believe the bootstrap intervals"
+_NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
+_DOUBTFUL = "the mixed model did not converge; believe the bootstrap interval"
 
 
 def _modelled(
@@ -153,8 +153,8 @@ def _modelled(
         rows, c.measure, c.factor, (c.level, c.reference), others, c.users - groups, c.factor not in between
     )
     remark = _NO_MODEL if not np.isfinite(fit.p) else _DOUBTFUL if fit.doubtful else ""
-    if remark and c.measure not in remarks.setdefault(remark, []):
-        remarks[remark].append(c.measure)
+    if remark:
+        remarks.setdefault(remark, []).append(f"{c.measure} with {c.level}")
     return replace(c, model=fit.estimate, model_low=fit.low, model_high=fit.high, p=fit.p)
 
 

@@ -15,7 +15,7 @@ with atheris.instrument_imports(include=["models"]):
     from models.errors import ModelError
     from models.mocap.library import load
 
-from test_bad_motion_files import AMC, ASF, BVH, CHARACTER, DEEPMIMIC
+from motion_files import AMC, ASF, BVH, CHARACTER, DEEPMIMIC
 
 FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-readers-"))
 # The first byte of an input says what the rest is.
