@@ -100,10 +100,8 @@ class AnimationSummary:
 
     def soles(self) -> str:
         """Of its soles, in a sentence."""
-        return (
-            f"Its lowest sole is at {self.lowest_sole_cm:+.1f} cm, and its feet skate {self.foot_skate_cm:.1f} cm "
-            "at most."
-        )
+        lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
+        return f"Its lowest sole is at {lowest:+.1f} cm, and its feet skate {self.foot_skate_cm:.1f} cm at most."
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ __all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 TOKEN = "0123456789abcdef"
-CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "deepmimic" / "humanoid3d_kick.txt"
+CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "xia" / "strutting_01_000.bvh"  # prepared in seconds
 
 
 @pytest.fixture(scope="module")
