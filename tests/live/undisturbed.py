@@ -55,8 +55,10 @@ def used(served: Served, browser: Any, took_hold: list[bool]) -> Stretch:
         for way in ((40, -30), (-40, 30)):
             # The ball moves on between the look at it and the press: a drag that misses turns the view.
             with contextlib.suppress(AssertionError), drag(tab, lambda: on_screen(served.desk.now["p"]), way, 3.0):
+                took_hold.append(False)
+                served.until(lambda: served.desk.holds, "the stylus is held", patience=5.0)
+                took_hold[-1] = True
                 time.sleep(0.5)
-                took_hold.append(served.desk.holds)
         tab.reload()
         tab.get_by_role("button", name="Pause").wait_for()
 
