@@ -37,11 +37,13 @@ def write_report_of(folder: Path) -> None:
 
 def lines_of(recording: Recording, folder: Path) -> list[str]:
     """What happened in a run, in words: as its recording has it, or as was found of one that was stopped."""
-    if recording.summary is not None:
+    if recording.summary is not None and "lines" in recording.summary:
         return [str(line) for line in cast(list[object], recording.summary["lines"])]
-    stopped = f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."
+    # Of a device the recorder knew the rows only: what happened lies in the folder.
+    whole = recording.summary is not None
+    stopped = [] if whole else [f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."]
     try:
         found = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["lines"]
     except (OSError, ValueError, KeyError, TypeError):
-        return [stopped]
-    return [stopped, *map(str, found)]
+        return stopped
+    return [*stopped, *map(str, found)]
