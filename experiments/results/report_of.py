@@ -18,11 +18,7 @@ def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording."""
     with Recording(folder / RECORDING) as recording:
         if "frames" not in recording.groups:  # of a device: no figure was in the loop
-            told = folder / SUMMARY
-            lines = (
-                json.loads(told.read_text(encoding="utf-8"))["lines"] if told.exists() else lines_of(recording, folder)
-            )
-            write_hardware_report(folder, recording, lines)
+            write_hardware_report(folder, recording, lines_of(recording, folder))
             return
         figures = draw_figures(recording, folder / FIGURES)
         if (folder / CURVE_FILE).exists():
