@@ -107,7 +107,9 @@ class Served:
         self.page = Page(config, folder, port=0, shadows=False)
         self.thread = threading.Thread(target=self.page.serve, daemon=True)
         self.thread.start()
-        self.until(lambda: self.page.stage is not None, "the run is compiled and put together", patience=4.0 * PATIENCE)
+        self.assert_until(
+            lambda: self.page.stage is not None, "the run is compiled and put together", patience=4.0 * PATIENCE
+        )
 
     @property
     def desk(self) -> Any:
@@ -117,7 +119,9 @@ class Served:
     def address(self) -> str:
         return f"http://127.0.0.1:{self.page.port}"
 
-    def until(self, condition: Callable[[], bool], what: str, step: float = 0.05, patience: float = PATIENCE) -> None:
+    def assert_until(
+        self, condition: Callable[[], bool], what: str, step: float = 0.05, patience: float = PATIENCE
+    ) -> None:
         end = time.monotonic() + patience
         while not condition():
             assert self.thread.is_alive(), f"the page has ended before: {what}"
@@ -126,14 +130,14 @@ class Served:
 
     def settled(self) -> dict[str, np.ndarray]:
         """What is shown once time stands still."""
-        self.until(lambda: self.desk.paused, "time is stopped")
+        self.assert_until(lambda: self.desk.paused, "time is stopped")
         seen = [math.nan]
 
         def still() -> bool:
             seen.append(float(self.desk.now["t"][0]))
             return seen[-1] == seen[-2]
 
-        self.until(still, "time stands still", step=0.3)  # [s], of blocks of 8 ms
+        self.assert_until(still, "time stands still", step=0.3)  # [s], of blocks of 8 ms
         return self.desk.now
 
     def close(self) -> None:

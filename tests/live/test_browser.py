@@ -64,36 +64,38 @@ def test_the_hand_is_dragged_the_figure_follows_and_the_arrow_grows(tab: Any, se
     pose, place = drawn["reference"].copy(), drawn["p"].copy()
     assert arrow_of(stage) == 0.0
     with drag(tab, lambda: on_screen(place), (0, -60)):
-        served.until(lambda: desk.holds, "the stylus is held")
+        served.assert_until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
-        served.until(lambda: desk.now["p"][2] - place[2] > 0.004, "it comes along")
-        served.until(lambda: arrow_of(stage) > 0.05, "the arrow of the hand has grown")
-        served.until(lambda: float(np.abs(desk.now["reference"] - pose).max()) > 1e-3, "the figure's pose changes")
+        served.assert_until(lambda: desk.now["p"][2] - place[2] > 0.004, "it comes along")
+        served.assert_until(lambda: arrow_of(stage) > 0.05, "the arrow of the hand has grown")
+        served.assert_until(
+            lambda: float(np.abs(desk.now["reference"] - pose).max()) > 1e-3, "the figure's pose changes"
+        )
         kept(tab, "dragged")
-    served.until(lambda: not desk.holds, "it is let go")
+    served.assert_until(lambda: not desk.holds, "it is let go")
 
 
 def test_a_curve_is_grabbed_bent_and_the_bend_undone(tab: Any, served: Served) -> None:
     desk = served.desk
-    served.until(lambda: desk.now["distance"][0] < 0.001, "the stylus is on the curve, where it can be taken hold of")
+    served.assert_until(lambda: desk.now["distance"][0] < 0.001, "the stylus is on the curve")
     desk.pause(True)
     place = served.settled()["p"].copy()
     tab.keyboard.down("Shift")
     with drag(tab, lambda: on_screen(place), (0, -60)):
-        served.until(lambda: desk.holds, "the stylus is held")
+        served.assert_until(lambda: desk.holds, "the stylus is held")
         desk.pause(False)
-        served.until(lambda: desk.now["p"][2] - place[2] > 0.01, "it comes along")
+        served.assert_until(lambda: desk.now["p"][2] - place[2] > 0.01, "it comes along")
         kept(tab, "bending")
     tab.keyboard.up("Shift")
-    served.until(lambda: desk.now["bends"][0] == 1.0, "the curve is bent")
+    served.assert_until(lambda: desk.now["bends"][0] == 1.0, "the curve is bent")
     bent = desk.now["course"].copy()
     tab.get_by_role("button", name="Undo").first.click()
-    served.until(lambda: desk.now["bends"][0] == 0.0, "the bend is undone")
-    served.until(lambda: float(np.abs(desk.now["course"] - bent).max()) > 0.005, "the curve is where it was")
+    served.assert_until(lambda: desk.now["bends"][0] == 0.0, "the bend is undone")
+    served.assert_until(lambda: float(np.abs(desk.now["course"] - bent).max()) > 0.005, "the curve is where it was")
     tab.get_by_role("button", name="Redo").first.click()
-    served.until(lambda: desk.now["bends"][0] == 1.0, "the bend is done again")
+    served.assert_until(lambda: desk.now["bends"][0] == 1.0, "the bend is done again")
     tab.get_by_role("button", name="Undo").first.click()
-    served.until(lambda: desk.now["bends"][0] == 0.0, "and undone")
+    served.assert_until(lambda: desk.now["bends"][0] == 0.0, "and undone")
 
 
 def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
@@ -102,12 +104,12 @@ def test_keys_move_the_hand_and_let_it_go(tab: Any, served: Served) -> None:
     place = served.settled()["p"].copy()
     for key in "LLLUU":
         tab.keyboard.press(key.lower())
-    served.until(lambda: desk.holds and desk.target[2] > place[2] + 1.5 * STEP, "the keys have arrived")
+    served.assert_until(lambda: desk.holds and desk.target[2] > place[2] + 1.5 * STEP, "the keys have arrived")
     np.testing.assert_allclose(desk.target - place, [3 * STEP, 0.0, 2 * STEP], atol=1e-9)
     desk.pause(False)
-    served.until(lambda: float(np.linalg.norm(desk.now["user"])) > 0.2, "the hand pulls")
+    served.assert_until(lambda: float(np.linalg.norm(desk.now["user"])) > 0.2, "the hand pulls")
     tab.keyboard.press("h")
-    served.until(lambda: not desk.holds, "it is let go")
+    served.assert_until(lambda: not desk.holds, "it is let go")
 
 
 def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served) -> None:
@@ -115,11 +117,11 @@ def test_a_spacemouse_moves_the_hand_while_it_is_pushed(tab: Any, served: Served
     served.page._cap = CapHand(SpaceMouse(cap, "SpaceNavigator", "test"))
     cap.push(0, 0, -200)  # the cap is lifted
     place = desk.now["p"][2]
-    served.until(lambda: desk.holds and desk.target[2] > place + 0.01, "the hand goes up")
+    served.assert_until(lambda: desk.holds and desk.target[2] > place + 0.01, "the hand goes up")
     cap.push(0, 0, 0)
-    served.until(lambda: not desk.holds, "it is let go")
+    served.assert_until(lambda: not desk.holds, "it is let go")
     cap.plugged = False
-    served.until(lambda: served.page._cap is None, "it is gone")
+    served.assert_until(lambda: served.page._cap is None, "it is gone")
     tab.get_by_text("The SpaceMouse is gone.").wait_for()
 
 
@@ -135,16 +137,16 @@ def test_a_gain_is_moved_until_its_verdict_turns_red(tab: Any, served: Served) -
     assert served.desk.config.mode.seek == 11000.0
     tab.get_by_role("tab", name="Play").click()
     tab.get_by_role("button", name="Undo").first.click()
-    served.until(lambda: served.desk.config.mode.seek < 11000.0, "the gain is back")
+    served.assert_until(lambda: served.desk.config.mode.seek < 11000.0, "the gain is back")
     tab.get_by_role("tab", name="Gains").click()
     tab.locator(".verdict-refuted").first.wait_for(state="detached")
 
 
 def record(tab: Any, served: Served, name: str, seconds: float = 1.5) -> None:
     tab.get_by_role("button", name="Record", exact=True).click()
-    served.until(lambda: bool(served.desk.now["recording"][0] > seconds), "it is recorded")
+    served.assert_until(lambda: bool(served.desk.now["recording"][0] > seconds), "it is recorded")
     tab.get_by_role("button", name="Stop").click()
-    served.until(lambda: name in served.desk.takes(), "it is kept")
+    served.assert_until(lambda: name in served.desk.takes(), "it is kept")
 
 
 def downloaded(tab: Any, button: str, path: Path) -> Path:
@@ -160,14 +162,14 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.03]), False)
     record(tab, served, "take 2")
     served.desk.let_go()
-    served.until(lambda: served.page._takes._list.value == "take 2", "it is chosen")
+    served.assert_until(lambda: served.page._takes._list.value == "take 2", "it is chosen")
     assert load(downloaded(tab, "BVH", tmp_path / "edited.bvh")).clip.duration > 1.0
     with Recording(downloaded(tab, "Recording", tmp_path / "recording.h5")) as recording:
         assert recording.channel("ticks", "t")[-1] > 1.0
     assert '"stretch"' in downloaded(tab, "Configuration", tmp_path / "config.json").read_text()
     tab.get_by_text("Compare and mix").click()
     tab.get_by_label("Show both").click()
-    served.until(lambda: served.page._takes.compares, "both are shown")
+    served.assert_until(lambda: served.page._takes.compares, "both are shown")
     tab.get_by_text("take 1:").first.wait_for()
     tab.wait_for_timeout(500.0)
     kept(tab, "compared")
@@ -183,14 +185,14 @@ def test_takes_are_recorded_downloaded_compared_mixed_and_exported(tab: Any, ser
     tab.get_by_role("button", name="Undo").last.click()
     tab.get_by_text("no regions").wait_for()
     tab.get_by_label("Show both").click()
-    served.until(lambda: not served.page._takes.compares, "the default animation is back")
+    served.assert_until(lambda: not served.page._takes.compares, "the default animation is back")
 
 
 def test_a_mode_is_switched(tab: Any, served: Served) -> None:
     tab.get_by_role("tab", name="Play").click()
     choose(tab, "Mode", "follow")
     tab.get_by_role("button", name="Run this").click()
-    served.until(lambda: served.desk.built.config.mode.kind == "follow", "it runs")
+    served.assert_until(lambda: served.desk.built.config.mode.kind == "follow", "it runs")
     tab.get_by_label("Grab and bend").wait_for(state="detached")
     kept(tab, "follow")
 
@@ -205,7 +207,7 @@ def upload(tab: Any, file: Any) -> None:
 def test_an_upload_that_is_no_motion_is_answered_in_the_page(tab: Any, served: Served) -> None:
     upload(tab, {"name": "broken.bvh", "mimeType": "text/plain", "buffer": b"HIERARCHY\nROOT x\n{ oh }\n"})
     tab.get_by_text("broken.bvh:3: found 'oh'", exact=False).last.wait_for()
-    served.until(lambda: served.desk.preparing is None, "the next one can come")
+    served.assert_until(lambda: served.desk.preparing is None, "the next one can come")
     kept(tab, "refused")
 
 
@@ -222,30 +224,30 @@ def test_a_capture_is_uploaded_prepared_and_driven(tab: Any, served: Served) -> 
     served.desk.pause(True)  # without a graphics card the drawing takes the processor that prepares
     upload(tab, CAPTURE)
     tab.get_by_text("Preparing", exact=False).first.wait_for()
-    served.until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)
+    served.assert_until(lambda: CAPTURE.stem in served.desk.clips, "it is prepared", patience=4.0 * PATIENCE)
     served.desk.pause(False)
     tab.get_by_role("tab", name="Play").click()
     tab.get_by_role("button", name="Run this").click()
-    served.until(lambda: CAPTURE.stem in str(served.desk.built.config.map.clips), "it runs")
+    served.assert_until(lambda: CAPTURE.stem in str(served.desk.built.config.map.clips), "it runs")
     before = float(served.desk.now["t"][0])
-    served.until(lambda: float(served.desk.now["t"][0]) > before + 0.5, "time goes on")
+    served.assert_until(lambda: float(served.desk.now["t"][0]) > before + 0.5, "time goes on")
     served.desk.hold(served.desk.now["p"] + np.array([0.0, 0.0, 0.02]), False)
-    served.until(lambda: float(np.linalg.norm(served.desk.now["user"])) > 0.2, "it is driven")
+    served.assert_until(lambda: float(np.linalg.norm(served.desk.now["user"])) > 0.2, "it is driven")
     kept(tab, "own-motion")
 
 
 def test_a_tab_that_is_closed_ends_nothing_and_a_phone_drives(chromium: Any, tab: Any, served: Served) -> None:
     served.desk.hold(served.desk.now["p"], False)
     tab.close()
-    served.until(lambda: served.page.driver.client is None, "the driver has left")
+    served.assert_until(lambda: served.page.driver.client is None, "the driver has left")
     assert not served.desk.holds
     before = float(served.desk.now["t"][0])
     phone = new_tab(chromium, served.address, width=390, height=780)
-    served.until(lambda: float(served.desk.now["t"][0]) > before, "time went on")
+    served.assert_until(lambda: float(served.desk.now["t"][0]) > before, "time went on")
     phone.wait_for_timeout(2000.0)
     kept(phone, "phone")
     phone.get_by_role("button", name="Reset").click()
-    served.until(lambda: float(served.desk.now["t"][0]) < before, "the other one drives")
+    served.assert_until(lambda: float(served.desk.now["t"][0]) < before, "the other one drives")
     phone.close()
 
 

@@ -56,7 +56,7 @@ def used(served: Served, browser: Any, took_hold: list[bool]) -> Stretch:
             # The ball moves on between the look at it and the press: a drag that misses turns the view.
             with contextlib.suppress(AssertionError), drag(tab, lambda: on_screen(served.desk.now["p"]), way, 3.0):
                 took_hold.append(False)
-                served.until(lambda: served.desk.holds, "the stylus is held", patience=5.0)
+                served.assert_until(lambda: served.desk.holds, "the stylus is held", patience=5.0)
                 took_hold[-1] = True
                 time.sleep(0.5)
         tab.reload()
