@@ -160,7 +160,7 @@ class Page:
 
     def serve(self) -> None:
         """Draw until `close` is called, or the servo's process ends."""
-        written = 0.0
+        written, due = 0.0, 0.0
         while not self._closed.is_set():
             begin = time.perf_counter()
             self.desk.poll()
@@ -171,8 +171,9 @@ class Page:
             if begin - written > POLL:
                 written = begin
                 self._write()
-            took = time.perf_counter() - begin
-            self._closed.wait(max(FASTEST - took, took * (1.0 / SHARE - 1.0), 1e-3))
+            now = time.perf_counter()
+            due = max(due + FASTEST, begin + (now - begin) / SHARE)
+            self._closed.wait(max(due - now, 1e-3))
 
     def close(self) -> None:
         """Serve no more."""
@@ -256,6 +257,7 @@ class Page:
                 ball.rest(desk.target if desk.holds else now["p"])
             stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
+        self.server.flush()  # viser would wait 1/60 s from the end of the last sending, and leave pictures out
 
     def _write(self) -> None:
         desk = self.desk
