@@ -88,9 +88,8 @@ class Page:
         """Show a line to everybody."""
         self._said = [*self._said, line][-LINES:]
         if hasattr(self, "_lines"):
-            self._lines.content = "".join(
-                f'<p style="margin:.15rem .75rem;font-size:.8rem">{html.escape(one)}</p>' for one in self._said
-            )
+            lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._said)
+            self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
         """What a browser's event does: only if it drives, and what is refused is said on the page."""
