@@ -62,7 +62,7 @@ class Page:
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
         self.desk, self.driver = Desk(folder, self.say), Driver()
         self._said: list[str] = []
-        self._closed = threading.Event()
+        self._closed, self._turn = threading.Event(), threading.RLock()
         with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
@@ -92,7 +92,7 @@ class Page:
             self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
-        """What a browser's event does: only if it drives, and what is refused is said on the page."""
+        """What a browser's event does: only if it drives, between two pictures; what is refused is said on the page."""
 
         def done(event: Any) -> None:
             if event.client_id is None:
@@ -105,7 +105,8 @@ class Page:
                     )  # fmt: skip
                 return
             try:
-                does(event)
+                with self._turn:
+                    does(event)
             except (ControllerError, ModelError, SimError, OSError) as error:
                 self.say(str(error))
 
@@ -162,14 +163,15 @@ class Page:
         written, due = 0.0, 0.0
         while not self._closed.is_set():
             begin = time.perf_counter()
-            self.desk.poll()
-            if self.desk.builds != self._builds:
-                self._set_stage()
-            self._push()
-            self._draw()
-            if begin - written > POLL:
-                written = begin
-                self._write()
+            with self._turn:  # events come in threads of their own
+                self.desk.poll()
+                if self.desk.builds != self._builds:
+                    self._set_stage()
+                self._push()
+                self._draw()
+                if begin - written > POLL:
+                    written = begin
+                    self._write()
             now = time.perf_counter()
             due = max(due + FASTEST, begin + (now - begin) / SHARE)
             self._closed.wait(max(due - now, 1e-3))

@@ -1,6 +1,8 @@
 """The animator's loop on the live page, by mouse and keyboard: bend, perform, look back, record and compare takes."""
 
+import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -169,6 +171,20 @@ def test_two_takes_are_laid_over_each_other(tab: Any, served: Served) -> None:
     np.testing.assert_allclose(second[: len(pair[1].force)], pair[1].force)
     tab.get_by_label("Show both").uncheck()
     served.assert_until(lambda: not takes.compares, "the default animation is back")
+
+
+def test_events_come_between_pictures(served: Served) -> None:
+    page, takes = served.page, served.page._takes
+    event = SimpleNamespace(client_id=page.driver.client, client=None)
+
+    def flip(_: Any) -> None:
+        takes._compare.value = not takes._compare.value
+        takes._on_compare()
+
+    for _ in range(40):
+        page.acts(flip)(event)
+        time.sleep(0.01)
+    served.assert_until(lambda: not takes.compares, "the page is there, and shows the default animation")
 
 
 def test_the_timeline_is_scrubbed_to_what_was_recorded_and_back_to_now(tab: Any, served: Served) -> None:
