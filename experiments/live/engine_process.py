@@ -2,7 +2,6 @@
 
 import os
 import queue
-import signal
 import time
 from collections.abc import Callable, Sequence
 from multiprocessing import get_context
@@ -38,6 +37,7 @@ from experiments.live.messages import (
     Undo,
 )
 from experiments.live.takes import Take
+from experiments.live.workers import start_undisturbed
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
@@ -67,7 +67,7 @@ class EngineProcess:
         self._told: Any = context.Queue()
         # Not a daemon: it starts compilers.
         self._process = context.Process(target=_main, args=(shown, held, self._orders, self._told), name="hvf-servo")
-        self._process.start()
+        start_undisturbed(self._process)
 
     def ask(self, order: object) -> None:
         """Have something done."""
@@ -98,7 +98,6 @@ class EngineProcess:
 
 
 def _main(shown: Any, held: Any, orders: Any, told: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked for it is told to quit by the page
     _Runner(Board(shown, SHOWN), Board(held, HELD), orders, told).run()
 
 

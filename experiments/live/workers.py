@@ -14,6 +14,15 @@ from models.errors import ModelError
 _LISTENS = 0.5  # [s] between two looks whether the page is still there
 
 
+def start_undisturbed(process: Any) -> None:
+    """Start a process that Ctrl-C does not end, not even while it begins: the page tells it when to end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class Worker:
     """A process that is asked and tells; of what it is asked, only the newest counts.
 
@@ -28,7 +37,7 @@ class Worker:
         self._asked: Any = context.Queue()
         self._told: Any = context.Queue()
         self._process = context.Process(target=_main, args=(does, self._asked, self._told), daemon=True)
-        self._process.start()
+        start_undisturbed(self._process)
 
     def ask(self, what: object) -> None:
         """Have it done."""
@@ -56,7 +65,6 @@ class Worker:
 
 
 def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(2)  # the servo goes before
     does(asked, told)
 
