@@ -34,7 +34,7 @@ from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_ch
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
-from experiments.setups.rivers import default_choice
+from experiments.setups.rivers import default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
@@ -139,7 +139,7 @@ def _river_clips_parts(
     if not isinstance(mode, Rivers) or mode.crossing == "sum":
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
-    curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
+    curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
     parts = _about_circle(place, made, clips)
     return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
