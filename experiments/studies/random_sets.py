@@ -142,21 +142,27 @@ def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of the table, a map each."""
+    """Lines of the table, a map each: how many sets stand, with Wilson's interval (1927), and keep the other bounds."""
+    from statsmodels.stats.proportion import proportion_confint
+
     lines = [
-        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm "
-        "| skate cm (95 % of stances; worst) | joints beyond ° |",
+        "| map | sets, of which told off their pace before | stand (95 % interval) | residual of those %: median, "
+        "90 %; within 12 | lowest sole cm; above -1 | skate cm: median, most; within 2 | joints beyond °; within |",
         "|---|---|---|---|---|---|---|",
     ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
         stood = [row for row in of if row["fell"] is None]
+        low, high = proportion_confint(len(stood), len(of), method="wilson")
         residual = 100 * np.array([row["residual"] for row in stood] or [np.nan])
+        lowest, skate, beyond = (np.array([row[key] for row in of]) for key in ("lowest", "skate", "beyond"))
         lines.append(
-            f"| {kind} | {len(of)} | {len(stood)} | {np.sqrt(np.mean(residual**2)):.1f}, {np.median(residual):.1f}, "
-            f"{np.quantile(residual, 0.9):.1f} | {min(row['lowest'] for row in of):.1f} | "
-            f"{np.median([row['skate'] for row in of]):.1f}; {max(row['slid'] for row in of):.1f} | "
-            f"{max(row['beyond'] for row in of):.1f} |"
+            f"| {kind} | {len(of)}, {sum(bool(row['off_pace']) for row in of)} "
+            f"| {len(stood)}, {low:.0%} to {high:.0%} "
+            f"| {np.median(residual):.1f}, {np.quantile(residual, 0.9):.1f}; {np.sum(residual <= 12.0)} "
+            f"| {lowest.min():.1f}; {np.sum(lowest > -1.0)} "
+            f"| {np.median(skate):.1f}, {skate.max():.1f}; {np.sum(skate <= 2.0)} "
+            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} |"
         )
     return lines
 
