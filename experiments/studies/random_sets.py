@@ -20,11 +20,11 @@ from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import in_step, natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
+from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.setups.alike import motion_of
 from experiments.setups.blendable import not_blendable, off_pace
 from experiments.setups.wiring import wire
-from experiments.studies.prepared_captures import followed
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError
 from models.humanoid.skeleton import joint_range
@@ -78,7 +78,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
         clip = _named(prepared_clip(Path(folder) / name).clip, name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
-    residual, fell, _ = followed(clip)
+    residual, fell, *_ = followed(clip)
     reason = "; ".join(not_blendable((clip, _other(clip))))
     if not reason and (fell is not None or residual > MOST_ALONE):
         reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
