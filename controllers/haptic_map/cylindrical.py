@@ -136,7 +136,8 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
         self.upper = tuple(upper)
         legs = float(len(self.upper) > 0)
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap)
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap,
+                         len(self.upper) > 0)  # fmt: skip
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])

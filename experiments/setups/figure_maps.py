@@ -27,7 +27,7 @@ from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
 from experiments.setups.balance import balanced
-from experiments.setups.blendable import not_blendable, off_pace
+from experiments.setups.blendable import keeps_pace, not_blendable, off_pace, same
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -79,7 +79,8 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     made = _cylinder(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> CylindricalMap:
-        return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
+        alike = same(clips) or (keeps_pace(clips, made.loops, lap) and moves_alike(made, lap))
+        return balanced(made, figure, lap) if alike else only_arms(made)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 

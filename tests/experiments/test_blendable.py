@@ -1,14 +1,16 @@
 """What cannot be blended, or is off its pace, is said before a run, on every map."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
+from controllers.motion.loops import checked_clip, closed_loop
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.setups.blendable import not_blendable
+from experiments.setups.blendable import keeps_pace, not_blendable
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
@@ -21,6 +23,16 @@ def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
     assert len(said) == 2
     assert said[0].startswith("backflip turns over")
     assert said[1].startswith("jump flies for 0.")
+
+
+def test_a_mean_of_clips_wants_them_near_their_own_pace_and_nearer_where_one_flies() -> None:
+    walk, angry, run = embedded("walk"), embedded("angry"), embedded("run")
+    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in (walk, angry, run)]
+    slower = replace(loops[1], duration=0.8 * loops[0].duration)
+    assert keeps_pace((walk, angry), (loops[0], slower), loops[0].duration)
+    assert not keeps_pace((run, angry), (loops[2], slower), loops[2].duration)
+    slowest = replace(loops[1], duration=0.7 * loops[0].duration)
+    assert not keeps_pace((walk, angry), (loops[0], slowest), loops[0].duration)
 
 
 @pytest.mark.parametrize(("kind", "mode"), [("composite", "follow"), ("rivers", "rivers")])
