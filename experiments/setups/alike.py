@@ -117,6 +117,6 @@ def arms(legs: Sequence[Limb]) -> list[int]:
     return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK}]
 
 
-def only_arms(made: Cylindrical) -> Cylindrical:
-    """The same map in which only arms and head are blended: legs, root and trunk are those of the first clip."""
-    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs))
+def only_arms(made: Cylindrical, legs_of: int) -> Cylindrical:
+    """The same map in which only arms and head are blended: legs, root and trunk are those of one clip."""
+    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs), legs_of)

@@ -50,12 +50,25 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def grounded(clips: Sequence[Clip]) -> int:
+    """The first clip that stays on the floor, counted from 0: its legs carry the arms of others.
+
+    Arms move the centre of mass, so flights of a clip are ballistic with its own arms alone. Where all fly, the first.
+    """
+    return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
+
+
 def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
     """Whether a lap [s] plays all clips near enough to their own pace for a mean of them; closer where one flies."""
     paces = [loop.duration / lap for loop in loops]
     flies = any(longest_flight(clip) > 0.0 for clip in clips)
     slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if flies else (SLOWEST, FASTEST)
     return all(slowest <= pace <= fastest for pace in paces)
+
+
+def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
+    """Loops with one of them first."""
+    return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
@@ -65,5 +78,5 @@ def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[
     if not off:
         return ()
     closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    best = natural_lap(closed)
+    best = natural_lap(led_by(grounded(clips), closed))
     return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; --lap {best:.1f} suits them best",)

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import in_step, natural_lap
+from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.setups.alike import motion_of
-from experiments.setups.blendable import not_blendable, off_pace
+from experiments.setups.blendable import grounded, led_by, not_blendable, off_pace
 from experiments.setups.wiring import wire
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError
@@ -98,12 +98,12 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure."""
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    lap = natural_lap(loops)
-    pace = [loop.duration / lap for loop in in_step(loops, lap)]
+    lap = natural_lap(led_by(grounded(clips), loops))
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
     config = run_config(mode=mode, map=kind, user=user, clips=names, lap=lap, seconds=SECONDS, seed=seed)
     session = wire(config, tuple(clips))
+    played = getattr(session.haptic_map, "loops", loops)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
     frames, weight = log.frames, session.weight
@@ -113,8 +113,9 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     force = np.linalg.norm(frames["residual"][:, :3], axis=1)[stands] / weight
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
-        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "pace": [round(p, 2) for p in pace],
-        "remarks": session.remarks, "off_pace": off_pace(clips, in_step(loops, lap), lap), "fell": fell,
+        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap,
+        "pace": [round(one.duration / lap, 2) for one in played],
+        "remarks": session.remarks, "off_pace": off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
