@@ -50,8 +50,8 @@ NAMES = (
 _DELAY, _OFFSET, _WEIGHT = 9, 10, 12
 
 WINDOW = 0.2
-"""Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below the encoders' noise. With 0.12 s the noise of
-the rates, which are regressors, moves frictions by two standard errors towards each other."""
+"""Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below the encoders' noise. With 0.12 s the
+noise of the rates, which are regressors, moves frictions by two standard errors towards each other."""
 _HOP = 0.25  # of a window, from one to the next
 _SMOOTH = 4  # readings on either side, over which the rate is taken that tells friction's direction
 _SLOWEST = 0.1  # [rad/s] below which that direction is not sure

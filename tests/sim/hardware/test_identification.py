@@ -85,8 +85,9 @@ def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_interv
     # An interval of one parameter alone is two thirds as wide: 1.96 standard errors in place of 2.91.
     alone = np.mean(shares <= ndtri(0.975) / ndtri(1.0 - 0.025 / len(NAMES)))
     print(
-        f"{within} of {len(draws)} devices within all intervals; {100 * alone:.1f} % of the numbers within 95 % intervals of "
-        f"their own; mean error {shares.mean():.2f} of an interval's half, largest of a device {np.sort(shares.max(axis=1))}"
+        f"{within} of {len(draws)} devices within all intervals; {100 * alone:.1f} % of the numbers within 95 % "
+        f"intervals of their own; mean error {shares.mean():.2f} of an interval's half, largest of each device "
+        f"{np.round(np.sort(shares.max(axis=1)), 2)}"
     )
     assert within >= 0.9 * len(draws)
     assert len(draws) < 20 or 0.9 <= alone <= 0.98
