@@ -6,12 +6,16 @@ arguments lie as compiled code holds them in memory that is kept, and the functi
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import numba
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from sim.compilation.compiled import entry_point
+
+_ADDRESS, _NUMBER = types.uintp, types.int64
 
 
 class KeptCall:
@@ -26,8 +30,8 @@ class KeptCall:
     """
 
     def __init__(self, function: Callable[..., None], before: tuple[Any, ...], after: tuple[Any, ...] = ()):
-        kept, call, self._release = _compiled(function, numba.typeof(before), numba.typeof(after))
-        self._address, self._call = kept((before, after)), call
+        self._call, self._release = _compiled(function, numba.typeof(before), numba.typeof(after))
+        self._address = keep_arguments((before, after))
 
     def __call__(self, number: int) -> None:
         """Call the function."""
@@ -38,59 +42,64 @@ class KeptCall:
             self._release(self._address)
 
 
+def _place(context: Any, builder: Any, kind: Any, address: Any) -> Any:
+    return builder.inttoptr(address, context.get_value_type(kind).as_pointer())
+
+
+@intrinsic
+def _keep(_: Any, kind: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        size = context.get_abi_sizeof(context.get_value_type(kind))
+        memory = context.nrt.allocate(builder, context.get_constant(types.uintp, size))
+        context.nrt.incref(builder, kind, given[0])
+        address = builder.ptrtoint(memory, context.get_value_type(_ADDRESS))
+        builder.store(given[0], _place(context, builder, kind, address))
+        return address
+
+    return _ADDRESS(kind), generate
+
+
+@entry_point
+def keep_arguments(arguments: Any) -> int:
+    """Address of a copy of arguments as compiled code holds them, which keeps alive what they refer to."""
+    return _keep(arguments)
+
+
 @cache
-def _compiled(function: Any, before: types.Tuple, after: types.Tuple) -> tuple[Any, Any, Any]:
-    """What keeps the arguments and tells their address, what calls the function with them, and what lets them go."""
-    together, number, address = types.Tuple((before, after)), types.int64, types.uintp
-    parts = (*before.types, number, *after.types)
+def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
+    """What calls a function with kept arguments, by their address and a number, and what lets them go."""
+    together, parts = types.Tuple((before, after)), (*before.types, _NUMBER, *after.types)
     function.compile(parts)
     found = function.overloads[parts]
     code = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
 
-    def place(context: Any, builder: Any, at: Any) -> Any:
-        return builder.inttoptr(at, context.get_value_type(together).as_pointer())
-
     @intrinsic
-    def keep(_: Any, values: Any) -> Any:
+    def call(_: Any, address: Any, number: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            size = context.get_abi_sizeof(context.get_value_type(together))
-            memory = context.nrt.allocate(builder, context.get_constant(types.uintp, size))
-            context.nrt.incref(builder, together, given[0])
-            at = builder.ptrtoint(memory, context.get_value_type(address))
-            builder.store(given[0], place(context, builder, at))
-            return at
-
-        return address(together), generate
-
-    @intrinsic
-    def call(_: Any, at: Any, value: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            kept = builder.load(place(context, builder, given[0]))
+            kept = builder.load(_place(context, builder, together, given[0]))
             first, last = (
                 cgutils.unpack_tuple(builder, builder.extract_value(kept, i), len(kinds.types))
                 for i, kinds in enumerate((before, after))
             )
             shape = context.call_conv.get_function_type(types.none, parts)
             where = builder.inttoptr(context.get_constant(types.uintp, code), shape.as_pointer())
-            status, _ = context.call_conv.call_function(builder, where, types.none, parts, [*first, given[1], *last])
+            arguments = [*first, given[1], *last]
+            status, _ = context.call_conv.call_function(builder, where, types.none, parts, arguments)
             with cgutils.if_unlikely(builder, status.is_error):
                 context.call_conv.return_status_propagate(builder, status)
             return context.get_dummy_value()
 
-        return types.none(address, number), generate
+        return types.none(_ADDRESS, _NUMBER), generate
 
     @intrinsic
-    def release(_: Any, at: Any) -> Any:
+    def release(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            where = place(context, builder, given[0])
+            where = _place(context, builder, together, given[0])
             context.nrt.decref(builder, together, builder.load(where))
             context.nrt.free(builder, builder.bitcast(where, cgutils.voidptr_t))
             return context.get_dummy_value()
 
-        return types.none(address), generate
+        return types.none(_ADDRESS), generate
 
-    return (
-        cast(Any, njit((together,))(lambda values: keep(values))),
-        cast(Any, njit((address, number), nogil=True)(lambda at, value: call(at, value))),
-        cast(Any, njit((address,))(lambda at: release(at))),
-    )  # fmt: skip
+    calling = njit((_ADDRESS, _NUMBER), nogil=True)(lambda address, number: call(address, number))
+    return calling, njit((_ADDRESS,))(lambda address: release(address))

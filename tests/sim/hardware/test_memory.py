@@ -87,7 +87,7 @@ def test_ten_thousand_ticks_leave_no_block_of_memory_behind(turns) -> None:
     assert state is State.ACTIVE
     assert abs(after - before) < 100  # not one in a hundred ticks
     assert made == freed
-    assert made <= 4 * TICKS  # work arrays of the field: a stack of forces, and three of the search for the closest point
+    assert made <= 4 * TICKS  # work arrays: a stack of forces, and three to search for the closest point
     assert more < 100
 
 
