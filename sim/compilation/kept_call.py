@@ -46,8 +46,7 @@ def _place(context: Any, builder: Any, kind: Any, address: Any) -> Any:
     return builder.inttoptr(address, context.get_value_type(kind).as_pointer())
 
 
-@intrinsic
-def _keep(_: Any, kind: Any) -> Any:
+def _keeping(_: Any, kind: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         size = context.get_abi_sizeof(context.get_value_type(kind))
         memory = context.nrt.allocate(builder, context.get_constant(types.uintp, size))
@@ -57,6 +56,9 @@ def _keep(_: Any, kind: Any) -> Any:
         return address
 
     return _ADDRESS(kind), generate
+
+
+_keep: Any = intrinsic(_keeping)
 
 
 @entry_point
@@ -73,8 +75,7 @@ def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
     found = function.overloads[parts]
     code = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
 
-    @intrinsic
-    def call(_: Any, address: Any, number: Any) -> Any:
+    def calling(_: Any, address: Any, number: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             kept = builder.load(_place(context, builder, together, given[0]))
             first, last = (
@@ -91,8 +92,7 @@ def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
 
         return types.none(_ADDRESS, _NUMBER), generate
 
-    @intrinsic
-    def release(_: Any, address: Any) -> Any:
+    def releasing(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             where = _place(context, builder, together, given[0])
             context.nrt.decref(builder, together, builder.load(where))
@@ -101,5 +101,13 @@ def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
 
         return types.none(_ADDRESS), generate
 
-    calling = njit((_ADDRESS, _NUMBER), nogil=True)(lambda address, number: call(address, number))
-    return calling, njit((_ADDRESS,))(lambda address: release(address))
+    call: Any = intrinsic(calling)
+    release: Any = intrinsic(releasing)
+
+    def call_at(address: int, number: int) -> None:
+        call(address, number)
+
+    def release_at(address: int) -> None:
+        release(address)
+
+    return njit((_ADDRESS, _NUMBER), nogil=True)(call_at), njit((_ADDRESS,))(release_at)
