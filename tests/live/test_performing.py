@@ -181,7 +181,7 @@ def test_events_come_between_pictures(served: Served) -> None:
         takes._compare.value = not takes._compare.value
         takes._on_compare()
 
-    for _ in range(40):
+    for _ in range(16):
         page.acts(flip)(event)
         time.sleep(0.01)
     served.assert_until(lambda: not takes.compares, "the page is there, and shows the default animation")
