@@ -134,9 +134,9 @@ def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_
     """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
     linkage, heavier = drawn(np.random.default_rng(5000))
     s = np.linspace(0.0, 2.0 * np.pi, 97)
-    points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.02 * np.sin(2.0 * s)], axis=1)
+    points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.03 * np.sin(2.0 * s)], axis=1)
     points[-1] = points[0]
-    saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (4.0, 2.5)]
+    saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (8.0, 5.0)]
     with pytest.raises(SimError, match="the end of what is looked for"):
         identify_linkage([moved(linkage, heavier, saddle) for saddle in saddles])
 
