@@ -66,15 +66,27 @@ def truth(linkage: Linkage, heavier: float) -> np.ndarray:
     return np.array([*known, second, third])
 
 
+def recorded(seed: int) -> tuple[list[Motion], np.ndarray]:
+    """Motions of a device, and what is true of it."""
+    linkage, heavier = drawn(np.random.default_rng(seed))
+    return [moved(linkage, heavier, curve(lap)) for lap in LAPS], truth(linkage, heavier)
+
+
 def identified(seed: int) -> tuple[Identified, np.ndarray]:
     """What is found of a device, and what is true of it."""
-    linkage, heavier = drawn(np.random.default_rng(seed))
-    return identify_linkage([moved(linkage, heavier, curve(lap)) for lap in LAPS]), truth(linkage, heavier)
+    motions, hidden = recorded(seed)
+    return identify_linkage(motions), hidden
 
 
 @pytest.fixture(scope="module")
-def found() -> tuple[Identified, np.ndarray]:
-    return identified(7)
+def record() -> tuple[list[Motion], np.ndarray]:
+    return recorded(7)
+
+
+@pytest.fixture(scope="module")
+def found(record) -> tuple[Identified, np.ndarray]:
+    motions, hidden = record
+    return identify_linkage(motions), hidden
 
 
 @pytest.mark.slow
@@ -97,11 +109,24 @@ def test_hidden_friction_inertia_delay_offset_and_weight_are_within_their_interv
 def test_the_intervals_are_narrow_enough_to_be_of_use(found) -> None:
     result, hidden = found
     margins = dict(zip(NAMES, result.margins, strict=True))
-    assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.005
-    assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.2 * PREMIUM_1_5.viscous_friction[0]
-    assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.005
-    assert margins["delay"] < 2e-4
-    assert result.unexplained < 0.005
+    assert max(margins[f"coulomb{i}"] / hidden[i - 1] for i in (1, 2, 3)) < 0.001
+    assert max(margins[f"viscous{i}"] for i in (1, 2, 3)) < 0.04 * PREMIUM_1_5.viscous_friction[0]
+    assert max(margins[f"inertia{i}"] / INERTIA[i - 1] for i in (1, 2, 3)) < 0.001
+    assert margins["delay"] < 5e-5
+    assert result.unexplained < 0.001
+
+
+@pytest.mark.slow
+def test_a_torque_that_is_not_in_the_equations_widens_the_intervals_and_is_covered_by_them(record, found) -> None:
+    """A ripple of one percent of the friction, the same again in every lap, which no average takes out."""
+    motions, hidden = record
+    rippled = [
+        m._replace(torque=m.torque + 0.01 * hidden[:3] * np.sin(12.0 * m.theta + [0.3, 1.0, 2.0])) for m in motions
+    ]
+    result = identify_linkage(rippled)
+    errors = np.abs(result.values - hidden)
+    assert np.any(errors > found[0].margins)
+    assert np.all(errors < result.margins)
 
 
 @pytest.mark.slow
@@ -109,9 +134,9 @@ def test_a_motion_that_does_not_tell_the_delay_is_refused_and_no_number_is_made_
     """Two slow laps round a saddle: the fit runs to the end of the delays that are in its equations."""
     linkage, heavier = drawn(np.random.default_rng(5000))
     s = np.linspace(0.0, 2.0 * np.pi, 97)
-    points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.02 * np.sin(2.0 * s)], axis=1)
+    points = np.stack([0.0477 * np.cos(s), 0.0477 * np.sin(s), 0.03 * np.sin(2.0 * s)], axis=1)
     points[-1] = points[0]
-    saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (4.0, 2.5)]
+    saddles = [Trajectory(np.linspace(0.0, lap, 97), points, periodic=True) for lap in (8.0, 5.0)]
     with pytest.raises(SimError, match="the end of what is looked for"):
         identify_linkage([moved(linkage, heavier, saddle) for saddle in saddles])
 
