@@ -134,7 +134,7 @@ class Person:
     name: str = "median"
     age: float = 30.0
     hand: Literal["right", "left"] = "right"
-    skill: float = 0.7
+    skill: float = 0.85
     grip: float = 2.0
     mass: float = 0.6
     stiffness: float = 250.0
@@ -151,13 +151,13 @@ class Person:
     felt_noise: float = 0.006
     seen_noise: float = 0.0004
     refractory: float = 0.15
-    horizon: float = 0.3
-    motor_noise: float = 0.011
+    horizon: float = 0.42
+    motor_noise: float = 0.008
     force_noise: float = 0.03
     tremor: float = 0.06
     tremor_frequency: float = 9.0
     correction: float = 0.8
-    caution: float = 2.0
+    caution: float = 2.5
     entrainment: float = 1.0
     learning: float = 0.0
 

@@ -14,9 +14,9 @@ from sim.users.wishes import targets
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
 TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes to see where it ends
 AFTER = 0.1  # [s] after a click in which a movement may still come to rest
-MOVES = 14  # from side to side; the first two are practice
+MOVES = 10  # from side to side; the first two are practice
 _PRACTICE = 2
-_SECONDS = (11.0, 22.0)  # in which nearly everybody has made all moves, and in which the slowest have
+_SECONDS = (8.0, 18.0)  # in which nearly everybody has made all moves, and in which the slowest have
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
@@ -54,9 +54,9 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
         spread = list[float]()
         for i, person in enumerate(people):
             width = 2.0 * amplitude * person.caution * person.motor_noise / seconds
-            spread.append(float(np.std(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
+            spread.append(float(np.var(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
         speeds.append(amplitude / seconds)
-        spreads.append(float(np.mean(spread)))
+        spreads.append(float(np.sqrt(np.mean(spread))))
     x, y = np.array(speeds), np.array(spreads)
     slope, intercept = np.polyfit(x, y, 1)
     source = "Schmidt et al. 1979, Wright & Meyer 1983: some 4 to 12 ms (m)"

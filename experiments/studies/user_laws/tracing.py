@@ -12,30 +12,34 @@ from sim.users.pace import natural_times
 from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
-LAPS = 7  # of which the first is practice
+LAPS = 7  # of an ellipse, of which the first is practice
+STEERED, AT_LEAST = 9.0, 6  # [s] at each pace, and laps, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
 LAP_TIMES = (1.0, 1.4, 2.0, 2.8, 4.0)  # [s]
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
-_EFFECTIVE = 4.133  # standard deviations of an effective width: 96 % of a normal distribution
+_PASSING = 1.645  # standard deviations above the mean that 95 % of a normal distribution lie below
 _SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
-    """Time of a lap over the length of a circular tunnel by its effective width (Accot & Zhai 1997).
+    """Time of a lap over the length of a circular tunnel by its width (Accot & Zhai 1997).
 
-    The effective width is what holds 96 % of a lap, 4.133 standard deviations from the tunnel's middle (Kulikov,
-    MacKenzie & Stuerzlinger 2005).
+    The published slopes are of tunnels that are passed without a touch (Kulikov, MacKenzie & Stuerzlinger 2005 say so).
+    Here the pace is given, and the tunnel is as wide as 95 % of her laps need: twice the mean of the farthest that each
+    lap goes from the middle, and 1.645 standard deviations of that.
     """
     difficulty = list[float]()
     for lap in LAP_TIMES:
-        angle = 2.0 * np.pi * np.arange(0.0, (LAPS + 1) * lap, _SAMPLING) / lap
+        laps = max(AT_LEAST, round(STEERED / lap))
+        angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * lap, _SAMPLING) / lap
         points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
         widths = list[float]()
         for i, person in enumerate(people):
-            trace = trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0])
-            beside = np.hypot(*trace.p[round(lap / PERIOD) :, :2].T) - RADIUS
-            widths.append(_EFFECTIVE * float(np.sqrt(np.mean(beside**2))))
+            trace = trial(person, _wishes(points, lap), laps * lap, seed + i, points[0])
+            beside = np.abs(np.hypot(*trace.p[round(lap / PERIOD) :, :2].T) - RADIUS)
+            farthest = beside.reshape(laps - 1, -1).max(axis=1)
+            widths.append(2.0 * float(np.mean(farthest) + _PASSING * np.std(farthest, ddof=1)))
         difficulty.append(2.0 * np.pi * RADIUS / float(np.mean(widths)))
     x, y = np.array(difficulty), np.array(LAP_TIMES)
     slope, intercept = np.polyfit(x, y, 1)
