@@ -152,7 +152,7 @@ class Person:
     seen_noise: float = 0.0004
     refractory: float = 0.15
     horizon: float = 0.42
-    motor_noise: float = 0.008
+    motor_noise: float = 0.0078
     force_noise: float = 0.03
     tremor: float = 0.06
     tremor_frequency: float = 9.0

@@ -64,7 +64,7 @@ _MOST = 1_000_000  # people of one population
 def population(number: int, seed: int) -> tuple[Person, ...]:
     """People drawn by lot; the first ones of a larger population of the same seed are the same.
 
-    Age is uniform between 20 and 75, skill a Beta(8.5, 1.5), one in ten is left-handed, all other numbers are log-normal
+    Age is uniform between 20 and 75, skill a Beta(8.5, 1.5), one in ten left-handed, all other numbers are log-normal
     about the median person's, cut off at their intervals. Scatter of endpoints and horizon grow as skill falls, delays
     as age rises.
 

@@ -6,17 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from controllers.state import Array
-from experiments.studies.user_laws.bare_device import Trace, trial
+from experiments.studies.user_laws.bare_device import AFTER, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
 TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes to see where it ends
-AFTER = 0.1  # [s] after a click in which a movement may still come to rest
 MOVES = 10  # from side to side; the first two are practice
 _PRACTICE = 2
-_SECONDS = (8.0, 18.0)  # in which nearly everybody has made all moves, and in which the slowest have
+_SECONDS = 20.0  # in which the slowest have made all moves
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
@@ -94,7 +93,4 @@ def _conditions() -> list[tuple[float, float]]:
 def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((MOVES + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    trace = trial(person, targets(points, width), _SECONDS[0], seed, points[0])
-    if len(trace.clicks) <= MOVES:  # the longer run begins with the shorter one
-        trace = trial(person, targets(points, width), _SECONDS[1], seed, points[0])
-    return trace._replace(clicks=trace.clicks[: MOVES + 1])
+    return trial(person, targets(points, width), _SECONDS, seed, points[0], clicks=MOVES + 1)
