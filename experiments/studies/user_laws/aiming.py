@@ -64,7 +64,7 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
         (
             Law("Speed–accuracy: slope of σ over A/T", 1e3 * slope, 3.0, 12.0, "ms", source, built_in=True),
             Law("Speed–accuracy: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.8, 1.0, "",
-                "Schmidt et al. 1979: linear, r above 0.9 (m)", built_in=True),
+                "Meyer et al. 1988: linear (a); r above 0.9 (m)", built_in=True),
         ),
         x, y, ("A/T [m/s]", "standard deviation of the end [m]"), (float(slope), float(intercept)),
     )  # fmt: skip

@@ -47,7 +47,7 @@ def steering(people: Sequence[Person], seed: int) -> Study:
         "steering", "Steering law: time of a lap over length by width",
         (
             Law("Steering: slope", 1e3 * slope, 50.0, 200.0, "ms",
-                "Accot & Zhai 1997, 1999: 78 straight, some 150 circular (m)"),
+                "Accot & Zhai 1997: 78 straight, some 150 circular (m)"),
             Law("Steering: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "",
                 "Accot & Zhai 1999: r above 0.98 with five devices"),
         ),
@@ -73,7 +73,7 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
         speeds.append(speed[::40])
     x, y = np.concatenate(curvatures), np.concatenate(speeds)
     line = np.polyfit(np.log(x), np.log(y), 1)
-    source = "Lacquaniti et al. 1983, Viviani & Schneider 1991: 0.33, adults' ellipses 0.28 to 0.38 (m)"
+    source = "Lacquaniti et al. 1983: 1/3; adults' ellipses 0.28 to 0.38 (m)"
     return Study(
         "power-law", "Two-thirds power law: speed over curvature",
         (Law("Power law: exponent β", float(np.mean(exponents)), 0.28, 0.38, "", source),),
