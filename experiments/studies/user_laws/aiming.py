@@ -93,4 +93,5 @@ def _conditions() -> list[tuple[float, float]]:
 def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((MOVES + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    return trial(person, targets(points, width), _SECONDS, seed, points[0], clicks=MOVES + 1)
+    trace = trial(person, targets(points, width), _SECONDS, seed, points[0], clicks=MOVES + 1)
+    return trace._replace(clicks=trace.clicks[: MOVES + 1])
