@@ -13,7 +13,7 @@ from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
 LAPS = 7  # of an ellipse, of which the first is practice
-STEERED, AT_LEAST = 9.0, 6  # [s] at each pace, and laps, of which the first is practice
+STEERED, AT_LEAST = 9.0, 8  # [s] at each pace, and laps, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
 LAP_TIMES = (1.0, 1.4, 2.0, 2.8, 4.0)  # [s]
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
@@ -27,20 +27,20 @@ def steering(people: Sequence[Person], seed: int) -> Study:
 
     The published slopes are of tunnels that are passed without a touch (Kulikov, MacKenzie & Stuerzlinger 2005 say so).
     Here the pace is given, and the tunnel is as wide as 95 % of her laps need: twice the mean of the farthest that each
-    lap goes from the middle, and 1.645 standard deviations of that.
+    lap goes from the middle, and 1.645 standard deviations of that within people.
     """
     difficulty = list[float]()
     for lap in LAP_TIMES:
         laps = max(AT_LEAST, round(STEERED / lap))
         angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * lap, _SAMPLING) / lap
         points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-        widths = list[float]()
+        farthest = list[Array]()
         for i, person in enumerate(people):
             trace = trial(person, _wishes(points, lap), laps * lap, seed + i, points[0])
             beside = np.abs(np.hypot(*trace.p[round(lap / PERIOD) :, :2].T) - RADIUS)
-            farthest = beside.reshape(laps - 1, -1).max(axis=1)
-            widths.append(2.0 * float(np.mean(farthest) + _PASSING * np.std(farthest, ddof=1)))
-        difficulty.append(2.0 * np.pi * RADIUS / float(np.mean(widths)))
+            farthest.append(beside.reshape(laps - 1, -1).max(axis=1))
+        spread = np.sqrt(np.mean(np.var(farthest, axis=1, ddof=1)))
+        difficulty.append(2.0 * np.pi * RADIUS / float(2.0 * (np.mean(farthest) + _PASSING * spread)))
     x, y = np.array(difficulty), np.array(LAP_TIMES)
     slope, intercept = np.polyfit(x, y, 1)
     return Study(
