@@ -116,6 +116,8 @@ class AnimationMap(ClipMap):
         Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
     lap : float, optional
         Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+    apart : bool
+        Whether legs are one clip's, so that strides of the clips need not be in step.
 
     Raises
     ------
@@ -132,12 +134,13 @@ class AnimationMap(ClipMap):
         second_group: Sequence[int],
         limbs: Sequence[Limb],
         lap: float | None = None,
+        apart: bool = False,
     ) -> None:
         poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
-        self.loops: list[Loop] = in_step(loops, lap)
+        self.loops: list[Loop] = in_step(loops, lap, apart)
         self.lap = lap
         limbs = [limb.allowing(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)

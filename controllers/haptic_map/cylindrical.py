@@ -21,6 +21,7 @@ from controllers.state import Array
 
 CYLINDRICAL = 1
 _CLIPS = 4
+_ORDINALS = ("first", "second", "third", "fourth")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _TABLE_SIZE, _TABLE = range(7)
 _NODES = 13  # of the corrections' table, across the blend each way
 _BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
@@ -35,9 +36,10 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     radius, angle = cylinder(x, chain)
     a, a_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     b, b_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX])
-    last = int(params[_OWN_LEGS])
+    owner = int(params[_OWN_LEGS]) - 1
+    last = 1 if owner >= 0 else 0
     weights, changes = np.zeros((1 + last, _CLIPS)), np.zeros((1 + last, 3, _CLIPS))
-    weights[0, 0] = 1.0
+    weights[0, max(owner, 0)] = 1.0
     for i in range(_CLIPS):
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
@@ -79,7 +81,7 @@ class Cylindrical(AnimationMap):
     they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
 
     Clips that step differently have no mean that steps: a foot that one of them plants, another one lifts. With `upper`
-    joints only these are blended; root and legs are those of the first clip everywhere, and so are its feet.
+    joints only these are blended; root and legs are those of one clip everywhere, and so are its feet.
 
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
     the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
@@ -102,6 +104,8 @@ class Cylindrical(AnimationMap):
         Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
     upper : sequence of int
         Joints that alone are blended, counted from 1; by default all.
+    legs_of : int
+        With `upper`, the clip whose legs and root they are, counted from 0.
 
     Attributes
     ----------
@@ -127,6 +131,7 @@ class Cylindrical(AnimationMap):
         corrections: Array | None = None,
         lap: float | None = None,
         upper: Sequence[int] = (),
+        legs_of: int = 0,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -134,9 +139,12 @@ class Cylindrical(AnimationMap):
             )
         self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
-        self.upper = tuple(upper)
-        legs = float(len(self.upper) > 0)
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap)
+        if not 0 <= legs_of < _CLIPS:
+            raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
+        self.upper, self.legs_of = tuple(upper), legs_of
+        legs = 1.0 + legs_of if self.upper else 0.0
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap,
+                         len(self.upper) > 0)  # fmt: skip
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
@@ -165,7 +173,8 @@ class Cylindrical(AnimationMap):
         """Whether only some joints are blended."""
         if not self.upper:
             return ()
-        return ("the clips move differently: a mean of them is no motion, so legs and trunk are the first clip's",)
+        owner = _ORDINALS[self.legs_of]
+        return (f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's",)
 
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
@@ -196,6 +205,7 @@ class Cylindrical(AnimationMap):
         arrays = {"domain": np.array([self.r_range, self.z_range])}
         if self.upper:
             arrays["upper_joints"] = np.array(self.upper, dtype=np.float64)
+            arrays["legs_of"] = np.array([float(self.legs_of)])
         if self.limbs:
             arrays["corrections"] = self.corrections
         return arrays | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
@@ -217,6 +227,7 @@ class Cylindrical(AnimationMap):
         if not np.isfinite(upper).all():
             raise ParameterError(f"'upper_joints' of the map must be finite, got {upper}")
         clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
+        owner = int(kept(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
         return Cylindrical(
-            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints
+            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints, owner
         )  # fmt: skip

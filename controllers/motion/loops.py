@@ -162,11 +162,10 @@ def drift_of(poses: Array) -> Array:
     net = float(2.0 * np.arctan2(k * np.sign(w or 1.0), abs(w)))
     turns = _full_turns(poses[:, 3:7], net)
     step = last[:2] - turned(np.array(net), first[:2])
-    if turns == 0 and abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
-        return np.zeros(3)
-    if turns != 0 and abs(net) < 1.0:
-        # A twist of whole turns cannot move on; what is left of a step is closed at the seam.
+    if abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
+    if abs(net) < 1.0:
+        turns = 0  # a twist of whole turns cannot move on: who turns as he goes does so in the remainder
     angle = net + 2.0 * np.pi * turns
     columns, _ = plane_exponential(np.array([[1.0, 0.0, angle], [0.0, 1.0, angle]]))
     return np.append(np.linalg.solve(columns.T, step), angle)

@@ -7,8 +7,9 @@ s_i its strides and T the time of the lap, clip i is played k_i / s_i times,
 
 .. math:: k = \arg\min_k \max_i w\!\left(\log \frac{k\,d_i}{s_i\,T}\right), \qquad w(x) = \max(-x, 3 x)
 
-over all that travel, which so take as many strides, and k_i likewise of each other clip alone (s_i = 1). Faster counts
-thrice, for a body played f times as fast needs f² of its forces, and one that jumps cannot fall faster than it does.
+over all that travel, which so take as many strides, and k_i likewise of each other clip alone (s_i = 1); of each clip
+alone where legs are one clip's, so that strides need not be in step. Faster counts thrice, for a body played f times as
+fast needs f² of its forces, and one that jumps cannot fall faster than it does.
 """
 
 from collections.abc import Sequence
@@ -42,7 +43,7 @@ def strides(loop: Loop) -> int:
     return 1
 
 
-def in_step(loops: Sequence[Loop], lap: float | None = None) -> list[Loop]:
+def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False) -> list[Loop]:
     """The loops, each played as often as it fits a lap.
 
     Parameters
@@ -52,18 +53,20 @@ def in_step(loops: Sequence[Loop], lap: float | None = None) -> list[Loop]:
     lap : float, optional
         T [s]. Without it clips are played once, and those that travel and repeat themselves with as many strides as the
         first of them.
+    apart : bool
+        Each by itself, travelling ones too.
     """
     counts = [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
     if lap is None:
         wanted = next((count for count in counts if count > 1), 1)
         shares = [wanted / count if count > 1 else 1.0 for count in counts]
     else:
-        travels = [float(np.hypot(*loop.drift[:2])) > _FURTHEST for loop in loops]
+        travels = [not apart and float(np.hypot(*loop.drift[:2])) > _FURTHEST for loop in loops]
         durations = np.array([loop.duration / count for loop, count in zip(loops, counts, strict=True)])
         common = _times(durations[travels], lap) if any(travels) else 1
         shares = [
-            common / count if goes else float(_times(np.array([loop.duration]), lap))
-            for loop, count, goes in zip(loops, counts, travels, strict=True)
+            (common if goes else _times(np.array([duration]), lap)) / count
+            for duration, count, goes in zip(durations, counts, travels, strict=True)
         ]
     return [
         replace(loop, drift=share * loop.drift, duration=share * loop.duration, share=share)
@@ -81,15 +84,16 @@ def _times(durations: Array, lap: float) -> int:
 
 
 def natural_lap(loops: Sequence[Loop], shortest: float = 3.0, longest: float = 6.0) -> float:
-    """Time of a lap [s] in which loops that are played `in_step` are all as near to their own pace as can be.
+    """Time of a lap [s] in which the first loop goes at its own pace, and the others `in_step` are as near as can be.
 
-    Tried are times from the shortest to the longest, or that of the longest loop, 2 % apart; of those within 2 % of
-    the best the shortest is taken. A lap of several short cycles leaves a hand the time of all of them to change the
-    blend. The first loop, whose legs may be those of the whole blend, counts thrice.
+    The legs of a blend may be the first loop's, so the lap is a number of its strides: from the shortest to the
+    longest time, or that of the longest loop; of those within 2 % of the best the shortest. A lap of several short
+    cycles leaves a hand the time of all of them to change the blend.
     """
-    longest = max(longest, *(loop.duration for loop in loops))
-    laps = shortest * 1.02 ** np.arange(int(np.log(longest / shortest) / np.log(1.02)) + 1)
-    counts = np.append(3.0, np.ones(len(loops) - 1))
-    paces = np.array([[loop.duration / lap for loop in in_step(loops, float(lap))] for lap in laps])
-    worst = (counts * np.abs(np.log(paces))).max(axis=1)
+    first = loops[0]
+    stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
+    least = int(np.ceil(shortest / stride - _SAME))
+    most = int(max(longest, *(loop.duration for loop in loops)) / stride + _SAME)
+    laps = stride * np.arange(least, max(least, most) + 1)
+    worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in in_step(loops, float(lap))) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

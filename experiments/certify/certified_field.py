@@ -65,8 +65,7 @@ def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajec
 def _circle(
     config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile, timed: _Timed
 ) -> dict[str, Trajectory]:
-    circle = Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)
-    return {"": circle if isinstance(config.mode, Rivers) else timed(circle)}
+    return {"": timed(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
 
 
 def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str, Trajectory]:

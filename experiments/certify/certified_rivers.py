@@ -22,6 +22,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
+from experiments.certify.certified_field import given_curves
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
@@ -104,9 +105,10 @@ def certify_rivers(
     if len(curves) > 1:
         # The one that the run begins on comes first.
         names = tuple(name.removeprefix("_") or "first" for name in curves)
-        choice = side_by_side(RiverBundle(tuple(lifted_river(curve, mode) for curve in curves.values()), names))
+        bundle = RiverBundle(tuple(lifted_river(curve, mode) for curve in curves.values()), names)
+        choice = side_by_side(bundle, tuple(curves.values()))
     else:
-        choice = default_choice(mode, main.curve, getattr(config.map, "reach", 0.0))
+        choice = default_choice(mode, given_curves(config)[""], getattr(config.map, "reach", 0.0))
     bundle = choice.bundle
     rivers = certified_bundle(bundle, main.device, sampling)
     names = tuple(zip(bundle.names, rivers, strict=True))[1:]

@@ -35,14 +35,13 @@ class Command:
     def __call__(self) -> int:
         """Prepare, and say how well-formed it is."""
         from experiments.preparation.command import prepare_file, summary
-        from models.mocap.preparation.well_formed import well_formed
         from models.mocap.retargeting.retarget import Hints
 
         with working("preparing"):
-            made = prepare_file(
+            outcome = prepare_file(
                 self.source, self.target, self.loop, self.mirror, Hints(self.up, self.rest_frame), self.report,
                 self.overwrite,
             )  # fmt: skip
-        measures = well_formed(made.clip)
-        say({"lines": [summary(made, measures)], "well_formed": measures, "faults": measures.faults()}, self.json)
+        told = {"well_formed": outcome.measures, "followed": outcome.followed, "faults": outcome.faults()}
+        say({"lines": [summary(outcome)], **told}, self.json)
         return 0

@@ -112,7 +112,6 @@ def preparation(asked: Any, told: Any) -> None:
     """Prepared clips: asked for (source, target), tells an `Uploaded`."""
     from experiments.preparation.command import prepare_file, summary
     from models.mocap.library import load
-    from models.mocap.preparation.well_formed import well_formed
     from models.mocap.readers.own_bvh import write_bvh
 
     while (files := newest(asked)) is not None:
@@ -124,8 +123,8 @@ def preparation(asked: Any, told: Any) -> None:
                 write_bvh(loaded.clip, target)
                 said = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
             else:
-                made = prepare_file(source, target, overwrite=True)
-                said = f"{summary(made, well_formed(made.clip))}, {time.perf_counter() - begin:.0f} s in all"
+                line = summary(prepare_file(source, target, overwrite=True))
+                said = f"{line}, {time.perf_counter() - begin:.0f} s in all"
             told.put(Uploaded(source.name, target, said))
         except (ModelError, ValueError, ArithmeticError) as error:
             told.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))

@@ -2,12 +2,14 @@
 
 from html import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from experiments.files.html_page import html_page, image
 from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
+from experiments.preparation.followed import Followed, followed
 from models.errors import ModelError
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
@@ -15,10 +17,32 @@ from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.retarget import Hints
 
 
+class PreparedFile(NamedTuple):
+    """A prepared file, and what became of it.
+
+    Attributes
+    ----------
+    made : Prepared
+        The clip and how it was made.
+    measures : WellFormed
+        Of the clip.
+    followed : Followed
+        How the physical figure follows it.
+    """
+
+    made: Prepared
+    measures: WellFormed
+    followed: Followed
+
+    def faults(self) -> tuple[str, ...]:
+        """What is not within bounds, a line each."""
+        return (*self.measures.faults(), *self.followed.faults(self.measures.flights > 0))
+
+
 def prepare_file(
     source: Path, target: Path, loop: str = "auto", mirror: bool = False, hints: Hints | None = None,
     report: Path | None = None, overwrite: bool = False,
-) -> Prepared:  # fmt: skip
+) -> PreparedFile:  # fmt: skip
     """Make a well-formed clip of the motion in a file, and write it as BVH on the figure.
 
     Parameters
@@ -48,23 +72,26 @@ def prepare_file(
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
     made = prepared(source, loop, mirror, hints)
+    outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip))
     try:
         write_bvh(made.clip, target)
         if report is not None:
             report.mkdir(parents=True, exist_ok=True)
-            (report / f"prepare-{source.stem}.html").write_text(page(made), encoding="utf-8")
+            (report / f"prepare-{source.stem}.html").write_text(page(outcome), encoding="utf-8")
     except OSError as error:
         raise ModelError(
             f"cannot write {error.filename}: {error.strerror}; expected a place that can be written"
         ) from None
-    return made
+    return outcome
 
 
-def summary(made: Prepared, measures: WellFormed) -> str:
+def summary(outcome: PreparedFile) -> str:
     """One line for the terminal."""
-    faults = measures.faults()
+    made, measures, follows = outcome
+    faults = outcome.faults()
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; contact lacks {100 * measures.residual:.1f} % of weight; "
+        f"{follows.line()}; "
         f"{made.seconds:.0f} s of processor time; "
         + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
         + "".join(f"; {line}" for line in advice(made))
@@ -105,9 +132,10 @@ def advice(made: Prepared) -> tuple[str, ...]:
     )
 
 
-def page(made: Prepared) -> str:
+def page(outcome: PreparedFile) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
-    before, after = well_formed(made.captured), well_formed(made.clip)
+    made, after, follows = outcome
+    before = well_formed(made.captured)
     picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
     rows = "".join(
         f"<tr><th>{name}</th><td>{escape(was)}</td><td>{escape(now)}</td></tr>"
@@ -120,12 +148,12 @@ def page(made: Prepared) -> str:
         points = "".join(f"<li>{escape(line)}</li>" for line in lines)
         return f"<h2>{title}</h2><ul>{points}</ul>" if lines else ""
 
-    well = "Well-formed." if made.near and not after.faults() else "Not well-formed."
+    well = "Well-formed." if made.near and not outcome.faults() else "Not well-formed."
     body = (
-        f'<p>{well}</p><div class="wide"><table>'
+        f'<p>{well} {escape(follows.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
-        + listed("What is not within bounds", (*after.faults(), *advice(made)))
+        + listed("What is not within bounds", (*outcome.faults(), *advice(made)))
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
         + listed("What the file was taken for", made.report.lines() if made.report else ())

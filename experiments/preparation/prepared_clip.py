@@ -45,10 +45,15 @@ def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
 
     def find() -> npt.NDArray[np.float64]:
         with working(f"preparing {path.name}"):
-            clip = prepared(path).clip
-        return np.vstack((np.full((1, clip.poses.shape[1]), clip.fps), clip.poses))
+            made = prepared(path)
+        told = np.zeros((1, made.clip.poses.shape[1]))
+        told[0, :2] = made.clip.fps, made.near
+        return np.vstack((told, made.clip.poses))
 
     made_of = (loaded.clip.poses, np.array([loaded.clip.fps, -1.0 if loaded.loops is None else float(loaded.loops)]))
     rows = kept_array(kept_folder(prepared.__module__), "prepared", made_of, (-1, loaded.clip.poses.shape[1]), find)
     clip = Clip(rows[1:], float(rows[0, 0]), loaded.clip.name)
-    return PreparedClip(clip, (*loaded.report.lines(), f"{path.name}: prepared; --raw takes the capture as it is"))
+    done = (
+        "prepared" if rows[0, 1] else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
+    )
+    return PreparedClip(clip, (*loaded.report.lines(), f"{path.name}: {done}; --raw takes the capture as it is"))

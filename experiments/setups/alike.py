@@ -77,8 +77,6 @@ def moves_alike(made: Cylindrical, lap: float) -> bool:
 
     What was found once is kept beside the compiled code.
     """
-    if all(np.array_equal(poses, made.clips[0][0]) for poses, _ in made.clips):
-        return True
 
     def find() -> Array:
         return np.array([motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
@@ -119,6 +117,6 @@ def arms(legs: Sequence[Limb]) -> list[int]:
     return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK}]
 
 
-def only_arms(made: Cylindrical) -> Cylindrical:
-    """The same map in which only arms and head are blended: legs, root and trunk are those of the first clip."""
-    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs))
+def only_arms(made: Cylindrical, legs_of: int) -> Cylindrical:
+    """The same map in which only arms and head are blended: legs, root and trunk are those of one clip."""
+    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs), legs_of)

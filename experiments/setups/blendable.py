@@ -8,17 +8,17 @@ from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
+from models.mocap.preparation.poses import sole_points
 
 FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
 UPRIGHT = -0.5  # least vertical component of the pelvis axis: who kicks high leans by up to 97°, a cartwheel by 149°
+FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # of one that flies: it asks for 0.8 to 1.2 of gravity
 SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
 
 
 def longest_flight(clip: Clip) -> float:
     """Longest time without a sole near the floor [s]."""
-    from models.mocap.preparation.poses import sole_points  # brings signal processing with it
-
     flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FLIES
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flies.astype(int), [0]))))
     return float((edges[1::2] - edges[::2]).max(initial=0)) / clip.fps
@@ -29,9 +29,14 @@ def least_upright(clip: Clip) -> float:
     return float((1.0 - 2.0 * (clip.poses[:, 4] ** 2 + clip.poses[:, 5] ** 2)).min())
 
 
+def same(clips: Sequence[Clip]) -> bool:
+    """Whether clips are one and the same."""
+    return all(np.array_equal(clip.poses, clips[0].poses) for clip in clips)
+
+
 def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     """Which of different clips cannot be blended with the others, a line each; none if they are one and the same."""
-    if all(np.array_equal(clip.poses, clips[0].poses) for clip in clips):
+    if same(clips):
         return ()
     found: list[str] = []
     for clip in {clip.name: clip for clip in clips}.values():
@@ -44,6 +49,27 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def grounded(clips: Sequence[Clip]) -> int:
+    """The first clip that stays on the floor, counted from 0: its legs carry the arms of others.
+
+    Arms move the centre of mass, so flights of a clip are ballistic with its own arms alone. Where all fly, the first.
+    """
+    return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
+
+
+def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
+    """Whether a lap [s] plays all clips near enough to their own pace for a mean of them; closer where one flies."""
+    paces = [loop.duration / lap for loop in loops]
+    flies = any(longest_flight(clip) > 0.0 for clip in clips)
+    slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if flies else (SLOWEST, FASTEST)
+    return all(slowest <= pace <= fastest for pace in paces)
+
+
+def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
+    """Loops with one of them first."""
+    return [loops[first], *loops[:first], *loops[first + 1 :]]
+
+
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
     """Which clips a lap [s] plays much faster or slower than they are, as loops that are played `in_step`."""
     paces = {clip.name: loop.duration / lap for clip, loop in zip(clips, loops, strict=True)}
@@ -51,5 +77,5 @@ def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[
     if not off:
         return ()
     closed = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    best = natural_lap(closed)
+    best = natural_lap(led_by(grounded(clips), closed))
     return (f"a lap of {lap:.1f} s plays {', '.join(off)} times its own pace; --lap {best:.1f} suits them best",)

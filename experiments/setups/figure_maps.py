@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -19,6 +20,8 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
 from controllers.legs.limbs import Limb
+from controllers.motion.loops import checked_clip, closed_loop
+from controllers.motion.strides import in_step
 from controllers.state import Array
 from experiments.config.maps import Circle, Composite, Cylindrical, MapFile, RiverClips
 from experiments.config.modes import Rivers
@@ -27,14 +30,14 @@ from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
 from experiments.setups.balance import balanced
-from experiments.setups.blendable import not_blendable, off_pace
+from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
-from experiments.setups.rivers import default_choice
+from experiments.setups.rivers import default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
@@ -76,10 +79,16 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
     radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
+    played = [clips[i % len(clips)] for i in range(len(motions))]
+    loops = [closed_loop(checked_clip(poses, fps, f"clip {i}"), fps) for i, (poses, fps) in enumerate(motions)]
+    owner = grounded(played)
+    if not same(clips) and not keeps_pace(played, in_step(loops, lap), lap):
+        apart = CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
+        return _about_circle(place, apart, clips).said(apart.remarks)
     made = _cylinder(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> CylindricalMap:
-        return balanced(made, figure, lap) if moves_alike(made, lap) else only_arms(made)
+        return balanced(made, figure, lap) if same(clips) or moves_alike(made, lap) else only_arms(made, owner)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 
@@ -139,7 +148,7 @@ def _river_clips_parts(
     if not isinstance(mode, Rivers) or mode.crossing == "sum":
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
-    curves = [river.curve for river in default_choice(mode, place.curve, part.reach).bundle.rivers]
+    curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
     parts = _about_circle(place, made, clips)
     return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
@@ -176,7 +185,7 @@ def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> 
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
-        course=lambda damping: course_of(curve, damping), moves=True, expressive=place.expressive,
+        course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
         held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off_pace(played, made.loops, curve.duration)),
     )  # fmt: skip
 
@@ -191,7 +200,7 @@ def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapP
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
-        course=lambda damping: course_of(curve, damping),
+        course=cache(partial(course_of, curve)),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
         remarks=between if curve.periodic else (ends, *between),
     )  # fmt: skip

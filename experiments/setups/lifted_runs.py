@@ -74,13 +74,14 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
         If the Phantom does not reach a curve.
     """
     damping = river_gains(mode)[1]
-    curves = [paced(haptic_map.curve(i), damping) for i in range(len(haptic_map.names))]
-    return side_by_side(RiverBundle(tuple(lifted_river(curve, mode) for curve in curves), haptic_map.names))
+    given = tuple(haptic_map.curve(i) for i in range(len(haptic_map.names)))
+    rivers = tuple(lifted_river(paced(curve, damping), mode) for curve in given)
+    return side_by_side(RiverBundle(rivers, haptic_map.names), given)
 
 
-def side_by_side(bundle: RiverBundle) -> RiverChoice:
+def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
     """Rivers that lie side by side, told apart by the greatest speed: a hand is taken at that, too."""
-    return RiverChoice(bundle, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
+    return RiverChoice(bundle, given, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:

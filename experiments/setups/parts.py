@@ -67,6 +67,8 @@ class RiverChoice(NamedTuple):
     ----------
     bundle : RiverBundle
         The rivers, by name.
+    given : tuple of Trajectory
+        Their curves as the map has them, timed as the hand is to move.
     pace : float
         Speed by which they are told apart [m/s].
     hysteresis : float
@@ -74,6 +76,7 @@ class RiverChoice(NamedTuple):
     """
 
     bundle: RiverBundle
+    given: tuple[Trajectory, ...]
     pace: float
     hysteresis: float
 

@@ -16,6 +16,7 @@ from experiments.setups.budget import fastest
 from experiments.setups.defaults import river_gains
 from experiments.setups.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.governor import governed, speeds_along
+from experiments.setups.pace import paced
 from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
 
 # Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
@@ -56,7 +57,7 @@ def river_time(mode: Rivers) -> float:
 
 def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
     """Law of rivers: their sum, or of higher order."""
-    bundle, pace, hysteresis = choice
+    bundle, _, pace, hysteresis = choice
     if mode.crossing == "sum":
         return bundle
     return HigherOrder(
@@ -67,16 +68,26 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
     """The same rivers, each with the speeds that the flights of its animation admit."""
     rivers = tuple(
-        replace(river, speeds=speeds_along(maps.haptic_map, river.curve, i))
-        for i, river in enumerate(choice.bundle.rivers)
+        replace(river, speeds=speeds_along(maps.haptic_map, curve, i, river.curve))
+        for i, (river, curve) in enumerate(zip(choice.bundle.rivers, choice.given, strict=True))
     )
     return choice._replace(bundle=replace(choice.bundle, rivers=rivers))
 
 
 def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice:
-    """The default rivers about a curve (`river_bundle`), told apart by its mean speed."""
+    """The default rivers about a curve (`river_bundle`), which lead the Phantom at their own pace (`paced`).
+
+    They are told apart by the curve's mean speed.
+
+    Raises
+    ------
+    SimError
+        If the Phantom does not reach one of them.
+    """
     bundle = river_bundle(curve, reach, river_time(mode), river_gains(mode)[1], mode.river_tube)
-    return RiverChoice(bundle, curve.length / curve.duration, HYSTERESIS)
+    led = tuple(replace(river, curve=paced(river.curve, river.drag)) for river in bundle.rivers)
+    given = tuple(river.curve for river in bundle.rivers)
+    return RiverChoice(replace(bundle, rivers=led), given, curve.length / curve.duration, HYSTERESIS)
 
 
 def drawn(bundle: RiverBundle) -> Static:

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import in_step, natural_lap
+from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
+from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.setups.alike import motion_of
-from experiments.setups.blendable import not_blendable, off_pace
+from experiments.setups.blendable import grounded, led_by, not_blendable, off_pace
 from experiments.setups.wiring import wire
-from experiments.studies.prepared_captures import followed
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError
 from models.humanoid.skeleton import joint_range
@@ -78,7 +78,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
         clip = _named(prepared_clip(Path(folder) / name).clip, name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
-    residual, fell, _ = followed(clip)
+    residual, fell, *_ = followed(clip)
     reason = "; ".join(not_blendable((clip, _other(clip))))
     if not reason and (fell is not None or residual > MOST_ALONE):
         reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
@@ -98,12 +98,12 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure."""
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    lap = natural_lap(loops)
-    pace = [loop.duration / lap for loop in in_step(loops, lap)]
+    lap = natural_lap(led_by(grounded(clips), loops))
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
     config = run_config(mode=mode, map=kind, user=user, clips=names, lap=lap, seconds=SECONDS, seed=seed)
     session = wire(config, tuple(clips))
+    played = getattr(session.haptic_map, "loops", loops)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
     frames, weight = log.frames, session.weight
@@ -113,8 +113,9 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     force = np.linalg.norm(frames["residual"][:, :3], axis=1)[stands] / weight
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
-        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap, "pace": [round(p, 2) for p in pace],
-        "remarks": session.remarks, "off_pace": off_pace(clips, in_step(loops, lap), lap), "fell": fell,
+        "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap,
+        "pace": [round(one.duration / lap, 2) for one in played],
+        "remarks": session.remarks, "off_pace": off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
@@ -142,21 +143,27 @@ def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of the table, a map each."""
+    """Lines of the table, a map each: how many sets stand, with Wilson's interval (1927), and keep the other bounds."""
+    from statsmodels.stats.proportion import proportion_confint
+
     lines = [
-        "| map | sets | stand | residual %: RMS over all, median, 90 % below | lowest sole cm "
-        "| skate cm (95 % of stances; worst) | joints beyond ° |",
+        "| map | sets, of which told off their pace before | stand (95 % interval) | residual of those %: median, "
+        "90 %; within 12 | lowest sole cm; above -1 | skate cm: median, most; within 2 | joints beyond °; within |",
         "|---|---|---|---|---|---|---|",
     ]
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
         stood = [row for row in of if row["fell"] is None]
+        low, high = proportion_confint(len(stood), len(of), method="wilson")
         residual = 100 * np.array([row["residual"] for row in stood] or [np.nan])
+        lowest, skate, beyond = (np.array([row[key] for row in of]) for key in ("lowest", "skate", "beyond"))
         lines.append(
-            f"| {kind} | {len(of)} | {len(stood)} | {np.sqrt(np.mean(residual**2)):.1f}, {np.median(residual):.1f}, "
-            f"{np.quantile(residual, 0.9):.1f} | {min(row['lowest'] for row in of):.1f} | "
-            f"{np.median([row['skate'] for row in of]):.1f}; {max(row['slid'] for row in of):.1f} | "
-            f"{max(row['beyond'] for row in of):.1f} |"
+            f"| {kind} | {len(of)}, {sum(bool(row['off_pace']) for row in of)} "
+            f"| {len(stood)}, {low:.0%} to {high:.0%} "
+            f"| {np.median(residual):.1f}, {np.quantile(residual, 0.9):.1f}; {np.sum(residual <= 12.0)} "
+            f"| {lowest.min():.1f}; {np.sum(lowest > -1.0)} "
+            f"| {np.median(skate):.1f}, {skate.max():.1f}; {np.sum(skate <= 2.0)} "
+            f"| {beyond.max():.1f}; {np.sum(beyond == 0.0)} |"
         )
     return lines
 

@@ -105,6 +105,8 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     for k in range(3):
         memory[:] = reference.memory
         change_clip(memory, river, phase)
+        # By its place: a field may lead along the curve at other times than the clip has.
+        evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
         ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
         evaluate_map(reference.units, reference.kind, params, reference.scratch_x, memory, transition.ahead[0])
         if leaps(transition, transition.ahead[0]):

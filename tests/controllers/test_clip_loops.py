@@ -53,6 +53,20 @@ def test_a_walk_in_a_curve_repeats_round_its_circle():
     np.testing.assert_allclose(remainder[0], remainder[1], atol=1e-8)
 
 
+@pytest.mark.parametrize("turns", [-1.0, 1.0, 2.0])
+def test_who_turns_round_as_he_goes_is_not_pulled_shut_over_the_seam(turns):
+    poses = swinging(2, travel=1.3)
+    s = np.linspace(0.0, 1.0, len(poses))
+    poses[:, 3:7] = yawed((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
+    loop = _loop(poses)
+    assert loop.gap < 1e-6
+    assert loop.drift[2] == pytest.approx(-0.24, abs=1e-9)
+    made = loop.channels(s, s)
+    np.testing.assert_allclose(made[:, 2], poses[:, 2], atol=1e-6)
+    heading = Rotation.from_quat(made[:, [4, 5, 6, 3]]) * Rotation.from_quat(poses[:, [4, 5, 6, 3]]).inv()
+    np.testing.assert_allclose(heading.as_matrix(), heading[0].as_matrix()[None].repeat(len(s), 0), atol=1e-6)
+
+
 def test_a_loop_put_together_again_is_the_clip_where_it_was_moved_to():
     poses = swinging(2, travel=1.3)
     loop = _loop(poses)

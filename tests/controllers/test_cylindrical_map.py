@@ -56,6 +56,18 @@ def test_blending_a_clip_with_itself_changes_nothing_anywhere():
             np.testing.assert_allclose(difference(pose, corner), 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("owner", range(4))
+def test_root_and_legs_can_be_one_clips_everywhere(owner):
+    arms = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=owner)
+    for corner in range(4):
+        for s in (0.1, 0.45, 0.8):
+            pose = arms.pose(stylus(*_at(corner, s)))
+            own, others = (STILL.pose(stylus(*_at(k, s))) for k in (owner, corner))
+            np.testing.assert_allclose(difference(pose, own)[:12], 0.0, atol=1e-9)
+            np.testing.assert_allclose(difference(pose, others)[12:], 0.0, atol=1e-9)
+    assert ("first", "second", "third", "fourth")[owner] in arms.remarks[0]
+
+
 def test_beyond_the_edges_nothing_is_extrapolated():
     for k, (r, z) in enumerate([(0.005, -0.2), (0.3, -0.1), (0.02, 0.2), (0.2, 0.31)]):
         np.testing.assert_array_equal(STILL.pose(stylus(r, 1.0, z)), STILL.pose(stylus(*_at(k, 1.0 / (2 * np.pi)))))
@@ -179,6 +191,7 @@ def test_the_compiled_entry_gives_the_same_to_the_last_bit():
         ((CLIPS, (0.07, 0.03), Z), "r_range must increase"),
         ((CLIPS, (0.0, 0.03), Z), "from 1 mm or more, got "),
         ((CLIPS, R, (0.0, np.nan)), "z_range must increase"),
+        ((CLIPS, R, Z, (), None, None, (3,), 4), "legs are of clip 0 to 3, got 4"),
         (([*CLIPS[:3], (CLIPS[3][0][:, :11], 30.0)], R, Z), r"same size, got \[19, 19, 19, 11\]"),
     ],
 )

@@ -72,6 +72,24 @@ def test_a_lap_plays_each_clip_as_often_as_it_fits():
     np.testing.assert_allclose([one.duration for one in adjusted], durations * [one.share for one in adjusted])
 
 
+def test_clips_that_need_not_be_in_step_are_each_near_their_own_pace():
+    # Cycles of 2 and 0.9 s: two and four of them, where in step they would be three and three.
+    loops = [loop(repeated(1, 2, 1.1)), loop(repeated(2, 3, 2.0, 27))]
+    durations = [one.duration for one in in_step(loops, 4.1, apart=True)]
+    np.testing.assert_allclose(durations, [4.0, 3.6])
+    np.testing.assert_allclose([one.duration for one in in_step(loops, 4.1)], [4.0, 1.8])
+
+
+def test_in_the_natural_lap_the_first_clip_is_at_its_own_pace():
+    # A cycle of 0.5 s beside one of 2.1 s that goes on the spot, and one of 0.9 s.
+    loops = [loop(repeated(1, 1, 1.1, 15)), loop(swinging(3, 63)), loop(repeated(2, 1, 1.3, 27))]
+    for first in range(3):
+        order = loops[first:] + loops[:first]
+        lap = natural_lap(order)
+        assert in_step(order[:1], lap)[0].duration == pytest.approx(lap)
+        assert 3.0 <= lap <= 6.0
+
+
 def test_the_natural_lap_plays_clips_at_their_own_pace_where_that_can_be():
     loops = [loop(swinging(seed, frames)) for seed, frames in ((4, 30), (5, 45), (6, 90))]
     lap = natural_lap(loops)

@@ -1,14 +1,16 @@
 """What cannot be blended, or is off its pace, is said before a run, on every map."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
+from controllers.motion.loops import checked_clip, closed_loop
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.setups.blendable import not_blendable
+from experiments.setups.blendable import grounded, keeps_pace, not_blendable
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
@@ -21,6 +23,26 @@ def test_what_turns_over_or_flies_is_named_before_it_is_blended() -> None:
     assert len(said) == 2
     assert said[0].startswith("backflip turns over")
     assert said[1].startswith("jump flies for 0.")
+
+
+def test_a_mean_of_clips_wants_them_near_their_own_pace_and_nearer_where_one_flies() -> None:
+    walk, angry, run = embedded("walk"), embedded("angry"), embedded("run")
+    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in (walk, angry, run)]
+    slower = replace(loops[1], duration=0.8 * loops[0].duration)
+    assert keeps_pace((walk, angry), (loops[0], slower), loops[0].duration)
+    assert not keeps_pace((run, angry), (loops[2], slower), loops[2].duration)
+    slowest = replace(loops[1], duration=0.7 * loops[0].duration)
+    assert not keeps_pace((walk, angry), (loops[0], slowest), loops[0].duration)
+
+
+def test_legs_are_those_of_the_first_clip_that_stays_on_the_floor() -> None:
+    run, walk, cheer = embedded("run"), embedded("walk"), embedded("cheer")
+    assert [grounded(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
+    # At this lap the cheer is off its pace, so nothing but arms is blended.
+    made = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
+    assert made.haptic_map.legs_of == 1
+    assert any("legs and trunk are the second clip's" in remark for remark in made.remarks)
+    assert not any("run at" in remark or "walk at" in remark for remark in made.remarks)
 
 
 @pytest.mark.parametrize(("kind", "mode"), [("composite", "follow"), ("rivers", "rivers")])

@@ -1,9 +1,14 @@
 """FOLLOW over one clip on a map costs the physical figure little more than the clip alone."""
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
+from experiments.cli import main
+from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.setups.alike import motion_at, motion_of
 from experiments.setups.wiring import wire
@@ -16,10 +21,8 @@ SECONDS = 6.0
 POINTS = 0.03  # [body weights] RMS that a map may add
 
 
-def residual(kind: str, name: str) -> float:
-    """RMS of the residual force in FOLLOW over copies of a clip [body weights]; a root off by 0.5 m is a fall."""
-    clip = embedded(name)
-    config = run_config(map=kind, clips=(name,), lap=clip.duration, seconds=SECONDS)
+def residual(config: RunConfig) -> float:
+    """RMS of the residual force of a run [body weights]; a root off by 0.5 m is a fall."""
     session = wire(config)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
@@ -28,12 +31,30 @@ def residual(kind: str, name: str) -> float:
     return float(np.sqrt(np.mean(force**2))) / session.weight
 
 
+@cache
+def bound(name: str) -> float:
+    return track(embedded(name), SECONDS, TrackingConfig()).residual_force + POINTS
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "name"), [("cylindrical", "walk"), ("cylindrical", "run"), ("cylindrical", "jump"), ("composite", "walk")]
-)
+    ("kind", "name"),
+    [("cylindrical", "walk"), ("cylindrical", "run"), ("cylindrical", "jump"), ("composite", "walk"),
+     ("rivers", "walk"), ("rivers", "run"), ("rivers", "jump")],
+)  # fmt: skip
 def test_a_map_of_one_clip_costs_at_most_three_points_over_tracking_it(kind: str, name: str) -> None:
-    assert residual(kind, name) < track(embedded(name), SECONDS, TrackingConfig()).residual_force + POINTS
+    mode = "rivers" if kind == "rivers" else "follow"
+    config = run_config(mode=mode, map=kind, clips=(name,), lap=embedded(name).duration, seconds=SECONDS)
+    assert residual(config) < bound(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["run", "jump"])
+def test_a_lifted_map_of_four_copies_costs_at_most_three_points(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "map.npz"
+    assert main(["lift", *[name] * 4, "--out", str(file)]) == 0
+    for mode in ("follow", "rivers"):
+        assert residual(run_config(mode=mode, map=str(file), seconds=SECONDS)) < bound(name), mode
 
 
 def test_a_lap_at_a_corner_of_a_map_lacks_what_its_clip_lacks() -> None:

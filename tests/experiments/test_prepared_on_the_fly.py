@@ -30,6 +30,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
         def __init__(self, path: Path):
             found.append(path)
             loaded = load(path).clip
+            self.near = path.stem != "cartwheel"
             self.clip = Clip(loaded.poses[::2], loaded.fps / 2.0, loaded.name)
 
     Made.__module__ = prepare.__name__
@@ -45,6 +46,14 @@ def test_a_foreign_file_is_prepared_once_and_kept_to_the_last_bit(foreign: Path,
     np.testing.assert_array_equal(first.poses, again.poses)
     assert first.fps == again.fps == load(foreign).clip.fps / 2.0
     assert any("--raw" in remark for remark in remarks)
+
+
+def test_a_run_says_of_which_capture_no_feasible_motion_is_near(foreign: Path, calls: list[Path]) -> None:
+    far = foreign.rename(foreign.with_stem("cartwheel"))
+    for _ in range(2):
+        _, remarks = load_clips([str(far)])
+        assert "no feasible motion is near it" in remarks[-1]
+    assert len(calls) == 1
 
 
 def test_another_content_under_the_same_name_is_prepared_anew(foreign: Path, calls: list[Path]) -> None:

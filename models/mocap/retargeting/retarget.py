@@ -14,11 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import SEGMENTS, figure_model
+from models.humanoid.skeleton import JOINTS, SEGMENTS, figure_model, joint_range
 from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.arm_twist import with_twist_shared
 from models.mocap.retargeting.body_lines import body_lines, joints_below
 from models.mocap.retargeting.calibration import calibrate
 from models.mocap.retargeting.footing import levelled, on_the_floor
@@ -28,6 +29,7 @@ from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _BENT = np.deg2rad(60.0)  # a body that never stands straighter does not tell how its spine is at rest
+_RANGE = np.deg2rad(15.0)  # beyond the figure's joint ranges: people's differ by 5 to 9° (SD, Boone & Azen 1979)
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -161,7 +163,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     if not np.isfinite(calibrated.segments).all():
         raise unclear
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
-    segments = quaternions.product(axes, calibrated.segments[skipped:])
+    segments = quaternions.product(axes, with_twist_shared(calibrated.segments[skipped:]))
     own_leg = _own_leg("left_foot" in roles.segments or "left_shank" in roles.ends)
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
@@ -173,6 +175,8 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     remarks: list[str] = []
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
+    if beyond := _beyond_ranges(clip.poses):
+        remarks.append(beyond)
     if calibrated.bend > _BENT and rest is None:
         remarks.append("the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it")
     report = RetargetReport(
@@ -214,6 +218,20 @@ def _poses(root: Array, segments: Array) -> Array:
     parents = [segment.parent for segment in SEGMENTS[1:]]
     local[:, 1:] = quaternions.product(quaternions.conjugate(segments[:, parents]), segments[:, 1:])
     return np.hstack((root, local.reshape(len(root), -1)))
+
+
+def _beyond_ranges(poses: Array) -> str:
+    """Which joints are further beyond their ranges than ranges of people differ; empty if none is."""
+    vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
+    ranges = joint_range()
+    excess = np.maximum(ranges[:, :, 0] - vectors, vectors - ranges[:, :, 1]).max(axis=2)
+    most = excess.max(axis=0)
+    told = [
+        f"{JOINTS[k].replace('_', ' ')} by {np.rad2deg(most[k]):.0f}° ({np.mean(excess[:, k] > _RANGE):.0%} of frames)"
+        for k in np.argsort(-most)
+        if most[k] > _RANGE
+    ]
+    return f"beyond the figure's range: {', '.join(told)}; see whether the file has it so" if told else ""
 
 
 def _axis_name(direction: Array) -> str:
