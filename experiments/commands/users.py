@@ -13,9 +13,9 @@ class Command:
 
     out: Path = Path("runs/users")
     """Folder to write."""
-    people: Annotated[int, whole(1)] = 3
+    people: Annotated[int, whole(1)] = 6
     """How many people of a population take part."""
-    seed: Annotated[int, whole(0)] = 8
+    seed: Annotated[int, whole(0)] = 1
     """Of the population and of its noise."""
     laws: tuple[str, ...] = ()
     """fitts, scatter, steering, power-law, tremor, step-response, grip, practice, endurance; all by default."""

@@ -30,7 +30,7 @@ from sim.users.person_state import (
 from sim.users.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.wishes import PLACE
 
-ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994: ellipses along the way, m)
+ACROSS = 0.85  # scatter of endpoints across the way over that along it (Gordon et al. 1994 I: less; by how much, m)
 LEAST_SECONDS = 0.16  # [s] of the shortest submovement
 WATCHED = 0.8  # of a submovement's time: 94 % of its way, by which it is seen where it ends
 SURPRISE, REACTION = 0.004, 0.08  # [m] from where it should be, a hand is looked after within so long [s]

@@ -28,7 +28,9 @@ class Interval(NamedTuple):
 
 INTERVALS = {
     "age": Interval(18.0, 90.0, "years", "adults"),
-    "skill": Interval(0.0, 1.0, "", "share of the arm's inertia that the motor command foresees; 1 is an expert"),
+    "skill": Interval(
+        0.0, 1.0, "", "share of the arm's inertia that the motor command foresees; most of it: Gordon et al. 1994 II"
+    ),
     "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012: 1 to 3 N on this very device; up to 10 N when asked to"),
     "mass": Interval(0.1, 2.5, "kg", "Speich et al. 2005: 1.46 kg (m); hand and wrist alone some 0.1 to 0.5 kg"),
     "stiffness": Interval(20.0, 800.0, "N/m", "Mussa-Ivaldi et al. 1985, Tsuji et al. 1995 (m): some 50 to 800 N/m"),
@@ -50,9 +52,11 @@ INTERVALS = {
     ),
     "felt_noise": Interval(0.0, 0.02, "m", "van Beers et al. 1998 (m): proprioceptive localisation 5 to 10 mm"),
     "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
-    "refractory": Interval(0.1, 0.25, "s", "intermittent control: psychological refractory period 100 to 250 ms"),
-    "horizon": Interval(0.15, 0.8, "s", "duration of a submovement in tracking: Miall et al. 1993 (m): some 0.3 s"),
-    "motor_noise": Interval(0.0, 0.05, "s", "Schmidt et al. 1979: spread of endpoints is proportional to A/T"),
+    "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993: some 170 ms between corrections in tracking"),
+    "horizon": Interval(
+        0.15, 0.8, "s", "duration of a submovement in tracking: Miall, Weir & Stein 1993 find them at 0.5 to 1.8 Hz"
+    ),
+    "motor_noise": Interval(0.0, 0.05, "s", "Meyer et al. 1988: the spread of endpoints is linear in A/T"),
     "force_noise": Interval(0.0, 0.1, "", "Jones et al. 2002 (m): coefficient of variation of force, 2 to 5 %"),
     "tremor": Interval(
         0.0, 0.35, "m/s²", "normative study of postural tremor, Arch Neurol 39:358, 1982: 0.015 to 0.34"
@@ -134,7 +138,7 @@ class Person:
     name: str = "median"
     age: float = 30.0
     hand: Literal["right", "left"] = "right"
-    skill: float = 0.7
+    skill: float = 0.85
     grip: float = 2.0
     mass: float = 0.6
     stiffness: float = 250.0
@@ -151,13 +155,13 @@ class Person:
     felt_noise: float = 0.006
     seen_noise: float = 0.0004
     refractory: float = 0.15
-    horizon: float = 0.3
-    motor_noise: float = 0.011
+    horizon: float = 0.42
+    motor_noise: float = 0.0078
     force_noise: float = 0.03
     tremor: float = 0.06
     tremor_frequency: float = 9.0
     correction: float = 0.8
-    caution: float = 2.0
+    caution: float = 2.5
     entrainment: float = 1.0
     learning: float = 0.0
 

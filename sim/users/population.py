@@ -19,7 +19,8 @@ Of tremor as wide as the normative study's range (a factor of 20 between extreme
 inter-subject variation of arm models (a factor of about two either way); the others as coefficients of variation of a
 healthy sample, which are some 10 to 30 %.
 """
-_MEAN_SKILL = 2.0 / 3.0  # of Beta(4, 2)
+_SKILL = (8.5, 1.5)  # of a beta distribution: adults know the inertia of their own arm, but not all of it
+_MEAN_SKILL = _SKILL[0] / sum(_SKILL)
 _LEFT = 0.1  # share of people who hold a pen in the left hand
 _AGING = (
     0.006  # relative slowing a year from 30 years on: choice reaction and movement times rise by 5 to 10 % a decade
@@ -27,12 +28,12 @@ _AGING = (
 
 PERSONAS = {
     "median": Person(),
-    "expert": Person(name="expert", age=35.0, skill=1.0, motor_noise=0.008, horizon=0.28, seen_noise=0.0003,
+    "expert": Person(name="expert", age=35.0, skill=1.0, motor_noise=0.0055, horizon=0.38, seen_noise=0.0003,
                      tremor=0.04, correction=0.9),
-    "novice": Person(name="novice", age=24.0, skill=0.4, grip=4.0, motor_noise=0.016, horizon=0.35, correction=0.65,
+    "novice": Person(name="novice", age=24.0, skill=0.6, grip=4.0, motor_noise=0.0115, horizon=0.48, correction=0.65,
                      learning=0.15, entrainment=0.6),
-    "elder": Person(name="elder", age=76.0, skill=0.7, grip=3.0, strength=9.0, motor_noise=0.014, visual_delay=0.235,
-                    reflex_delay=0.05, refractory=0.2, horizon=0.4, tremor=0.14, tremor_frequency=7.0),
+    "elder": Person(name="elder", age=76.0, skill=0.8, grip=3.0, strength=9.0, motor_noise=0.01, visual_delay=0.235,
+                    reflex_delay=0.05, refractory=0.2, horizon=0.54, tremor=0.14, tremor_frequency=7.0),
     "lefty": Person(name="lefty", hand="left"),
     "firm": Person(name="firm", grip=8.0, stiffness=420.0, strength=30.0),
     "light": Person(name="light", grip=1.0, stiffness=120.0, mass=0.4),
@@ -63,7 +64,7 @@ _MOST = 1_000_000  # people of one population
 def population(number: int, seed: int) -> tuple[Person, ...]:
     """People drawn by lot; the first ones of a larger population of the same seed are the same.
 
-    Age is uniform between 20 and 75, skill a Beta(4, 2), one in ten is left-handed, all other numbers are log-normal
+    Age is uniform between 20 and 75, skill a Beta(8.5, 1.5), one in ten left-handed, all other numbers are log-normal
     about the median person's, cut off at their intervals. Scatter of endpoints and horizon grow as skill falls, delays
     as age rises.
 
@@ -88,7 +89,7 @@ def population(number: int, seed: int) -> tuple[Person, ...]:
 
 def _draw(rng: np.random.Generator, name: str) -> Person:
     median = Person()
-    age, skill, left = rng.uniform(20.0, 75.0), rng.beta(4.0, 2.0), rng.random() < _LEFT
+    age, skill, left = rng.uniform(20.0, 75.0), rng.beta(*_SKILL), rng.random() < _LEFT
     values = {key: getattr(median, key) * np.exp(spread * rng.normal()) for key, spread in _SPREAD.items()}
     slower, clumsier = 1.0 + _AGING * max(0.0, age - 30.0), 1.0 + 0.8 * (_MEAN_SKILL - skill)
     for key in ("visual_delay", "reflex_delay", "refractory", "horizon"):

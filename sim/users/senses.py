@@ -49,7 +49,7 @@ from sim.users.person_state import (
     PersonState,
 )
 
-DRIFT_TIME = 60.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
+DRIFT_TIME = 120.0  # [s] in which the felt place of an unseen hand drifts: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] of what is seen: a fixation
 CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
 DOUBTED = 0.005  # [m], and three times the noise of what is felt: what is seen further away is not believed

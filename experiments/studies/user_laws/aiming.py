@@ -6,17 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from controllers.state import Array
-from experiments.studies.user_laws.bare_device import Trace, trial
+from experiments.studies.user_laws.bare_device import AFTER, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
 TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes to see where it ends
-AFTER = 0.1  # [s] after a click in which a movement may still come to rest
-MOVES = 14  # from side to side; the first two are practice
+MOVES = 10  # from side to side; the first two are practice
 _PRACTICE = 2
-_SECONDS = (11.0, 22.0)  # in which nearly everybody has made all moves, and in which the slowest have
+_SECONDS = 20.0  # in which the slowest have made all moves
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
@@ -54,9 +53,9 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
         spread = list[float]()
         for i, person in enumerate(people):
             width = 2.0 * amplitude * person.caution * person.motor_noise / seconds
-            spread.append(float(np.std(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
+            spread.append(float(np.var(_first_ends(_tapped(person, amplitude, width, seed + i)), ddof=1)))
         speeds.append(amplitude / seconds)
-        spreads.append(float(np.mean(spread)))
+        spreads.append(float(np.sqrt(np.mean(spread))))
     x, y = np.array(speeds), np.array(spreads)
     slope, intercept = np.polyfit(x, y, 1)
     source = "Schmidt et al. 1979, Wright & Meyer 1983: some 4 to 12 ms (m)"
@@ -65,7 +64,7 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
         (
             Law("Speed–accuracy: slope of σ over A/T", 1e3 * slope, 3.0, 12.0, "ms", source, built_in=True),
             Law("Speed–accuracy: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.8, 1.0, "",
-                "Schmidt et al. 1979: linear, r above 0.9 (m)", built_in=True),
+                "Meyer et al. 1988: linear (a); r above 0.9 (m)", built_in=True),
         ),
         x, y, ("A/T [m/s]", "standard deviation of the end [m]"), (float(slope), float(intercept)),
     )  # fmt: skip
@@ -94,7 +93,5 @@ def _conditions() -> list[tuple[float, float]]:
 def _tapped(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((MOVES + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    trace = trial(person, targets(points, width), _SECONDS[0], seed, points[0])
-    if len(trace.clicks) <= MOVES:  # the longer run begins with the shorter one
-        trace = trial(person, targets(points, width), _SECONDS[1], seed, points[0])
+    trace = trial(person, targets(points, width), _SECONDS, seed, points[0], clicks=MOVES + 1)
     return trace._replace(clicks=trace.clicks[: MOVES + 1])

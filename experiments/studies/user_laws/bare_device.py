@@ -23,6 +23,7 @@ from sim.world.plant import Plant, make_plant
 from sim.world.world import World
 
 PERIOD, STEP, CUTOFF = 1e-3, 5e-4, 150.0  # [s], [s], [Hz]
+AFTER = 0.1  # [s] after a click in which a movement may still come to rest
 
 
 class Trace(NamedTuple):
@@ -46,21 +47,36 @@ class Trace(NamedTuple):
 
 
 @entry_point
-def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Array, rows: Array) -> None:
-    """Let the device push a person, a force [N] a tick (n, 3), and write where the stylus is, shape (n, 10)."""
+def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Array, rows: Array, clicks: int) -> int:
+    """Let the device push a person, a force [N] a tick (n, 3), and write where the stylus is, shape (n, 10).
+
+    Returns how many ticks were written: fewer than n if `AFTER` seconds ago she had pressed the switch so many times.
+    """
+    pressed, last = 0, rows.shape[0]
     for k in range(rows.shape[0]):
+        if k >= last:
+            return last
         t = k * plant.period
         sense_simulated(device, t)
         actuate_simulated(device, pushes[k])
         advance_simulated(device, plant, t, False, applied)
         rows[k, 0:3], rows[k, 3:6], rows[k, 6:9] = device.user.p, device.user.v, device.user.force
         rows[k, 9] = device.user.arm.switch[0]
+        if rows[k, 9] > 0.0:
+            pressed += 1
+            if pressed == clicks:
+                last = min(last, k + 1 + round(AFTER / plant.period))
+    return last
 
 
 def trial(
-    person: Person, wishes: Wishes, seconds: float, seed: int, start: Array, pushes: Array | None = None
-) -> Trace:
-    """A person with something to do for so long [s], from a place in H [m]; `pushes` (n, 3) are the device's [N]."""
+    person: Person, wishes: Wishes, seconds: float, seed: int, start: Array, pushes: Array | None = None,
+    clicks: int = -1,
+) -> Trace:  # fmt: skip
+    """A person with something to do for so long [s], from a place in H [m]; `pushes` (n, 3) are the device's [N].
+
+    It ends earlier where she has clicked so often as is asked for.
+    """
     world = World(SceneConfig(servo_period=PERIOD, physics_step=STEP), "none")
     world.reset(start, rest_pose())
     port = phantom_port(world.model, world.data, PERIOD, CUTOFF)
@@ -69,6 +85,6 @@ def trial(
     n = round(seconds / PERIOD)
     rows, plant = np.zeros((n, 10)), make_plant(world)
     given = np.zeros((n, 3)) if pushes is None else pushes
-    run_bare(device, plant, given, np.zeros((plant.substeps, device.user_torques)), rows)
-    t: Array = PERIOD * np.arange(1, n + 1, dtype=np.float64)
+    rows = rows[: run_bare(device, plant, given, np.zeros((plant.substeps, device.user_torques)), rows, clicks)]
+    t: Array = PERIOD * np.arange(1, len(rows) + 1, dtype=np.float64)
     return Trace(t, rows[:, 0:3], rows[:, 3:6], rows[:, 6:9], t[rows[:, 9] > 0.0])
