@@ -72,6 +72,8 @@ def _kept(command: Any) -> str:
     """What is left of a command that was stopped, and how to go on."""
     if isinstance(command, COMMANDS["run"] | COMMANDS["demo"]) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
+    if isinstance(command, COMMANDS["trials"] | COMMANDS["tune"]) and command.out.exists():
+        return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"
 
 

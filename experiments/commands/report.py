@@ -5,6 +5,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from experiments.results.folder import REPORT
+from experiments.saying import Json, say
 from experiments.working import working
 
 
@@ -14,6 +16,7 @@ class Command:
 
     folder: Positional[Path]
     """Folder of a run."""
+    json: Json = False
 
     def __call__(self) -> int:
         """Draw."""
@@ -21,5 +24,7 @@ class Command:
 
         with working("drawing the report"):
             lines = finish(self.folder)
-        print("\n".join([*lines, f"Written: {self.folder / 'report.html'}; open it in a browser."]))
+        page = str(self.folder / REPORT)
+        told = [*lines, f"Written: {page}; open it in a browser."]
+        say({"lines": lines, "report": page}, self.json, told)
         return 0

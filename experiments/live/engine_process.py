@@ -48,7 +48,7 @@ from sim.errors import SimError
 from sim.loop.field_slice import field_slice
 from sim.loop.loop import configuration_size, shown_configuration
 
-PICTURE = 1.0 / 60.0  # [s] between two pictures
+PICTURE = 0.012  # [s] at least between two pictures: every other block of 8 ms, so that each of the page's is new
 SLICE = 0.25  # [s] between two looks at the field
 SLICE_WIDTH = 0.14  # [m]
 IDLE = 0.01  # [s] between two looks at the page while nothing runs

@@ -62,7 +62,7 @@ class Page:
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
         self.desk, self.driver = Desk(folder, self.say), Driver()
         self._said: list[str] = []
-        self._closed = threading.Event()
+        self._closed, self._turn = threading.Event(), threading.RLock()
         with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
@@ -88,12 +88,11 @@ class Page:
         """Show a line to everybody."""
         self._said = [*self._said, line][-LINES:]
         if hasattr(self, "_lines"):
-            self._lines.content = "".join(
-                f'<p style="margin:.15rem .75rem;font-size:.8rem">{html.escape(one)}</p>' for one in self._said
-            )
+            lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._said)
+            self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
-        """What a browser's event does: only if it drives, and what is refused is said on the page."""
+        """What a browser's event does: only if it drives, between two pictures; what is refused is said on the page."""
 
         def done(event: Any) -> None:
             if event.client_id is None:
@@ -106,7 +105,8 @@ class Page:
                     )  # fmt: skip
                 return
             try:
-                does(event)
+                with self._turn:
+                    does(event)
             except (ControllerError, ModelError, SimError, OSError) as error:
                 self.say(str(error))
 
@@ -160,19 +160,21 @@ class Page:
 
     def serve(self) -> None:
         """Draw until `close` is called, or the servo's process ends."""
-        written = 0.0
+        written, due = 0.0, 0.0
         while not self._closed.is_set():
             begin = time.perf_counter()
-            self.desk.poll()
-            if self.desk.builds != self._builds:
-                self._set_stage()
-            self._push()
-            self._draw()
-            if begin - written > POLL:
-                written = begin
-                self._write()
-            took = time.perf_counter() - begin
-            self._closed.wait(max(FASTEST - took, took * (1.0 / SHARE - 1.0), 1e-3))
+            with self._turn:  # events come in threads of their own
+                self.desk.poll()
+                if self.desk.builds != self._builds:
+                    self._set_stage()
+                self._push()
+                self._draw()
+                if begin - written > POLL:
+                    written = begin
+                    self._write()
+            now = time.perf_counter()
+            due = max(due + FASTEST, begin + (now - begin) / SHARE)
+            self._closed.wait(max(due - now, 1e-3))
 
     def close(self) -> None:
         """Serve no more."""
@@ -256,6 +258,7 @@ class Page:
                 ball.rest(desk.target if desk.holds else now["p"])
             stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
+        self.server.flush()  # viser would wait 1/60 s from the end of the last sending, and leave pictures out
 
     def _write(self) -> None:
         desk = self.desk

@@ -1,18 +1,27 @@
 """Smoothness of a movement from its speed: spectral arc length, and log dimensionless jerk."""
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from controllers.state import Array
 
 CUTOFF = 20.0  # [Hz] of the profile that is differentiated twice: above what a hand does, below what encoders add
 RATE = 100.0  # [Hz] at which it is taken
+_SETTLED = 2.0  # periods of the cutoff after which the filter has forgotten an end, to some 1e-4
 
 
 def speed_profile(velocity: Array, rate: float) -> Array:
-    """Speed |v| of a sampled velocity (n, 3), low-passed without lag (Butterworth, order 4) and taken at `RATE`."""
-    sections = butter(2, CUTOFF, fs=rate, output="sos")
-    smooth = sosfiltfilt(sections, velocity, axis=0) if len(velocity) > 30 else velocity
+    r"""Speed |v| of a sampled velocity (n, 3), low-passed without lag and taken at `RATE`.
+
+    A Butterworth filter of order 2 forwards and backwards, which lets through :math:`1/(1 + (f/f_c)^4)` of a
+    frequency; over its ends a velocity is continued by its reflection in them. A short one is left as it is.
+    """
+    margin = round(_SETTLED / CUTOFF * rate)
+    smooth = velocity
+    if len(velocity) > margin:
+        before, after = 2.0 * velocity[0] - velocity[margin:0:-1], 2.0 * velocity[-1] - velocity[-2 : -margin - 2 : -1]
+        longer = np.concatenate([before, velocity, after])
+        share = 1.0 / (1.0 + (np.fft.rfftfreq(len(longer), 1.0 / rate) / CUTOFF) ** 4)
+        smooth = np.fft.irfft(np.fft.rfft(longer, axis=0) * share[:, None], len(longer), axis=0)[margin:-margin]
     return np.linalg.norm(smooth[:: max(1, round(rate / RATE))], axis=1)
 
 

@@ -8,6 +8,7 @@ from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
+from models.mocap.preparation.poses import sole_points
 
 FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
@@ -18,8 +19,6 @@ SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go w
 
 def longest_flight(clip: Clip) -> float:
     """Longest time without a sole near the floor [s]."""
-    from models.mocap.preparation.poses import sole_points  # brings signal processing with it
-
     flies = (sole_points(clip.poses)[:, :, 2] - CONTACT_RADIUS).min(axis=1) > FLIES
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flies.astype(int), [0]))))
     return float((edges[1::2] - edges[::2]).max(initial=0)) / clip.fps

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -184,7 +185,7 @@ def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> 
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
-        course=lambda damping: course_of(curve, damping), moves=True, expressive=place.expressive,
+        course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
         held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off_pace(played, made.loops, curve.duration)),
     )  # fmt: skip
 
@@ -199,7 +200,7 @@ def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapP
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
-        course=lambda damping: course_of(curve, damping),
+        course=cache(partial(course_of, curve)),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
         remarks=between if curve.periodic else (ends, *between),
     )  # fmt: skip

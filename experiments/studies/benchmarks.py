@@ -34,6 +34,7 @@ from experiments.setups.wiring import wire
 from experiments.studies.bench_figures import Figure, tell
 from experiments.studies.field_cost import heaviest_field, tick_microseconds
 from experiments.studies.figure_cost import figure_cost
+from experiments.studies.page_cost import picture_microseconds
 from experiments.studies.recorder_cost import recorder_cost
 from experiments.studies.tick_cost import MODES, STEP, prepared, tick_cost
 from experiments.studies.trial_cost import trial_cost
@@ -104,6 +105,7 @@ def figures() -> Iterator[Figure]:
     yield Figure("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
     yield Figure("trials on two threads / twice one", trials.scaling, at_least=0.9)
     yield Figure("memory after 2000 short trials / after 400", trials.grown, at_most=1.01)
+    yield in_steps("a picture of the live page", picture_microseconds(wire(config, clips)), 100.0)
     start = libraries_seconds()
     yield Figure(
         "second start of hvf to its first tick", second_start_seconds() / start, "× its libraries", at_most=3.0

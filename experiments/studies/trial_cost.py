@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from experiments.config.part import to_json
 from experiments.trials.database import Database
 from experiments.trials.drive import run_missing, warm
 from experiments.trials.plan import Trial, planned
-from experiments.trials.run_trial import SHELF, Task
+from experiments.trials.run_trial import SHELF, Row, Task
 from experiments.trials.study_config import StudyConfig, study_from
 from experiments.trials.threads import Threads
 
@@ -50,7 +50,7 @@ def trial_cost() -> TrialCost:
     """Measure; wall-clock times, so for a machine that does nothing else."""
     quiet = Console(stderr=True, quiet=True)
     more, one = overhead(6, 5.0, quiet)
-    _, two = _run(_study(6, 5.0), _THREADS, quiet)
+    _, two = _run(_study(6, 5.0), Threads(_THREADS), quiet)
     return TrialCost(more, one / (_THREADS * two), grown(_MANY, quiet), start_seconds())
 
 
@@ -58,16 +58,29 @@ def overhead(users: int, seconds: float, console: Console) -> tuple[float, float
     """Processor time of planning, driving and database over that of the trials, and the time of all of it [s]."""
     warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, console)
     begin = time.process_time()
-    own, whole = _run(_study(users, seconds), 1, console)
+    own, whole = _run(_study(users, seconds), Threads(1), console)
     return (time.process_time() - begin) / own - 1.0, whole
 
 
 def grown(trials: int, console: Console) -> float:
-    """Memory of this process after so many short trials, over that after a fifth of them."""
-    _run(_study(trials // 20, _SHORT), 1, console)
-    before = psutil.Process().memory_info().rss
-    _run(_study(trials // 4, _SHORT), 1, console)
-    return psutil.Process().memory_info().rss / before
+    """Memory of this process after so many short trials of a study, over that after a fifth of them."""
+    watched = _Watched(trials // 5)
+    _run(_study(trials // 4, _SHORT), watched, console)
+    return psutil.Process().memory_info().rss / watched.then
+
+
+class _Watched(Threads):
+    """One thread, whose process's memory is noted after a number of trials."""
+
+    def __init__(self, after: int):
+        super().__init__(1)
+        self._after, self.then = after, 0
+
+    def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
+        for done, row in enumerate(super().rows(tasks)):
+            if done == self._after:
+                self.then = psutil.Process().memory_info().rss
+            yield row
 
 
 def start_seconds() -> float:
@@ -94,13 +107,13 @@ def _study(users: int, seconds: float) -> StudyConfig:
     return study_from(values, "cost")
 
 
-def _run(study: StudyConfig, threads: int, console: Console) -> tuple[float, float]:
+def _run(study: StudyConfig, executor: Threads, console: Console) -> tuple[float, float]:
     """The trials' own processor time, and the time that the study took [s]."""
     with tempfile.TemporaryDirectory() as folder, Database(Path(folder) / "s.sqlite", "cost", "cost", "") as database:
         begin = time.perf_counter()
         trials: tuple[Trial, ...] = planned(study)
         told = {trial.key: {"user": trial.meeting.user} for trial in trials}
-        run_missing(trials, database, Threads(threads), "", console, told)
+        run_missing(trials, database, executor, "", console, told)
         return sum(row.seconds for row in database.rows()), time.perf_counter() - begin
 
 

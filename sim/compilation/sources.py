@@ -2,7 +2,11 @@
 
 import ast
 import hashlib
+import json
+import os
+import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -35,20 +39,58 @@ def sources_hash(module: str) -> str:
     str
         Hexadecimal digits.
     """
+    known = _Known(cache_folder() / "sources.json")
     found: dict[str, str] = {}
     waiting = [module]
     while waiting:
         name = waiting.pop()
         if name in found or (path := _file(name)) is None:
             continue
-        tree = ast.parse(path.read_bytes())
-        found[name] = ast.dump(tree)
-        waiting += _imported(tree)
+        found[name], imported = known.read(path)
+        waiting += imported
+    known.keep()
     libraries = [f"{library} {version(library)}" for library in _LIBRARIES]
     # Libraries round by the processor's own instructions.
     processor = [llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()]
     text = "\n".join([*(f"{name} {found[name]}" for name in sorted(found)), *libraries, *processor])
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+class _Known:
+    """Hashes and imports of files, kept by their times and sizes: to parse a hundred takes longer than to import them.
+
+    Parameters
+    ----------
+    file : Path
+        Where they are kept; it may be missing.
+    """
+
+    def __init__(self, file: Path):
+        self._file, self._new = file, False
+        self._entries: dict[str, tuple[list[int], str, list[str]]] = {}
+        with suppress(OSError, ValueError, TypeError):
+            self._entries = dict(json.loads(file.read_text(encoding="utf-8")))
+
+    def read(self, path: Path) -> tuple[str, list[str]]:
+        """Hash of a file's code, and the names that it imports."""
+        stamp = [path.stat().st_mtime_ns, path.stat().st_size]
+        kept = self._entries.get(str(path))
+        if kept is None or kept[0] != stamp:
+            tree = ast.parse(path.read_bytes())
+            kept = stamp, hashlib.sha256(ast.dump(tree).encode()).hexdigest(), list(_imported(tree))
+            self._entries[str(path)], self._new = kept, True
+        return kept[1], kept[2]
+
+    def keep(self) -> None:
+        """Write what is new; a folder that cannot be written to is done without."""
+        if not self._new:
+            return
+        with suppress(OSError):
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=self._file.parent, suffix=".tmp")
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                json.dump({path: entry for path, entry in self._entries.items() if Path(path).exists()}, file)
+            os.replace(name, self._file)
 
 
 def _file(name: str) -> Path | None:

@@ -129,10 +129,15 @@ def _described(function: Function) -> tuple[bytes, _Others]:
     return repr(items).encode(), others
 
 
+@cache
+def _disassembled(code: python_types.CodeType) -> tuple[dis.Instruction, ...]:
+    return tuple(dis.get_instructions(code))
+
+
 def _code(code: python_types.CodeType, name: str) -> tuple[object, ...]:
     """Instructions with what they name: not where they are written, nor a docstring, which none of them loads."""
     instructions: list[object] = []
-    for instruction in dis.get_instructions(code):
+    for instruction in _disassembled(code):
         value = instruction.argval
         if isinstance(value, python_types.CodeType):
             value = _code(value, name)
@@ -166,7 +171,7 @@ def _global_names(code: python_types.CodeType) -> set[tuple[str, ...]]:
     """Names of globals, each with the attributes that are taken of it one after the other."""
     found: set[tuple[str, ...]] = set()
     chain: tuple[str, ...] = ()
-    for instruction in dis.get_instructions(code):
+    for instruction in _disassembled(code):
         if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
             found |= {chain} if chain else set()
             chain = (instruction.argval,)

@@ -4,6 +4,8 @@ Its clock runs by its own steps, one a command, so that a run with it is the sam
 it is, with a tremor, until the motors have been on for a while, and then lets go.
 """
 
+import math
+
 import numpy as np
 
 from controllers.state import Array
@@ -51,7 +53,7 @@ class EmulatedPhantom:
     start : Array
         Where the stylus is at first, in H [m].
     linkage : Linkage
-        What it is.
+        What it is. Torques act after its delay, within a physics step by the share of the step.
     arm : Arm, optional
         The hand, once it has let go; relaxed by default.
     holds : float
@@ -62,7 +64,7 @@ class EmulatedPhantom:
     Raises
     ------
     SimError
-        If the start is out of reach, or the delay not below a period.
+        If the start is out of reach, or the delay more than a period less half a physics step.
     """
 
     def __init__(
@@ -76,10 +78,16 @@ class EmulatedPhantom:
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
         self._plant, self._switch, self._offset = make_plant(self.world), float(presses), np.array(linkage.offset)
         steps = self._plant.substeps
-        late = round(linkage.delay / scene.servo_period * steps)
+        # Positions of a semi-implicit step lead by half a step what the torques of a continuous time do.
+        late = linkage.delay / scene.servo_period * steps + 0.5
         if late > steps:
-            raise SimError(f"a delay of {linkage.delay} s is more than the servo period {scene.servo_period} s")
-        self._spans = [(s, flag) for s, flag in ((late, False), (steps - late, True)) if s > 0]
+            raise SimError(
+                f"a delay of {linkage.delay} s; expected at most {(1.0 - 0.5 / steps) * scene.servo_period:.4g} s, the "
+                "servo period less half a physics step"
+            )
+        whole, part = int(late), late % 1.0
+        spans = (whole, 0.0), (1 if part > 0.0 else 0, 1.0 - part), (steps - math.ceil(late), 1.0)
+        self._spans = [(n, new) for n, new in spans if n > 0]
         self._tremor = tremor(600.0, 2e-3)
         self._holding = make_hand(Arm(path=start + self._tremor, period=2e-3)) if holds > 0.0 else None
         self._relaxed, self._holds, self._on = make_hand(arm or Arm()), holds, 0.0
@@ -117,7 +125,7 @@ class EmulatedPhantom:
         for steps, new in self._spans:
             span = steps / self._plant.substeps * self._plant.period
             plant = self._plant._replace(substeps=steps, period=span)
-            self.world.data.ctrl[self._motors] = self.torque if new else self._last
+            self.world.data.ctrl[self._motors] = new * self.torque + (1.0 - new) * self._last
             pass_time(plant, self.port, user, t, self._applied[:steps])
             t += span
         self._last[:] = self.torque

@@ -8,6 +8,7 @@ from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import Array
+from sim.compilation.kept_call import KeptCall
 from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
@@ -88,7 +89,10 @@ class Ticker:
             raise SimError(f"the servo's device is a {type(parts.servo.device).__name__}; expected an Exchange")
         self.parts, self._device = parts, parts.servo.device
         self.gated = GateMemory.of(parts.gate, parts.driver.identity.own_weight)
-        self._ticks, self._frames = make_logs(parts.servo, 1)
+        self._ticks, frames = make_logs(parts.servo, 1)
+        field = parts.servo.field
+        self._block = KeptCall(run_block, (parts.servo,), (1, False, self._ticks, frames))
+        self._gate = KeptCall(gated_tick, (self._device, self.gated, field.limiter, field.tank, field.force))
         self._timeout = READ_SHARE * parts.gate.period
         self.row, self._number = np.zeros(ROW_SIZE), np.zeros(1)
         self._views = {name: self.row[place] for name, place in _PLACES.items()}
@@ -143,9 +147,8 @@ class Ticker:
             self.fail(found.fault, found.value)
         if request == CLEAR:
             rearm_servo(parts.servo)
-        run_block(parts.servo, number, 1, False, self._ticks, self._frames)
-        field = parts.servo.field
-        gated_tick(device, self.gated, field.limiter, field.tank, field.force, request)
+        self._block(number)
+        self._gate(request)
         try:
             parts.driver.write(self.gated.torque, self.gated.pushes)
         except DriverFault as found:

@@ -21,13 +21,15 @@ The weights' torques W₂ cos θ₂ and W₃ sin θ₃ are found as well, for th
 percent of a published mass would else be an offset of a degree. All are in units of the commanded torque: a wrong
 torque constant scales them.
 
-Intervals are from the estimating equations themselves (Huber 1967; Newey & West, Econometrica 55, 1987, for windows
-that overlap), wide enough for all parameters at once (Bonferroni), and for what no residual shows: a share `HIDDEN` of
-what is left may be a torque in the shape that moves a parameter most. So a device that the equations describe badly
-leaves more, and has wider intervals.
+Intervals have two parts. One is for noise, from the estimating equations themselves (Huber 1967; Newey & West,
+Econometrica 55, 1987, for windows that overlap), wide enough for all parameters at once (Bonferroni). The other is for
+what the equations leave out, a torque ripple or a friction that changes from place to place, which is the same again in
+every lap, so that no average takes it out: what is left beyond the encoders' noise may be a torque in the shape in time
+that moves a parameter most. How noisy the encoders are is told by the readings' sixth differences, to which no motion
+of a hand's or a device's bandwidth contributes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -47,21 +49,19 @@ NAMES = (
 """Of the parameters: [N m], [N m s/rad], added [kg m²], [s], [rad], W₂ and W₃ [N m]."""
 _DELAY, _OFFSET, _WEIGHT = 9, 10, 12
 
-WINDOW = 0.12
-"""Length of ψ [s]: its bandwidth, some 15 Hz, is above the motion's and below the encoders' noise."""
+WINDOW = 0.2
+"""Length of ψ [s]: its bandwidth, some 10 Hz, is above the motion's and below the encoders' noise. With 0.12 s the
+noise of the rates, which are regressors, moves frictions by two standard errors towards each other."""
 _HOP = 0.25  # of a window, from one to the next
 _SMOOTH = 4  # readings on either side, over which the rate is taken that tells friction's direction
-_SLOWEST = 0.05  # [rad/s] below which that direction is not sure
+_SLOWEST = 0.1  # [rad/s] below which that direction is not sure
 _STEPS = 12  # of Gauss–Newton
 _LONGEST = 1.999  # periods of delay for which there are torques in the equations
-_LAGS = 8  # windows that share noise with one: four overlap
+_LAGS = 4  # windows that share noise with one: they overlap, and noise of readings is white
 CONFIDENCE = 0.95
 """Of all intervals together."""
-HIDDEN = 0.15
-"""Share of what is left that may be hidden in the parameters. What the equations leave out is another torque in every
-motion: in simulation half a step of the physics, by which torques act early, and a Coulomb friction that sets in softly
-and is taken for a viscous one. A third of this share was picked on the tests' curve (devices of seeds 3000 to 3005)
-and covered 3006 to 3008, but it takes five sixths for two laps of a level circle with a wave."""
+_DIFFERENCES, _GAIN = 6, 924  # and by how much that many of them amplify white noise's variance: binomial 12 over 6
+_SURE = 1.5  # times the variance that the encoders explain: one of white noise is taken for no more
 
 
 class Motion(NamedTuple):
@@ -134,10 +134,11 @@ class _Equations(NamedTuple):
     weights: Array  # ψ at the midpoints, times the interval (windows, length)
     slopes: Array  # ψ̇, likewise
     rates: Array  # (windows, length, 3)
+    smooth: Array  # the same over 2 _SMOOTH + 1 readings, for what is not linear in them
     middles: Array  # θ as read, likewise
-    signs: Array
     torque: Array
     period: float
+    grain: Array  # standard deviation of the readings' noise [rad], shape (3,)
     usable: npt.NDArray[np.bool_]  # (windows, 3)
     breaks: npt.NDArray[np.bool_]  # whether a window begins a motion
 
@@ -181,19 +182,36 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
     left, sensitivity = _residuals(equations, values)
     quantile = float(ndtri(1.0 - 0.5 * (1.0 - CONFIDENCE) / len(NAMES)))
     noise = quantile * np.sqrt(np.diag(_covariance(equations, sensitivity, left, scale)))
+    margins = noise + _moved_most(equations, sensitivity, scale, _left_out(equations, left, values[6:9]))
     sizes = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
-    margins = np.hypot(noise, HIDDEN * _moved_most(equations, sensitivity, scale))
     unexplained = [np.mean(left[equations.usable[:, i], i] ** 2) / sizes[i] ** 2 for i in range(3)]
     return Identified(values, margins, int(counts.sum()), float(np.sqrt(np.mean(unexplained))))
 
 
-def _moved_most(equations: _Equations, sensitivity: Array, scale: Array) -> Array:
-    """How far torques as large as what is left, `scale` (3,) [N m], move each parameter in the worst shape in time.
+def _left_out(equations: _Equations, left: Array, inertia: Array) -> Array:
+    """RMS of the torque that is left beyond what the encoders' noise explains, shape (3,) [N m].
+
+    In a window the noise n of a reading is Σ (ψ̇ₖ₋₁ − ψ̇ₖ) M nₖ, for momentum is M times a difference of readings.
+    """
+    angles = tuple(np.moveaxis(equations.middles[:, len(equations.weights) // 2], -1, 0))
+    rows = mass_matrix.py_func(angles)
+    gain = np.linalg.norm(np.diff(equations.slopes, prepend=0.0, append=0.0)) / equations.period
+    found = np.zeros(3)
+    for i in range(3):
+        used = equations.usable[:, i]
+        by_joint = [(rows[i][j] + (inertia[i] if i == j else 0.0)) * gain * equations.grain[j] for j in range(3)]
+        explained = np.sum([np.broadcast_to(part, used.shape)[used] ** 2 for part in by_joint], axis=0)
+        found[i] = np.sqrt(max(0.0, float(np.mean(left[used, i] ** 2) - _SURE * np.mean(explained))))
+    return found
+
+
+def _moved_most(equations: _Equations, sensitivity: Array, scale: Array, torque: Array) -> Array:
+    """How far torques of an RMS, shape (3,) [N m], move each parameter in the worst shape in time.
 
     By Cauchy and Schwarz the norm of the parameter's row of the pseudo-inverse, times √n.
     """
-    rows, _ = _stacked(equations, sensitivity, np.zeros(equations.usable.shape), scale)
-    return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows), axis=1)
+    rows, sizes = _stacked(equations, sensitivity, np.broadcast_to(torque, equations.usable.shape), scale)
+    return np.sqrt(len(rows)) * np.linalg.norm(np.linalg.pinv(rows) * sizes, axis=1)
 
 
 def _first_guess() -> Array:
@@ -207,6 +225,8 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
     """Windows over all motions; the period is taken from the clock."""
     period = float(np.median(np.concatenate([np.diff(motion.clock) for motion in motions])))
     length, hop = round(WINDOW / period), max(1, round(_HOP * WINDOW / period))
+    wiggles = np.concatenate([np.diff(motion.theta, _DIFFERENCES, axis=0) for motion in motions])
+    grain = np.sqrt(np.mean(wiggles**2, axis=0) / _GAIN)
     s = (np.arange(length) + 0.5) / length
     # ψ = (8/3) sin⁴(π s)/W has a mean of 1/W, and three derivatives that end at zero.
     weights = 8.0 / 3.0 * np.sin(np.pi * s) ** 4 / length
@@ -225,9 +245,9 @@ def _equations(motions: Sequence[Motion]) -> _Equations:
         usable = np.min(np.abs(smooth[at]), axis=1) > _SLOWEST
         new = np.zeros(len(starts), dtype=bool)
         new[:1] = True
-        found.append((rates[at], middles[at], np.sign(smooth[at]), commands, usable, new))
-    rates, middles, signs, commands, usable, new = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return _Equations(weights, slopes, rates, middles, signs, commands, period, usable, new)
+        found.append((rates[at], smooth[at], middles[at], commands, usable, new))
+    rates, smooth, middles, commands, usable, new = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return _Equations(weights, slopes, rates, smooth, middles, commands, period, grain, usable, new)
 
 
 def _mean_torque(equations: _Equations, delay: float) -> Array:
@@ -244,19 +264,17 @@ def _mean_torque(equations: _Equations, delay: float) -> Array:
 def _mechanics(equations: _Equations, values: Array) -> Array:
     """∫ψ̇ M θ̇ + ∫ψ (Cᵀθ̇ − N) with the offset and the weights of `values`, shape (windows, 3)."""
     offset = np.array([0.0, values[_OFFSET], values[_OFFSET + 1]])
-    theta, rate = np.moveaxis(equations.middles - offset, -1, 0), np.moveaxis(equations.rates, -1, 0)
-    zero = np.zeros_like(theta[0])
-
-    def times(matrix: Any, turned: bool) -> list[Array]:
-        rows = zip(*matrix, strict=True) if turned else matrix
-        return [row[0] * rate[0] + row[1] * rate[1] + row[2] * rate[2] for row in rows]
-
-    angles, speeds = (theta[0], theta[1], theta[2]), (rate[0], rate[1], rate[2])
-    momentum = times(mass_matrix.py_func(angles), False)
-    turned = times(coriolis_matrix.py_func(angles, speeds), True)
-    weight = zero, values[_WEIGHT] * np.cos(theta[1]), values[_WEIGHT + 1] * np.sin(theta[2])
+    theta1, theta2, theta3 = angles = tuple(np.moveaxis(equations.middles - offset, -1, 0))
+    smooth = tuple(np.moveaxis(equations.smooth, -1, 0))
+    momentum = _times(mass_matrix.py_func(angles), np.moveaxis(equations.rates, -1, 0))
+    turned = _times(zip(*coriolis_matrix.py_func(angles, smooth), strict=True), smooth)
+    weight = np.zeros_like(theta1), values[_WEIGHT] * np.cos(theta2), values[_WEIGHT + 1] * np.sin(theta3)
     w, v = equations.weights, equations.slopes
     return np.stack([p @ v + (c - n) @ w for p, c, n in zip(momentum, turned, weight, strict=True)], axis=1)
+
+
+def _times(rows: Iterable[Any], vector: Sequence[Array] | Array) -> list[Array]:
+    return [row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in rows]
 
 
 def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
@@ -265,7 +283,7 @@ def _residuals(equations: _Equations, values: Array) -> tuple[Array, Array]:
     torque = _mean_torque(equations, float(values[_DELAY]))
     base, step = _mechanics(equations, values), 1e-5
     turning = np.einsum("k,wki->wi", equations.weights, equations.rates)
-    sign = np.einsum("k,wki->wi", equations.weights, equations.signs)
+    sign = np.einsum("k,wki->wi", equations.weights, np.sign(equations.smooth))
     swing = np.einsum("k,wki->wi", equations.slopes, equations.rates)
     left = torque[:, 0] + base + inertia * swing - viscous * turning - coulomb * sign
     sensitivity = np.zeros((*left.shape, len(NAMES)))

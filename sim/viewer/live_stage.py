@@ -89,8 +89,8 @@ class LiveStage:
         self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
         if self._root >= 0:
             self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
-        if self._root >= 0 and ghost:
-            self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
+        self._ghost_label = self._label("ghost", ghost, GHOST_AT + np.array([0.0, 0.0, 2.0]))
+        self._ghost_label.visible = self._has_ghost = self._root >= 0 and bool(ghost)
 
     @property
     def configuration_size(self) -> int:
@@ -101,6 +101,7 @@ class LiveStage:
         """Whether the ghost is seen, or something else stands in its place."""
         if self._ghost.visible != shows:
             self._ghost.visible = shows
+            self._ghost_label.visible = shows and self._has_ghost
 
     def draw_course(self, k: int, points: Array) -> None:
         """Draw one of the curves where it is now: points in the hand frame [m], shape (m, 3)."""

@@ -26,7 +26,7 @@ class Linkage:
     inertia : three floats
         Added to the published one at the joints, as a rotor's or a handle's [kg m²]; may be negative.
     delay : float
-        From a command to the motors' torque [s], below a servo period; in steps of the physics.
+        From a command to the motors' torque [s], below a servo period.
     offset : three floats
         Encoder reading minus angle [rad].
 

@@ -1,6 +1,8 @@
 """The world as it is stepped: the compiled model, its state, and how both are put where a run begins."""
 
+from copy import copy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, TypeAlias, get_args
 
 import mujoco
@@ -57,10 +59,10 @@ class World:
     def __post_init__(self) -> None:
         if self.kind not in get_args(FigureKind):
             raise SimError(f"figure is {self.kind!r}; expected one of {', '.join(get_args(FigureKind))}")
-        model = world_model(self.config) if self.kind == "physical" else device_world_model(self.config)
+        model, figure = (copy(compiled) for compiled in _models(self.config, self.kind))
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "data", mujoco.MjData(model))
-        object.__setattr__(self, "figure", figure_model(self.config.stature, self.config.mass))
+        object.__setattr__(self, "figure", figure)
 
     def reset(
         self,
@@ -158,6 +160,13 @@ def place_stylus(
     ):
         joint = model.joint(PHANTOM + name)
         data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = angle, rate
+
+
+@lru_cache(maxsize=8)
+def _models(config: SceneConfig, kind: FigureKind) -> tuple[mujoco.MjModel, mujoco.MjModel]:
+    """World and figure as they are compiled, of which every world takes a copy."""
+    model = world_model(config) if kind == "physical" else device_world_model(config)
+    return model, figure_model(config.stature, config.mass)
 
 
 def phantom_angles(p_H: Array) -> tuple[float, float, float]:

@@ -144,7 +144,7 @@ def test_every_command_has_a_file_of_its_name_and_figures_as_json() -> None:
     files = {path.stem for path in (ROOT / "experiments" / "commands").glob("*.py")} - {"__init__"}
     assert files == set(commands.NAMES) == set(COMMANDS)
     with_json = {command for command, action in OPTIONS if "--json" in action.option_strings}
-    silent = {"live", "report", "picture", "render", "figures", "bench"}  # draw, or are watched
+    silent = {"live", "picture", "render", "figures", "bench"}  # draw, or are watched
     hardware = {f"hardware {name}" for name in ("list", "doctor", "run", "calibrate", "identify")}
     for name in (set(commands.NAMES) | hardware) - silent - {"hardware"}:
         assert f"hvf {name}" in with_json

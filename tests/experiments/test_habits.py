@@ -1,15 +1,19 @@
 """What the command says of itself: the next step, how long it takes, how to go on after Ctrl-C."""
 
+import contextlib
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from experiments.cli import main, parsed
+from experiments.trials.study import DATABASE
 from experiments.welcome import WELCOME
 from experiments.working import left, working
 from sim.recording.recording import Recording
@@ -48,20 +52,27 @@ def _hear() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.mark.slow
-def test_ctrl_c_leaves_a_valid_recording_and_says_how_to_go_on(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    command = [sys.executable, "-m", "experiments.cli", "run", "--figure", "none", "--seconds", "2000", "--out"]
+def stopped(words: list[str], ready: Callable[[], bool], wait: float) -> str:
+    """Run a command, press Ctrl-C so long [s] after it is ready, and return what it says on stderr."""
     process = subprocess.Popen(
-        [*command, str(out)], stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear
-    )
+        [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        start_new_session=True, preexec_fn=_hear,
+    )  # fmt: skip
     deadline = time.monotonic() + 120.0
-    while not (out / "run.h5").exists() and time.monotonic() < deadline:
+    while not ready() and time.monotonic() < deadline:
         time.sleep(0.1)
-    time.sleep(1.5)
+    time.sleep(wait)
     os.killpg(process.pid, signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130, said
+    return said
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_valid_recording_and_says_how_to_go_on(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["run", "--figure", "none", "--seconds", "2000", "--out", str(out)]
+    said = stopped(words, (out / "run.h5").exists, wait=1.5)
     assert f"hvf report {out}" in said.replace("\n", " ")
     with Recording(out / "run.h5") as recording:
         assert not recording.complete
@@ -69,3 +80,39 @@ def test_ctrl_c_leaves_a_valid_recording_and_says_how_to_go_on(tmp_path: Path) -
     assert main(["report", str(out)]) == 0
     assert "The run was stopped: " in (out / "report.html").read_text(encoding="utf-8")
     assert (out / "summary.json").exists()
+
+
+STUDY = """name = "Stopped"
+seconds = 2.0
+repetitions = 20
+[run]
+figure = "none"
+[users]
+number = 4
+[factors]
+stiffness = [100, 300]
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_the_trials_that_had_ended_and_says_that_the_same_command_goes_on(tmp_path: Path) -> None:
+    pytest.importorskip("statsmodels", reason="needs the study extra")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    words = ["trials", str(tmp_path / "study.toml"), "--out", str(tmp_path / "study")]
+    database = f"file:{tmp_path / 'study' / DATABASE}?mode=ro"
+
+    def kept() -> int:
+        with (
+            contextlib.suppress(sqlite3.OperationalError),
+            sqlite3.connect(database, uri=True) as rows,
+        ):
+            return rows.execute("select count(*) from trials").fetchone()[0]
+        return 0
+
+    said = stopped(words, lambda: kept() > 0, wait=0.0)
+    assert "the same command goes on" in said
+    assert str(tmp_path / "study") in said
+    before = kept()
+    assert 0 < before < 160
+    assert main(words) == 0
+    assert kept() == 160

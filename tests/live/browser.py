@@ -65,6 +65,18 @@ def choose(tab: Any, label: str, option: str) -> None:
     tab.get_by_role("option", name=option, exact=True).click()
 
 
+def beside(tab: Any, label: str) -> Any:
+    """What is to be filled in, or moved, beside a label."""
+    return tab.get_by_text(label, exact=True).first.locator("xpath=ancestor::*[.//input][1]")
+
+
+def fill(tab: Any, label: str, value: str) -> None:
+    """Type into the field beside a label."""
+    typed = beside(tab, label).locator("input:visible")
+    typed.fill(value)
+    typed.press("Enter")
+
+
 @contextlib.contextmanager
 def drag(
     tab: Any, where: Callable[[], tuple[float, float]], by: tuple[float, float], patience: float = PATIENCE
@@ -146,12 +158,12 @@ class Served:
         self.page.close()
 
 
-def on_screen(p_H: np.ndarray, view: str = "both") -> tuple[float, float]:
-    """Where a point of the hand frame is seen in a tab, in pixels."""
-    camera = camera_of(VIEWS[view], WIDTH, HEIGHT)
+def on_screen(p_H: np.ndarray, height: int = HEIGHT) -> tuple[float, float]:
+    """Where a point of the hand frame is seen in a tab that is so high, in pixels."""
+    camera = camera_of(VIEWS["both"], WIDTH, height)
     forward = camera.look_at - camera.position
     forward /= np.linalg.norm(forward)
     right, up = screen_axes(forward)
     way = drawn_at(p_H) - camera.position
-    scale = 0.5 * HEIGHT / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
-    return 0.5 * WIDTH + scale * (way @ right), 0.5 * HEIGHT - scale * (way @ up)
+    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (way @ forward)
+    return 0.5 * WIDTH + scale * (way @ right), 0.5 * height - scale * (way @ up)

@@ -17,6 +17,7 @@ import numpy as np
 
 from experiments.config.words import run_config
 from tests.live.browser import ARGUMENTS, CHROMIUM, Served, drag, new_tab, on_screen
+from tests.live.watcher import sent_and_drawn
 
 WITH, ALONE, STRETCHES = 24.0, 15.0, 5  # [s] of a stretch with the page and without, and how many of either
 REMEMBERED = 9.0  # [s] that the engine's percentiles go back: a little more than 1000 blocks of 8 ms
@@ -78,6 +79,8 @@ def main() -> int:
     took_hold: list[bool] = []
     with_page: list[Stretch] = []
     try:
+        sent, drawn = sent_and_drawn(served.page, ALONE)
+        print(f"to a browser that needs no time to draw: {sent:.1f} of {drawn:.1f} pictures a second", flush=True)
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
             for _ in range(stretches):

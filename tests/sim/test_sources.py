@@ -18,6 +18,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for package in ("models", "controllers"):
         shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("*.bvh", "__pycache__"))
     monkeypatch.setattr(sources, "_ROOT", tmp_path)
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "cache"))
     yield tmp_path
     sources_hash.cache_clear()
 
@@ -44,3 +45,14 @@ def test_a_comment_and_a_change_elsewhere_are_the_same_hash(tree: Path) -> None:
     before = hashed()
     assert edited(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
     assert edited(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
+
+
+def test_what_is_kept_of_files_gives_the_same_hash_and_nothing_kept_or_nonsense_does_no_harm(tree: Path) -> None:
+    first = hashed()
+    (kept,) = (tree / "cache").rglob("sources.json")
+    assert hashed() == first
+    for nonsense in ("[1, 2", "7.5", "[[1]]"):
+        kept.write_text(nonsense, encoding="utf-8")
+        assert hashed() == first
+    kept.unlink()
+    assert hashed() == first

@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
@@ -39,6 +38,8 @@ def smoothed(clip: Clip, corner: float) -> Clip:
     """The motion without what is faster than a corner frequency [Hz]; a closed one goes on over its ends."""
     if clip.n_frames < 8 or corner >= 0.4 * clip.fps:
         return clip
+    from scipy.signal import butter, sosfiltfilt  # brings scipy.stats with it; a run begins without them
+
     sections = np.asarray(butter(2, corner / (clip.fps / 2.0) / _PASSES, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy import signal
 
-from experiments.results.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
+from experiments.results.smoothness import CUTOFF, RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
 
 
 def reach(seconds: float, rate: float = 100.0, way: float = 1.0) -> np.ndarray:
@@ -34,6 +35,14 @@ def test_tremor_makes_a_movement_less_smooth_by_both() -> None:
     shaken = reach(2.0) + 0.3 * (1.0 + np.sin(2.0 * np.pi * 9.0 * t))
     for measure in (spectral_arc_length, log_dimensionless_jerk):
         assert measure(shaken, RATE) < measure(reach(2.0), RATE) - 0.2
+
+
+def test_the_profile_is_what_a_butterworth_filter_forwards_and_backwards_leaves() -> None:
+    rate = 1000.0
+    velocity = np.cumsum(np.random.default_rng(1).normal(size=(3000, 3)), axis=0) * 1e-3
+    smooth = signal.sosfiltfilt(signal.butter(2, CUTOFF, fs=rate, output="sos"), velocity, axis=0)
+    expected = np.linalg.norm(smooth[:: round(rate / RATE)], axis=1)
+    assert speed_profile(velocity, rate) == pytest.approx(expected, abs=0.01 * expected.max())
 
 
 def test_the_profile_keeps_the_movement_and_drops_what_encoders_add() -> None:

@@ -10,6 +10,8 @@ import os
 import resource
 import signal
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -85,6 +87,20 @@ def assert_whole(path: Path, ended: Ended | None) -> None:
     assert not dropped.any()
     np.testing.assert_array_equal(np.diff(tick) - 1, np.diff(missed))
     assert ended is None or len(tick) == ended.ticks
+
+
+@pytest.mark.slow
+def test_a_run_with_a_recorder_says_nothing_on_its_error_stream(tmp_path: Path) -> None:
+    """Neither while it runs, nor when its three processes end."""
+    script = (
+        "import pathlib, sys; from tests.sim.hardware.test_processes import running\n"
+        "with running(pathlib.Path(sys.argv[1])) as run: print(run.stop().ticks)"
+    )
+    path = tmp_path / "run.h5"
+    ended = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True)
+    assert int(ended.stdout) > 20
+    assert path.exists()
+    assert ended.stderr == ""
 
 
 @pytest.mark.slow

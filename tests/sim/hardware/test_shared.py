@@ -1,5 +1,6 @@
 """What processes share is whole or not there, and a ring that is not emptied says how much is gone."""
 
+import multiprocessing
 import pickle
 import threading
 from collections.abc import Iterator
@@ -51,7 +52,7 @@ def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
 def test_a_writer_that_was_killed_in_a_write_is_told_of(numbers: SharedNumbers) -> None:
     into = np.zeros(64)
     assert numbers.read(into)
-    numbers._sequence[0] += 1
+    numbers._count[0] += 1
     assert not numbers.read(into)
 
 
@@ -78,10 +79,18 @@ def test_a_ring_that_was_not_emptied_in_time_counts_what_is_gone(ring: Ring) -> 
     assert (rows[0, 0], lost) == (30.0, 0)
 
 
+def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ring, capfd) -> None:
+    child = multiprocessing.get_context("spawn").Process(target=len, args=((numbers, ring),))
+    child.start()
+    child.join()
+    assert child.exitcode == 0
+    assert capfd.readouterr().err == ""
+
+
 def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_given(ring: Ring) -> None:
     for k in range(7):
         ring.append(np.array([k, 0.0]))
-    copied = ring._rows
+    copied = ring._numbers
 
     class Overtaken:
         def __getitem__(self, index):
@@ -93,9 +102,9 @@ def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_give
         def __setitem__(self, index, value):
             copied[index] = value
 
-    ring._rows = Overtaken()
+    ring._numbers = Overtaken()
     rows, lost = ring.take()
-    ring._rows = copied
+    ring._numbers = copied
     np.testing.assert_array_equal(rows[:, 0], [4, 5, 6])
     assert lost == 4
     rows, lost = ring.take()

@@ -1,0 +1,113 @@
+"""A compiled function that is handed its arguments once: a call then takes one number, and makes no memory.
+
+Else each of the arrays in its arguments is taken apart anew in every call, with a header of its own from the heap. The
+arguments lie as compiled code holds them in memory that is kept, and the function is called by its address.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numba
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from sim.compilation.compiled import entry_point
+
+_ADDRESS, _NUMBER = types.uintp, types.int64
+
+
+class KeptCall:
+    """Call of a compiled function, whose other arguments are kept.
+
+    Parameters
+    ----------
+    function : callable
+        Compiled; it returns nothing, and does not keep its arguments.
+    before, after : tuple
+        Of its arguments, those before and after the whole number that a call hands over.
+    """
+
+    def __init__(self, function: Callable[..., None], before: tuple[Any, ...], after: tuple[Any, ...] = ()):
+        self._call, self._release = _compiled(function, numba.typeof(before), numba.typeof(after))
+        self._address = keep_arguments((before, after))
+
+    def __call__(self, number: int) -> None:
+        """Call the function."""
+        self._call(self._address, number)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_address"):
+            self._release(self._address)
+
+
+def _place(context: Any, builder: Any, kind: Any, address: Any) -> Any:
+    return builder.inttoptr(address, context.get_value_type(kind).as_pointer())
+
+
+def _keeping(_: Any, kind: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        size = context.get_abi_sizeof(context.get_value_type(kind))
+        memory = context.nrt.allocate(builder, context.get_constant(types.uintp, size))
+        context.nrt.incref(builder, kind, given[0])
+        address = builder.ptrtoint(memory, context.get_value_type(_ADDRESS))
+        builder.store(given[0], _place(context, builder, kind, address))
+        return address
+
+    return _ADDRESS(kind), generate
+
+
+_keep: Any = intrinsic(_keeping)
+
+
+@entry_point
+def keep_arguments(arguments: Any) -> int:
+    """Address of a copy of arguments as compiled code holds them, which keeps alive what they refer to."""
+    return _keep(arguments)
+
+
+@cache
+def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
+    """What calls a function with kept arguments, by their address and a number, and what lets them go."""
+    together, parts = types.Tuple((before, after)), (*before.types, _NUMBER, *after.types)
+    function.compile(parts)
+    found = function.overloads[parts]
+    code = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+
+    def calling(_: Any, address: Any, number: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            kept = builder.load(_place(context, builder, together, given[0]))
+            first, last = (
+                cgutils.unpack_tuple(builder, builder.extract_value(kept, i), len(kinds.types))
+                for i, kinds in enumerate((before, after))
+            )
+            shape = context.call_conv.get_function_type(types.none, parts)
+            where = builder.inttoptr(context.get_constant(types.uintp, code), shape.as_pointer())
+            arguments = [*first, given[1], *last]
+            status, _ = context.call_conv.call_function(builder, where, types.none, parts, arguments)
+            with cgutils.if_unlikely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return types.none(_ADDRESS, _NUMBER), generate
+
+    def releasing(_: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            where = _place(context, builder, together, given[0])
+            context.nrt.decref(builder, together, builder.load(where))
+            context.nrt.free(builder, builder.bitcast(where, cgutils.voidptr_t))
+            return context.get_dummy_value()
+
+        return types.none(_ADDRESS), generate
+
+    call: Any = intrinsic(calling)
+    release: Any = intrinsic(releasing)
+
+    def call_at(address: int, number: int) -> None:
+        call(address, number)
+
+    def release_at(address: int) -> None:
+        release(address)
+
+    return njit((_ADDRESS, _NUMBER), nogil=True)(call_at), njit((_ADDRESS,))(release_at)
