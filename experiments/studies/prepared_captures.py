@@ -15,6 +15,7 @@ from models.mocap.library import embedded
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
+SECONDS = 8.0  # followed
 HEAD = (
     "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
     "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root moved RMS | most "
@@ -26,7 +27,7 @@ HEAD = (
 def row(name: str, made: Prepared) -> str:
     """A line of the table."""
     was, now = well_formed(made.captured), well_formed(made.clip)
-    before, after = followed(made.captured), followed(made.clip)
+    before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, seconds = made.feasible, made.clip.duration
     why = "" if after.stands else "motion" if not made.near or change.residual > LEAPING / 2 else "figure"
     cells = (
@@ -57,7 +58,7 @@ def _soles(measures: WellFormed) -> str:
 def main(paths: list[str]) -> None:
     """Print the table."""
     print(HEAD)
-    followed(embedded("walk"))  # what is compiled once costs no clip anything
+    followed(embedded("walk"), SECONDS)  # what is compiled once costs no clip anything
     for path in map(Path, paths):
         name = f"{path.parent.name}/{path.name}"
         try:
