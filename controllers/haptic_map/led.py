@@ -26,7 +26,7 @@ from controllers.legs.limbs import END, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
-from controllers.motion.loops import checked_clip, forward_loop, turned, yawed
+from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Pose
 from controllers.walking.walked_path import (
@@ -244,15 +244,17 @@ class Led(HapticMap):
     ) -> None:
         self._made_of = (clip, tuple(limbs), phase, standing, capture)
         poses, fps = clip
-        loop = forward_loop(checked_clip(poses, fps, "the clip that is led"), fps)
+        checked = checked_clip(poses, fps, "the clip that is led")
+        loop, (net, turns) = forward_loop(checked, fps), turn_of(checked)
+        turn = net + 2.0 * np.pi * turns
         self.phase = phase
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration
-        if self.stride < _LEAST_TRAVEL or abs(loop.drift[2]) > _LARGEST_TURN:
+        if self.stride < _LEAST_TRAVEL or abs(turn) > _LARGEST_TURN:
             raise ParameterError(
                 f"a clip that is led must go somewhere: {_LEAST_TRAVEL} m or more a lap, turning by at most "
                 f"{np.degrees(_LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
-                f"{np.degrees(loop.drift[2]):.0f}°. Walk and run do"
+                f"{np.degrees(turn):.0f}°. Walk and run do"
             )
         samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))

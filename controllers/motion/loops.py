@@ -153,14 +153,20 @@ def checked_clip(poses: Array, fps: float, name: str) -> Array:
     return array
 
 
-def drift_of(poses: Array) -> Array:
-    """ξ of a clip from its first and last frame and the turns between."""
+def turn_of(poses: Array) -> tuple[float, int]:
+    """Change of heading of a clip over its length [rad], up to half a turn, and the whole turns beyond it."""
     first, last = poses[0], poses[-1]
     w = float(last[3:7] @ first[3:7])
     # k part of q_last ⊗ q_first⁻¹: the change of heading is the twist of that rotation about the vertical.
     k = float(last[6] * first[3] - last[3] * first[6] + last[5] * first[4] - last[4] * first[5])
     net = float(2.0 * np.arctan2(k * np.sign(w or 1.0), abs(w)))
-    turns = _full_turns(poses[:, 3:7], net)
+    return net, _full_turns(poses[:, 3:7], net)
+
+
+def drift_of(poses: Array) -> Array:
+    """ξ of a clip from its first and last frame and the turns between."""
+    first, last = poses[0], poses[-1]
+    net, turns = turn_of(poses)
     step = last[:2] - turned(np.array(net), first[:2])
     if abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
