@@ -27,9 +27,8 @@ from experiments.setups.blendable import grounded, led_by, not_blendable, off_pa
 from experiments.setups.wiring import wire
 from experiments.trials.trial_log import TrialLog
 from models.errors import ModelError
-from models.humanoid.skeleton import joint_range
-from models.mocap import quaternions
 from models.mocap.clip import Clip
+from models.mocap.ranges import beyond_ranges
 from sim.body.falls import UP
 from sim.loop.loop import Loop
 
@@ -126,9 +125,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
     """Of the animation: lowest sole, way of a point in a stance (95 %, largest) [cm], joints beyond limits [°]."""
     motion = motion_of(poses, fps, dynamics=False)
-    vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
-    limits = joint_range()
-    excess = np.maximum(limits[:, :, 0] - vectors, vectors - limits[:, :, 1]).max() - _WITHIN
+    excess = float(beyond_ranges(poses).max()) - _WITHIN
     return {
         "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,
         "beyond": float(np.rad2deg(max(excess, 0.0))),

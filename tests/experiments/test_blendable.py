@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.motion.loops import checked_clip, closed_loop
@@ -12,7 +13,7 @@ from experiments.config.words import run_config
 from experiments.files.map_files import save_map
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable
 from experiments.setups.setups import map_parts
-from models.humanoid.skeleton import figure_model
+from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.library import embedded
 
 
@@ -43,6 +44,15 @@ def test_legs_are_those_of_the_first_clip_that_stays_on_the_floor() -> None:
     assert made.haptic_map.legs_of == 1
     assert any("legs and trunk are the second clip's" in remark for remark in made.remarks)
     assert not any("run at" in remark or "walk at" in remark for remark in made.remarks)
+
+
+def test_legs_that_sink_or_bend_beyond_their_range_carry_nobody_where_others_do() -> None:
+    walk, cheer = embedded("walk"), embedded("cheer")
+    sunk, bent = (replace(walk, poses=walk.poses.copy()) for _ in range(2))
+    sunk.poses[:, 2] -= 0.02
+    knee = 7 + 4 * JOINTS.index("right_knee")
+    bent.poses[:, knee : knee + 4] = Rotation.from_rotvec([0.0, -0.2, 0.0]).as_quat(scalar_first=True)
+    assert [grounded(clips) for clips in ((sunk, cheer), (bent, cheer), (sunk, bent), (walk, cheer))] == [1, 1, 0, 0]
 
 
 @pytest.mark.parametrize(("kind", "mode"), [("composite", "follow"), ("rivers", "rivers")])

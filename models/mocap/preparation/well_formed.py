@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.arrays import Array
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, joint_range
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap import quaternions
 from models.mocap.clip import Clip, global_rotations, pose_difference
 from models.mocap.dynamics.contacts import contacts
@@ -17,6 +17,7 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.feasible import contact_residual
 from models.mocap.preparation.poses import around, resampled, smoothed, sole_points
 from models.mocap.preparation.stances import stances
+from models.mocap.ranges import beyond_ranges
 
 LOWEST, HIGHEST = -0.003, 0.005  # of soles in stance [m]
 FLATTEST = np.deg2rad(2.0)
@@ -125,12 +126,10 @@ def well_formed(clip: Clip) -> WellFormed:
     low, high = np.quantile(heights[standing], (0.01, 0.99)) if standing.any() else (0.0, 0.0)
     skate = _skate(points, schedule.standing & (heights < _ON_FLOOR))
     flights, falling = _flights(clip)
-    vectors = quaternions.logarithm(clip.poses[:, 7:].reshape(clip.n_frames, -1, 4))
-    limits = joint_range()
     return WellFormed(
         clip.duration, float(low), float(high), _tilt(clip, standing), skate, outliers(clip), closed,
         _seam(clip, closed), flights, falling,
-        float(np.maximum(limits[:, :, 0] - vectors, vectors - limits[:, :, 1]).max()),
+        float(beyond_ranges(clip.poses).max()),
         contact_residual(clip, schedule) if clip.n_frames > 8 else 0.0,
     )  # fmt: skip
 

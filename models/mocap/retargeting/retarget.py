@@ -14,9 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import JOINTS, SEGMENTS, figure_model, joint_range
+from models.humanoid.skeleton import JOINTS, SEGMENTS, figure_model
 from models.mocap import quaternions
 from models.mocap.clip import Clip
+from models.mocap.ranges import beyond_ranges
 from models.mocap.readers.motion_file import MotionFileError, printable
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.arm_twist import with_twist_shared
@@ -175,7 +176,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     remarks: list[str] = []
     if slope:
         remarks.append(f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level")
-    if beyond := _beyond_ranges(clip.poses):
+    if beyond := _named_beyond_ranges(clip.poses):
         remarks.append(beyond)
     if calibrated.bend > _BENT and rest is None:
         remarks.append("the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it")
@@ -220,11 +221,9 @@ def _poses(root: Array, segments: Array) -> Array:
     return np.hstack((root, local.reshape(len(root), -1)))
 
 
-def _beyond_ranges(poses: Array) -> str:
+def _named_beyond_ranges(poses: Array) -> str:
     """Which joints are further beyond their ranges than ranges of people differ; empty if none is."""
-    vectors = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4))
-    ranges = joint_range()
-    excess = np.maximum(ranges[:, :, 0] - vectors, vectors - ranges[:, :, 1]).max(axis=2)
+    excess = beyond_ranges(poses)
     most = excess.max(axis=0)
     told = [
         f"{JOINTS[k].replace('_', ' ')} by {np.rad2deg(most[k]):.0f}° ({np.mean(excess[:, k] > _RANGE):.0%} of frames)"

@@ -1,0 +1,13 @@
+"""How far poses are beyond the ranges of the figure's joints."""
+
+import numpy as np
+
+from models.arrays import Array
+from models.humanoid.skeleton import joint_range
+from models.mocap import quaternions
+
+
+def beyond_ranges(poses: Array) -> Array:
+    """Of poses (n, 75), the largest excess of each joint's rotation vector [rad], shape (n, 17); negative within."""
+    vectors, ranges = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4)), joint_range()
+    return np.maximum(ranges[:, :, 0] - vectors, vectors - ranges[:, :, 1]).max(axis=2)
