@@ -8,6 +8,7 @@ from dataclasses import replace as replaced
 from typing import Any, NamedTuple, cast
 
 from controllers.errors import ParameterError
+from controllers.fields.function_law import FunctionLaw
 from controllers.fields.law import Law, Program
 from experiments.run_result import Run
 from experiments.simulation import Simulation
@@ -39,7 +40,8 @@ def sweep(
         As it is else.
     values : mapping of str to sequence
         By path of a number: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a composed field a
-        name stands for that of the one law that has it; ``field.Follow.k_r`` says which.
+        name stands for that of the one law that has it; ``field.Follow.k_r`` says which. A parameter of a law of
+        one's own is such a number, its function's name that of the law: ``field.floor.k``.
     seconds : float
         Simulated time of each run [s].
     threads : int
@@ -74,8 +76,10 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
     """The same part with one number set, which may be deep in it."""
     if isinstance(part, Program):
         law = _owner(part, names, path)
-        rest = names if len(names) == 1 or type(law).__name__ != names[0] else names[1:]
+        rest = names if len(names) == 1 or _name(law) != names[0] else names[1:]
         return part.with_law(law, cast(Law, _set(law, rest, value, path)))
+    if isinstance(part, FunctionLaw) and len(names) == 1:
+        return part(**{names[0]: value})
     if not is_dataclass(part) or isinstance(part, type) or names[0] not in {f.name for f in fields(part)}:
         known = [f.name for f in fields(part)] if is_dataclass(part) else []
         raise ParameterError(f"{path}: {type(part).__name__} has no {names[0]!r}; expected some of {', '.join(known)}")
@@ -88,9 +92,18 @@ def _owner(program: Program, names: Sequence[str], path: str) -> Law:
     wanted = names[0]
     found = [
         law for law in program.laws
-        if (type(law).__name__ == wanted if len(names) > 1 else hasattr(law, wanted))
+        if (_name(law) == wanted if len(names) > 1 else _has(law, wanted))
     ]  # fmt: skip
     if len(found) != 1:
-        laws = ", ".join(type(law).__name__ for law in program.laws)
+        laws = ", ".join(_name(law) for law in program.laws)
         raise ParameterError(f"{path}: {len(found)} laws of the field have {wanted!r}; expected one among {laws}")
     return found[0]
+
+
+def _name(law: Law) -> str:
+    """A law of one's own is called by its function."""
+    return law.name if isinstance(law, FunctionLaw) else type(law).__name__
+
+
+def _has(law: Law, number: str) -> bool:
+    return number in law.parameters if isinstance(law, FunctionLaw) else hasattr(law, number)

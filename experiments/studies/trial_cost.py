@@ -85,18 +85,19 @@ class _Watched(Threads):
 
 def start_seconds() -> float:
     """Seconds from the start of a new process to the first row of its study."""
-    code = "from experiments.studies.trial_cost import first_row; first_row()"
-    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    return float(told.stdout)
+    code, begin = "from experiments.studies.trial_cost import first_row; first_row()", time.perf_counter()
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        return time.perf_counter() - begin
 
 
 def first_row() -> None:
-    """Run the first trial of a study, and print how old this process is then [s]."""
+    """Run the first trial of a study, and print its state."""
     study = _study(1, _SHORT)
     trial = planned(study)[0]
     warm([trial.config], SHELF, Console(stderr=True, quiet=True))
-    next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))])))
-    print(time.time() - psutil.Process().create_time())
+    print(next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))]))).state, flush=True)
 
 
 def _study(users: int, seconds: float) -> StudyConfig:

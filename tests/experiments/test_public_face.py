@@ -50,10 +50,22 @@ def test_a_number_of_one_law_of_a_composed_field_is_set_and_the_composition_stay
     assert sim.field.program().laws[0].k_r == 300  # pyright: ignore[reportAttributeAccessIssue]
 
 
+@pytest.mark.parametrize("path", ["field.k", "field.level.k"])
+def test_a_parameter_of_a_law_of_ones_own_is_such_a_number(path: str) -> None:
+    sim = simulation((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0))
+    hand = hvf.HandState.at([0.04, 0.0, -0.01])
+    by_hand = (hvf.Follow(CURVE, k_r=300, b_d=8) + level(k=80.0)).limited(8.0)
+    np.testing.assert_array_equal(with_values(sim, {path: 80.0}).field.wrench(hand).force, by_hand.wrench(hand).force)
+    alone = with_values(simulation(level), {"field.k": 80.0})
+    np.testing.assert_array_equal(alone.field.wrench(hand).force, level(k=80.0).wrench(hand).force)
+    with pytest.raises(hvf.ParameterError, match="law level .* has no parameter b"):
+        with_values(sim, {"field.level.b": 1.0})
+
+
 @pytest.mark.parametrize(
     ("path", "said"),
     [
-        ("field.stiffness", "0 laws of the field have 'stiffness'; expected one among Follow, PythonLaw"),
+        ("field.stiffness", "0 laws of the field have 'stiffness'; expected one among Follow, level"),
         ("clock.rate", "Clock has no 'rate'; expected some of servo_period, physics_step"),
         ("speed", "Simulation has no 'speed'"),
     ],
