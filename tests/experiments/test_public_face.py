@@ -58,7 +58,7 @@ def test_a_parameter_of_a_law_of_ones_own_is_such_a_number(path: str) -> None:
     np.testing.assert_array_equal(with_values(sim, {path: 80.0}).field.wrench(hand).force, by_hand.wrench(hand).force)
     alone = with_values(simulation(level), {"field.k": 80.0})
     np.testing.assert_array_equal(alone.field.wrench(hand).force, level(k=80.0).wrench(hand).force)
-    with pytest.raises(hvf.ParameterError, match="law level .* has no parameter b"):
+    with pytest.raises(hvf.ParameterError, match=r"law level .* has no parameter b"):
         with_values(sim, {"field.level.b": 1.0})
 
 
