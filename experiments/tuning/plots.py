@@ -38,7 +38,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         axis.plot(place[:1], place[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
         axis.set_xlabel(label_of(config.objectives[0]))
         axis.set_ylabel(label_of(config.objectives[1]))
-    axis.legend(frameon=False, fontsize=9)
+    axis.legend(framealpha=0.85, edgecolor="none", fontsize=9)
     axis.grid(alpha=0.3)
     return figure
 
@@ -80,6 +80,6 @@ def gains_figure(
     axis.set_ylabel("k_r [N/m]")
     axis.set_yscale("log")
     axis.set_ylim(0.7 * config.space["stiffness"].low, 1.5 * max(critical.max(), config.space["stiffness"].high))
-    axis.legend(frameon=False, fontsize=8)
+    axis.legend(framealpha=0.85, edgecolor="none", fontsize=8)
     axis.grid(alpha=0.3)
     return figure
