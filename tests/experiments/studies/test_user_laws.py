@@ -17,7 +17,7 @@ HARDLY_VARY = ("tremor", "step-response", "grip", "practice", "endurance")
 """Laws of which one panel of three tells as much as three of six, that take four times as long."""
 
 
-def check(panels: Sequence[Sequence[Law]]) -> None:
+def assert_published(panels: Sequence[Sequence[Law]]) -> None:
     """The median of the panels lies within the published interval, for each number of a law."""
     for measured in zip(*panels, strict=True):
         values, law = [panel.value for panel in measured], measured[0]
@@ -29,13 +29,13 @@ def check(panels: Sequence[Sequence[Law]]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in STUDIES if name not in HARDLY_VARY])
 def test_a_published_law_holds_over_fresh_panels(name: str) -> None:
-    check([user_laws(PEOPLE, seed, (name,))[0].laws for seed in PANELS])
+    assert_published([user_laws(PEOPLE, seed, (name,))[0].laws for seed in PANELS])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HARDLY_VARY)
 def test_a_published_law_that_hardly_varies_holds_on_a_fresh_panel(name: str) -> None:
-    check([user_laws(3, PANELS[0], (name,))[0].laws])
+    assert_published([user_laws(3, PANELS[0], (name,))[0].laws])
 
 
 @pytest.mark.slow
