@@ -6,6 +6,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from experiments.saying import Json, say
+from experiments.working import working
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Command:
         """Exit code 0 if every tick is the same, 1 if not."""
         from experiments.reproduce import reproduce
 
-        found = reproduce(self.folder)
+        with working("reproducing"):
+            found = reproduce(self.folder)
         say(found, self.json)
         return 0 if found.same else 1

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from experiments.config.part import part, whole
 from experiments.saying import Json, say
+from experiments.working import working
 
 
 @part
@@ -27,6 +28,7 @@ class Command:
         """Exit code 0 if every law holds, 1 if one does not."""
         from experiments.studies.user_laws.report import laws_into, lines
 
-        laws = laws_into(self.out, self.people, self.seed, self.laws, self.overwrite)
+        with working("measuring people", self.people):
+            laws = laws_into(self.out, self.people, self.seed, self.laws, self.overwrite)
         say(laws, self.json, lines(laws))
         return 0 if all(law.holds for law in laws) else 1
