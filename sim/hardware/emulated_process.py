@@ -29,6 +29,7 @@ from sim.hardware.shared import SharedNumbers
 
 WATCHDOG = 0.02
 """Time without a command after which the device lets go [s]: twenty periods at 1 kHz."""
+_OFF = bytes(32)
 _SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # in a reading's packet: when it was sent, and how many numbers
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
 """What a bystander sees of the device: torques of its motors [N m], how often its watchdog let go, its clock [s]."""
@@ -200,7 +201,7 @@ class EmulatedDriver:
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`."""
         try:
-            self._packets.send(bytes(32))
+            self._packets.send(_OFF)
         except OSError:
             return
 

@@ -92,9 +92,9 @@ class Ended(NamedTuple):
     compute, lateness : Quantiles
         Of a tick.
     memory_growth : float
-        Of the resident memory since the first second [MB].
+        Of the resident memory since the first tick [MB].
     descriptors : int
-        Open files more than after the first second.
+        Open files more than at the first tick.
     broken : str
         The program's own failure, if that was the end.
     """
@@ -194,7 +194,7 @@ class ServoProcess:
         self._compute, self._lateness = Spread.empty(), Spread.empty()
         orders, status, rows = channels.orders, channels.status, channels.rows
         self._hear = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
-        shown = status.count, status.numbers, rows.count, rows.numbers
+        self._rows, shown = rows.numbers, (status.count, status.numbers, rows.count, rows.numbers)
         self._leave = KeptCall(leave_row, (ticker.row, *shown, self._compute, self._lateness))
         self._ticks = self._missed = 0.0
         self._heard, self._beat, self._done = time.monotonic(), -1.0, 0.0
@@ -206,14 +206,16 @@ class ServoProcess:
             self._ticker.tick(0)
         said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._ticker.tick(0)
+        self._rows.sum()  # what is touched for the first time takes a page from the system
         self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # what came while nobody was there to read
+        self._resources = _resources()
         self._told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:
         """Tick at absolute deadlines, until there is an order to end, or nobody who could give one."""
         period, parent = self._period, float(os.getppid())
         begin = self._heard = time.monotonic()
-        number, settled = 1.0, float(round(1.0 / period))
+        number = 1.0
         while True:
             late = wait_until(begin + number * period)
             skipped = late // period
@@ -222,8 +224,6 @@ class ServoProcess:
             if not self.turn(number, late) or self._parent[0] != parent:
                 return
             number += 1.0
-            if self._ticks == settled:
-                self._resources = _resources()
 
     def turn(self, number: float, late: float) -> bool:
         """Do tick `number`, which begins late by so much [s]; False, and none, if there is an order to end."""
@@ -246,7 +246,7 @@ class ServoProcess:
 
     def close(self) -> None:
         """Let go of the memory that is shared, before it is closed."""
-        del self._hear, self._leave
+        del self._hear, self._leave, self._rows
 
     def ended(self, broken: str) -> Ended:
         """What to say at the end."""
