@@ -87,6 +87,7 @@ class HidPhantom:
         self._told, self._reading, self._off = self._hid.told.data, self._hid.reading.data, np.zeros(3)
         self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
+        incoming = incoming[: protocol.REPORT_SIZE + 1]  # a byte of room shows a report that is too long
         self._receive, self._send = _transfers(handle, incoming, outgoing)
 
     def _feature(self, number: int) -> Any:
@@ -235,7 +236,7 @@ def _transfers(
         return handle.transfers(incoming, outgoing)
 
     def receive(timeout_ms: int) -> int:
-        raw = handle.read(protocol.REPORT_SIZE + 1, timeout_ms)  # a byte of room shows a report that is too long
+        raw = handle.read(len(incoming), timeout_ms)
         incoming[: len(raw)] = raw
         return len(raw)
 
