@@ -19,10 +19,10 @@ from experiments.setups.defaults import resolved
 from models.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker
-from tests.devices.firmware import compiled
+from tests.devices.firmware import ROOT, compiled
 from tests.sim.hardware.emulation import AT_ONCE
 
-HERE = Path(__file__).parent
+HERE, DEVICES = Path(__file__).parent, ROOT / "tests" / "devices"
 RESTRICTED = modes.Follow(
     walls=modes.JointWalls(), governor=modes.SpeedGovernor(), orientation=modes.OrientationMoment(0.05)
 )
@@ -37,11 +37,13 @@ RUNS = {
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
-def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(tmp_path: Path) -> None:
+@pytest.mark.parametrize("device", ["packets", "HID"])
+def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(device: str, tmp_path: Path) -> None:
     """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself."""
     library = compiled(tmp_path, HERE / "heap_calls.c")
     environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
-    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo"]
+    behind = [compiled(tmp_path, DEVICES / "mock_hidapi.c", ROOT / "firmware" / "hvf_hid.c")] if device == "HID" else []
+    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", *map(str, behind)]
     said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
     state, calls, calls_of_a_thousand_numbers = said.split()
     assert state == State.ACTIVE.name
