@@ -25,6 +25,11 @@ number_at: Any = _load(types.float64)
 int32_at: Any = _load(types.int32)
 
 
+def items(array: Array) -> "memoryview[float]":
+    """An array whose items are Python's numbers: to read one makes no object of NumPy's."""
+    return cast("memoryview[float]", array.data)
+
+
 @entry_point
 def gather(addresses: IntArray, into: Array) -> None:
     """Copy numbers, each from its own address, shape (n,) both."""
@@ -35,4 +40,4 @@ def gather(addresses: IntArray, into: Array) -> None:
 def addresses_of(arrays: list[Array]) -> IntArray:
     """Where the numbers of arrays lie, one array after the other; who uses it keeps them alive."""
     found = [array.ctypes.data + array.strides[0] * np.arange(len(array)) for array in arrays]
-    return cast(IntArray, np.concatenate(found).astype(np.int64))
+    return np.concatenate(found).astype(np.int64)

@@ -18,6 +18,7 @@ import numpy as np
 from controllers.safety.faults import Fault
 from controllers.state import Array
 from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol
 from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_THETA
@@ -84,7 +85,7 @@ class HidPhantom:
         self._hid = HidMemory.fresh(self.telemetry)
         self._take_identity()
         self._take_calibration()
-        self._told, self._reading, self._off = self._hid.told.data, self._hid.reading.data, np.zeros(3)
+        self._told, self._reading, self._off = items(self._hid.told), items(self._hid.reading), np.zeros(3)
         self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
         incoming = incoming[: protocol.REPORT_SIZE + 1]  # a byte of room shows a report that is too long

@@ -5,7 +5,7 @@ whole numbers of each size. The host is little-endian, as the protocol is.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -79,12 +79,12 @@ def checksum(report: npt.NDArray[np.uint8]) -> int:
 class Words(NamedTuple):
     """A buffer as bytes, and as whole numbers of two, four and eight, each with and without sign as the layouts ask."""
 
-    u8: npt.NDArray[np.uint8]
-    u16: npt.NDArray[np.uint16]
-    i16: npt.NDArray[np.int16]
-    u32: npt.NDArray[np.uint32]
-    i32: npt.NDArray[np.int32]
-    u64: npt.NDArray[np.uint64]
+    u8: npt.NDArray[Any]
+    u16: npt.NDArray[Any]
+    i16: npt.NDArray[Any]
+    u32: npt.NDArray[Any]
+    i32: npt.NDArray[Any]
+    u64: npt.NDArray[Any]
 
     @classmethod
     def fresh(cls) -> "Words":
@@ -185,14 +185,14 @@ def judge_report(hid: HidMemory) -> None:
     _measure(hid, made, answered)
     _judge_temperature(hid, status)
     if status & _ERRORS:
-        _fault(told, _REPORTED, status & _ERRORS)
+        _fault(told, _REPORTED, float(status & _ERRORS))
     if told[TOLD_FAULT] == 0.0:
         _judge_watchdog(hid, made, answered, status)
     told[TOLD_NEW] = 1.0 if told[TOLD_FAULT] == 0.0 else 0.0
 
 
 @njit
-def _is_next(hid: HidMemory, number: int) -> bool:
+def _is_next(hid: HidMemory, number: np.int64) -> bool:
     """Whether a report's number is ahead of the last one's; the same one again is refused, an older one a fault."""
     last, telemetry = hid.numbers[N_LAST], hid.telemetry
     ahead = 1 if last < 0 else (number - last + 2**31) % 2**32 - 2**31
@@ -208,7 +208,7 @@ def _is_next(hid: HidMemory, number: int) -> bool:
 
 
 @njit
-def _measure(hid: HidMemory, made: float, answered: int) -> None:
+def _measure(hid: HidMemory, made: float, answered: np.int64) -> None:
     """Note temperatures, round trip, jitter and staleness."""
     telemetry, now = hid.telemetry, hid.told[TOLD_NOW]
     for i in range(3):
@@ -221,7 +221,7 @@ def _measure(hid: HidMemory, made: float, answered: int) -> None:
 
 
 @njit
-def _judge_temperature(hid: HidMemory, status: int) -> None:
+def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
     hottest = -np.inf
     for i in range(3):
         celsius = hid.telemetry[TEMPERATURE + i]
@@ -232,7 +232,7 @@ def _judge_temperature(hid: HidMemory, status: int) -> None:
 
 
 @njit
-def _judge_watchdog(hid: HidMemory, made: float, answered: int, status: int) -> None:
+def _judge_watchdog(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
     """The firmware switched off: a fault where commands went out and did not arrive, and else a gap.
 
     After a gap the force is ramped in again by who drives, so the motors may be switched on again.

@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 
 Bytes = npt.NDArray[np.uint8]
 _ADDRESS, _SIZE = ctypes.c_void_p, ctypes.c_size_t
@@ -94,7 +95,7 @@ class HidapiNode:
         asked, answered = np.zeros(2), np.zeros(1)
         reads = KeptCall(read_report, (self._places("hid_read_timeout"), incoming, asked))
         writes = KeptCall(write_report, (self._places("hid_write"), outgoing, answered))
-        read, written = asked.data, answered.data
+        read, written = items(asked), items(answered)
 
         def receive(timeout_ms: int) -> int:
             read[0], read[1] = timeout_ms, -1.0

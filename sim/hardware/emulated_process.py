@@ -20,6 +20,7 @@ from controllers.safety.faults import Fault
 from controllers.state import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, fresh_telemetry, note_arrival
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
@@ -173,7 +174,7 @@ class EmulatedDriver:
             told,
         )  # fmt: skip
         told[TOLD_SENT] = time.monotonic()
-        self._torque, self._told = self._command[:3], told.data
+        self._torque, self._told = self._command[:3], items(told)
         self._take, self._send = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 

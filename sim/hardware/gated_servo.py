@@ -9,7 +9,7 @@ from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import Array
 from sim.compilation.kept_call import KeptCall
-from sim.compilation.memory_access import addresses_of, gather
+from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
@@ -98,7 +98,7 @@ class Ticker:
         self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
         self._number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
-        self._told, self._faults = self.gated.told.data, self._device.faults.data
+        self._told, self._faults = items(self.gated.told), items(self._device.faults)
         self._block = KeptCall(run_block, (parts.servo,), self._number, (1, False, self._ticks, frames))
         gate = self._device, self.gated, field.limiter, field.tank, field.force
         self._gate = KeptCall(gated_tick, gate, self._request)

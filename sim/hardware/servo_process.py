@@ -25,6 +25,7 @@ from controllers.state import Array, IntArray
 from models.errors import ModelError
 from sim.compilation.compiled import entry_point
 from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
@@ -168,8 +169,8 @@ def leave_row(
     """Show a tick's row to the others, and count its times."""
     write_whole(status_count, status, row)
     append_row(count, rows, row)
-    count_time(compute, row[COMPUTE])
-    count_time(lateness, row[LATENESS])
+    count_time(compute, float(row[COMPUTE]))
+    count_time(lateness, float(row[LATENESS]))
 
 
 class ServoProcess:
@@ -190,7 +191,7 @@ class ServoProcess:
         self._ticker, self._told, self._clock = ticker, channels.told, clock
         self._period = ticker.parts.gate.period
         order, parent = np.zeros(ORDER_SIZE), np.zeros(1)
-        self._order, self._parent = order.data, parent.data  # whose items are Python's numbers
+        self._order, self._parent = items(order), items(parent)
         self._compute, self._lateness = Spread.empty(), Spread.empty()
         orders, status, rows = channels.orders, channels.status, channels.rows
         self._hear = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
