@@ -100,7 +100,7 @@ class _Shared:
 
     def _unmap(self) -> None:
         # Memory cannot be given back while there are views into it.
-        self.count, self.numbers = np.zeros(0, np.int64), np.zeros(0)
+        del self.count, self.numbers
         self._memory.close()
 
 
