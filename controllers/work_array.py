@@ -37,7 +37,7 @@ def _on_stack(kind: types.Type) -> Any:
 
     @intrinsic(prefer_literal=True)
     def array(_: Any, shape: Any) -> Any:
-        sizes = list(shape) if isinstance(shape, types.BaseTuple) else [shape]
+        sizes = list(shape) if isinstance(shape, types.BaseTuple) else [shape]  # pyright: ignore[reportArgumentType]
         made, constant = types.Array(kind, len(sizes), "C"), all(isinstance(size, types.Literal) for size in sizes)
 
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -72,9 +72,9 @@ _numbers, _integers = _on_stack(types.float64), _on_stack(types.int64)
 
 @overload(work_array, prefer_literal=True, strict=False, inline="always")
 def _work_array(shape: Any) -> Any:
-    return lambda shape: _numbers(shape)
+    return lambda shape: _numbers(shape)  # pyright: ignore[reportUnknownLambdaType]
 
 
 @overload(work_integers, prefer_literal=True, strict=False, inline="always")
 def _work_integers(shape: Any) -> Any:
-    return lambda shape: _integers(shape)
+    return lambda shape: _integers(shape)  # pyright: ignore[reportUnknownLambdaType]
