@@ -82,9 +82,10 @@ def key_of(config: RunConfig) -> str:
 
 
 def files_of(config: RunConfig) -> tuple[str, ...]:
-    """Files that a configuration names: clips that are not embedded, and the map's."""
+    """Files that a configuration names: clips that are not embedded, the map's, and the device's."""
     clips = tuple(name for name in config.map.clips if name not in embedded_names())
-    return clips + ((config.map.file,) if isinstance(config.map, MapFile) else ())
+    others = (config.map.file if isinstance(config.map, MapFile) else "", config.device.device_file)
+    return clips + tuple(name for name in others if name)
 
 
 @cache
@@ -100,7 +101,7 @@ def file_digest(name: str) -> str:
         return hashlib.sha256(Path(name).read_bytes()).hexdigest()
     except OSError as error:
         raise StudyError(
-            f"{name}: {error.strerror}; expected the file of a clip or a map, or one of the embedded clips, "
+            f"{name}: {error.strerror}; expected the file of a clip, a map or a device, or one of the embedded clips, "
             f"{', '.join(embedded_names())}"
         ) from None
 
