@@ -66,6 +66,9 @@ INTERVALS = {
         0.0, 0.02, "m", "van Beers et al. 1998 (a): shoulder and elbow are felt to 0.6 to 1.1°, 5 to 10 mm at the hand"
     ),
     "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
+    "turn_noise": Interval(
+        0.0, 0.2, "rad", "direction in which a movement is felt to go: Gordon, Ghilardi & Ghez 1994 (m): 3 to 6°"
+    ),
     "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993 (a): some 170 ms between corrections in tracking"),
     "horizon": Interval(
         0.15, 0.8, "s", "duration of a submovement in tracking: Miall, Weir & Stein 1993 (a) find them at 0.5 to 1.8 Hz"
@@ -126,6 +129,8 @@ class Person:
         Of what is seen [s].
     felt_noise, seen_noise : float
         Standard deviation of a place that is felt, and of one that is seen [m].
+    turn_noise : float
+        Standard deviation of the direction in which a movement is felt to go [rad].
     refractory : float
         Least time between two decisions [s].
     horizon : float
@@ -170,6 +175,7 @@ class Person:
     visual_delay: float = 0.2
     felt_noise: float = 0.006
     seen_noise: float = 0.0004
+    turn_noise: float = 0.1
     refractory: float = 0.15
     horizon: float = 0.42
     motor_noise: float = 0.0078

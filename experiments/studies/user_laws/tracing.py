@@ -17,7 +17,7 @@ from sim.users.wishes import Wishes, following
 LAPS = 7  # of an ellipse, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
 DIFFICULTIES = (10.0, 15.0, 20.0, 30.0, 40.0)  # length over width: 10.7 to 42.7 of Yamanaka et al. 2017
-PACES = (0.6, 0.9, 1.3, 2.0, 3.0)  # of a lap that is practised [s]
+PACES = (0.6, 1.0, 1.7, 2.8, 4.5)  # of a lap that is practised [s]
 ERRORS = 0.064  # share of passages that touch a wall (Accot & Zhai 1997)
 PRACTISED, PASSED = 9, 9  # laps at a pace, and through a tunnel, of which the first and the last are not judged
 LEAST = 5  # of these that go round, at a pace that she can hold

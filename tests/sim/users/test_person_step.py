@@ -20,7 +20,7 @@ from sim.users.wishes import Wishes, following, resting
 from sim.world.phantom_port import phantom_port
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, simulated
 
-QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, force_noise=0.0, tremor=0.0, correction=0.0)
+QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, turn_noise=0.0, force_noise=0.0, tremor=0.0, correction=0.0)
 PERIOD, STEP = 1e-3, 2.5e-4
 
 
