@@ -65,6 +65,9 @@ INTERVALS = {
     "felt_noise": Interval(
         0.0, 0.02, "m", "van Beers et al. 1998 (a): shoulder and elbow are felt to 0.6 to 1.1°, 5 to 10 mm at the hand"
     ),
+    "felt_force_noise": Interval(
+        0.0, 0.2, "", "Pang, Tan & Durlach 1991 (a): the just noticeable difference of a force is roughly 7 % of it"
+    ),
     "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
     "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993 (a): some 170 ms between corrections in tracking"),
     "horizon": Interval(
@@ -126,6 +129,8 @@ class Person:
         Of what is seen [s].
     felt_noise, seen_noise : float
         Standard deviation of a place that is felt, and of one that is seen [m].
+    felt_force_noise : float
+        Standard deviation of a force that is felt, over the force.
     refractory : float
         Least time between two decisions [s].
     horizon : float
@@ -169,6 +174,7 @@ class Person:
     reflex_gain: float = 0.15
     visual_delay: float = 0.2
     felt_noise: float = 0.006
+    felt_force_noise: float = 0.07
     seen_noise: float = 0.0004
     refractory: float = 0.15
     horizon: float = 0.42

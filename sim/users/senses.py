@@ -21,6 +21,7 @@ from sim.users.person_state import (
     DRIVEN_P,
     DRIVEN_V,
     FELT_FORCE,
+    FELT_FORCE_NOISE,
     FELT_NOISE,
     FORCE_NOISE,
     HAND_P,
@@ -28,6 +29,7 @@ from sim.users.person_state import (
     INTENDED,
     INTENT,
     LOOK_TICKS,
+    MISFELT,
     OFFSET,
     PERIOD,
     PRESSED,
@@ -46,6 +48,7 @@ from sim.users.person_state import (
     TREMOR_BEFORE,
     TREMOR_GAIN,
     UNSTEADY,
+    WISH_PERIOD,
     PersonState,
 )
 
@@ -63,6 +66,8 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
     _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
+    if n[WISH_PERIOD] < 0.0:  # only an intent of the caller's own asks for the force
+        _noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
     tick = int(m[TICKS])
     now = past[tick % size]
@@ -76,7 +81,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
         V[OFFSET, k] = kept * V[OFFSET, k] + (1.0 - kept) * (seen[SEEN + k] - seen[SENSED + k])
         V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
-        V[FELT_FORCE, k] = felt[PRESSED + k]
+        V[FELT_FORCE, k] = (1.0 + V[MISFELT, k]) * felt[PRESSED + k]
     for k in range(3):
         V[REFLEX, k] = 0.0
         for j in range(3):
