@@ -26,7 +26,8 @@ class Users:
     seed : int
         Of the population that they are drawn from.
     does : str
-        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user".
+        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user"; they lead in the mode
+        "lead".
     """
 
     number: int = whole(1, default=12)

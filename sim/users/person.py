@@ -65,9 +65,12 @@ INTERVALS = {
     "felt_noise": Interval(
         0.0, 0.02, "m", "van Beers et al. 1998 (a): shoulder and elbow are felt to 0.6 to 1.1°, 5 to 10 mm at the hand"
     ),
+    "felt_force_noise": Interval(
+        0.0, 0.2, "", "Pang, Tan & Durlach 1991 (a): the just noticeable difference of a force is roughly 7 % of it"
+    ),
     "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
-    "turn_noise": Interval(
-        0.0, 0.2, "rad", "direction in which a movement is felt to go: Gordon, Ghilardi & Ghez 1994 (m): 3 to 6°"
+    "direction_noise": Interval(
+        0.0, 0.2, "rad", "Gordon et al. 1994 I (a): an angle, the same for short ways and long ones; 3 to 6° (m)"
     ),
     "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993 (a): some 170 ms between corrections in tracking"),
     "horizon": Interval(
@@ -129,8 +132,10 @@ class Person:
         Of what is seen [s].
     felt_noise, seen_noise : float
         Standard deviation of a place that is felt, and of one that is seen [m].
-    turn_noise : float
-        Standard deviation of the direction in which a movement is felt to go [rad].
+    felt_force_noise : float
+        Standard deviation of a force that is felt, over the force.
+    direction_noise : float
+        Standard deviation of the angle by which a movement is felt to go in a wrong direction [rad].
     refractory : float
         Least time between two decisions [s].
     horizon : float
@@ -174,8 +179,9 @@ class Person:
     reflex_gain: float = 0.15
     visual_delay: float = 0.2
     felt_noise: float = 0.006
+    felt_force_noise: float = 0.07
     seen_noise: float = 0.0004
-    turn_noise: float = 0.1
+    direction_noise: float = 0.1
     refractory: float = 0.15
     horizon: float = 0.42
     motor_noise: float = 0.0078

@@ -18,10 +18,12 @@ from sim.users.person_state import (
     BLUR,
     DEVIATING,
     DEVIATION,
+    DIRECTION_NOISE,
     DRIFT,
     DRIVEN_P,
     DRIVEN_V,
     FELT_FORCE,
+    FELT_FORCE_NOISE,
     FELT_NOISE,
     FORCE_NOISE,
     HAND_P,
@@ -29,6 +31,7 @@ from sim.users.person_state import (
     INTENDED,
     INTENT,
     LOOK_TICKS,
+    MISFELT,
     OFFSET,
     PERIOD,
     PRESSED,
@@ -46,9 +49,9 @@ from sim.users.person_state import (
     TREMOR_B,
     TREMOR_BEFORE,
     TREMOR_GAIN,
-    TURN,
-    TURN_NOISE,
     UNSTEADY,
+    VEERED,
+    WISH_PERIOD,
     PersonState,
 )
 
@@ -56,7 +59,7 @@ DRIFT_TIME = 120.0  # [s] in which the felt place of an unseen hand drifts: 15 t
 BLUR_TIME = 0.2  # [s] of what is seen: a fixation
 CALIBRATION_TIME = 0.15  # [s] within which sight corrects what is felt
 DOUBTED = 0.005  # [m], and three times the noise of what is felt: what is seen further away is not believed
-TURN_TIME = 0.5  # [s] within which the felt direction of a movement wanders
+VEER_TIME = 0.5  # [s] within which the felt direction of a movement wanders
 ASTRAY_TIME = 0.5  # [s] within which a place that movement led astray is felt again where it is
 UNSTEADY_TIME = 0.1  # [s] of noise of force: mostly below 2 Hz (Jones et al. 2002, m)
 
@@ -66,10 +69,12 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     """Note what is felt and seen, and make of what arrives now where the hand is believed to be."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
     _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
-    _noise(person, TURN, n[TURN_NOISE], TURN_TIME)
+    _noise(person, VEERED, n[DIRECTION_NOISE], VEER_TIME)
     _go_astray(person)
     _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
+    if n[WISH_PERIOD] < 0.0:  # only an intent of the caller's own asks for the force
+        _noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
     tick = int(m[TICKS])
     now = past[tick % size]
@@ -83,7 +88,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
         V[OFFSET, k] = kept * V[OFFSET, k] + (1.0 - kept) * (seen[SEEN + k] - seen[SENSED + k])
         V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
-        V[FELT_FORCE, k] = felt[PRESSED + k]
+        V[FELT_FORCE, k] = (1.0 + V[MISFELT, k]) * felt[PRESSED + k]
     for k in range(3):
         V[REFLEX, k] = 0.0
         for j in range(3):
@@ -108,11 +113,11 @@ def _noise(person: PersonState, which: int, deviation: float, seconds: float) ->
 @njit
 def _go_astray(person: PersonState) -> None:
     r"""What is felt goes astray as the hand moves: ė = δ × v − e/T, for a direction that is felt wrong by δ [rad]."""
-    V, v, turn = person.vectors, person.vectors[HAND_V], person.vectors[TURN]
+    V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
     period = person.numbers[PERIOD]
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        V[ASTRAY, k] += period * (turn[i] * v[j] - turn[j] * v[i] - V[ASTRAY, k] / ASTRAY_TIME)
+        V[ASTRAY, k] += period * (angle[i] * v[j] - angle[j] * v[i] - V[ASTRAY, k] / ASTRAY_TIME)
 
 
 @njit

@@ -50,6 +50,11 @@ def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
     assert len({trial.key for trial in many}) == len(many)
 
 
+def test_people_lead_where_the_mode_is_to_lead() -> None:
+    made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
+    assert {trial.config.user.does for trial in planned(made)} == {"lead"}
+
+
 def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
     file, keys = tmp_path / "device.json", set[str]()
     for content in ("{}", '{"identified": {}}'):

@@ -179,6 +179,10 @@ def test_the_shipped_tunings_can_be_read(name: str) -> None:
 
 
 @pytest.mark.slow
+def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
+    assert kept_stability(run_config(mode="lead")).verdict == "unknown"
+
+
 def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain() -> None:
     soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
     assert (soft.verdict, stiff.verdict) == ("certified", "refuted")

@@ -16,11 +16,12 @@ from sim.users.participant import Participant
 from sim.users.person import Person
 from sim.users.person_state import BELIEF, CAPACITY, FELT_FORCE, REFLEX
 from sim.users.person_step import person_step
-from sim.users.wishes import Wishes, following, resting
+from sim.users.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, simulated
 
-QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, turn_noise=0.0, force_noise=0.0, tremor=0.0, correction=0.0)
+QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, direction_noise=0.0, force_noise=0.0, tremor=0.0,
+               correction=0.0)  # fmt: skip
 PERIOD, STEP = 1e-3, 2.5e-4
 
 
@@ -57,6 +58,18 @@ def test_no_reflex_and_no_belief_comes_before_its_delay() -> None:
     assert hand.state.vectors[REFLEX, 0] < -1e-3
     assert hand.state.vectors[BELIEF, 0] > 1e-4
     assert hand.state.vectors[FELT_FORCE, 0] < -0.1
+
+
+def test_a_force_is_felt_with_noise_in_proportion_to_it() -> None:
+    rows, felt = resting(2), list[np.ndarray]()
+    rows[0, ENGAGED] = 1.0
+    hand = Clamped(QUIET, Wishes(rows, OWN))
+    hand.hold(np.array([0.02, -0.03, 0.03]), 1.0)
+    for _ in range(300):
+        hand.hold(np.array([0.02, -0.03, 0.03]), 0.05)
+        felt.append(hand.state.vectors[FELT_FORCE] / hand.force)
+    np.testing.assert_allclose(np.mean(felt), 1.0, atol=0.02)
+    np.testing.assert_allclose(np.std(felt), QUIET.felt_force_noise, rtol=0.2)
 
 
 def test_a_relaxed_person_takes_the_place_where_she_is_put() -> None:
