@@ -69,8 +69,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     """Note what is felt and seen, and make of what arrives now where the hand is believed to be."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
     _noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
-    _noise(person, VEERED, n[DIRECTION_NOISE], VEER_TIME)
-    _go_astray(person)
+    go_astray(person)
     _noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
     if n[WISH_PERIOD] < 0.0:  # only an intent of the caller's own asks for the force
@@ -111,8 +110,15 @@ def _noise(person: PersonState, which: int, deviation: float, seconds: float) ->
 
 
 @njit
-def _go_astray(person: PersonState) -> None:
-    r"""What is felt goes astray as the hand moves: ė = δ × v − e/T, for a direction that is felt wrong by δ [rad]."""
+def go_astray(person: PersonState) -> None:
+    r"""A movement is felt to go in a direction that is wrong by a small rotation δ [rad], which wanders.
+
+    .. math:: \dot e = \delta \times v - e / T
+
+    for the error e of the place that is felt: unseen movements miss by an angle that is the same for short ways and
+    long ones (Gordon, Ghilardi & Ghez 1994 I).
+    """
+    _noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
     V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
     period = person.numbers[PERIOD]
     for k in range(3):
