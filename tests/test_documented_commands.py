@@ -19,7 +19,6 @@ EARLIER = {  # what a page takes for granted: another page's result
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
 }
-MISFITS = ["hvf users "]  # a law that does not hold is told by the exit code: the page says which
 ELSEWHERE = ["--cluster tcp://head", "hvf live "]  # needs other machines; serves until it is stopped (tests/live)
 GIVEN = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
@@ -79,8 +78,7 @@ def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> N
             cwd=tmp_path, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
             capture_output=True, text=True, timeout=HOUR, check=False,
         )  # fmt: skip
-        misfits = any(words in f"{line} " for words in MISFITS)
-        assert done.returncode == (1 if misfits else 0), f"{line}\n{done.stderr}"
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
         fell = " fell at " in done.stdout
         assert fell == any(clips in line for clips in FALLS), f"{line}\n{done.stdout}"
         if line in residuals:
