@@ -1,11 +1,12 @@
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-pytest.importorskip("optuna")
+optuna = pytest.importorskip("optuna")
 
+import hvf
 from controllers.errors import ParameterError
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import load_config
@@ -19,6 +20,7 @@ from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of
 from experiments.tuning.storage import storage_of
+from experiments.tuning.tune import TunedSimulation
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning
 
@@ -201,3 +203,21 @@ def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path:
     assert kept_stability(taken).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_search_from_python_goes_on_with_its_own_candidates_only(tmp_path: Path) -> None:
+    curve, search = hvf.circle(lap=2.0), hvf.Search(candidates=1, journal=tmp_path / "journal")
+    walk, space = hvf.Cylindrical(hvf.clips("walk"), around=curve), {"field.k_r": (100.0, 101.0)}
+
+    def found(damping: float, cost: Callable[[hvf.Run], float]) -> TunedSimulation:
+        field = hvf.Follow(curve, k_r=300, b_d=damping).limited(8.0)
+        sim = hvf.Simulation(field=field, haptic_map=walk)
+        return hvf.tune(sim, space, cost, seconds=0.2, search=search)
+
+    first = found(8.0, lambda run: 1.0)
+    assert found(8.0, lambda run: 1.0).costs == first.costs == (1.0,)
+    assert found(8.0, lambda run: 2.0).costs == (2.0,)
+    assert found(9.0, lambda run: 3.0 - 2.0).costs == (1.0,)
+    names = optuna.get_all_study_names(storage_of(tmp_path / "journal"))
+    assert len(names) == 3
