@@ -12,6 +12,7 @@ from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
 
@@ -50,7 +51,7 @@ def blend(
     angle, weights, changes, chain, memory, pose, jacobian
         As `combine` takes them.
     """
-    blend_corrected(params, angle, weights, changes, np.empty((4, 0)), chain, memory, pose, jacobian)
+    blend_corrected(params, angle, weights, changes, work_array((4, 0)), chain, memory, pose, jacobian)
 
 
 @njit
@@ -63,11 +64,11 @@ def blend_corrected(
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
     figure = params[_DRIFTS + 3 * clips :]
     channels = figure_channels(figure)
-    value, slope = np.empty((clips, channels)), np.empty((clips, channels))
+    value, slope = work_array((clips, channels)), work_array((clips, channels))
     _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
     combine(
         figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
-        np.empty((0, 0, 3)), 0.0, 0.0, pose, jacobian,
+        work_array((0, 0, 3)), 0.0, 0.0, pose, jacobian,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.motion.mean import mean_derivative, mean_rotation
 from controllers.rotations import multiply, relative
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
 _WAYS = 3  # parameters of a pose: θ, and two by which only the weights change
@@ -129,7 +130,8 @@ def combine(
     packed = figure[_GROUPS + rotations :]
     tangents = _WAYS if jacobian.shape[0] > 0 else 0
 
-    drift, shift, turn = np.zeros((1 + _WAYS, 3)), np.empty((2, 3)), np.empty(3)
+    drift, shift, turn = work_array((1 + _WAYS, 3)), work_array((2, 3)), work_array(3)
+    drift[:] = 0.0
     for i in range(clips):
         for k in range(3):
             drift[0, k] += weights[0, i] * drifts[i, k]
@@ -138,7 +140,7 @@ def combine(
     update_lap(memory, angle, drift[0])
     # The root is in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead, mixture = np.empty(3), 0.0, 0.0
+    frame, ahead, mixture = work_array(3), 0.0, 0.0
     if footing.shape[0] > 0:
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
@@ -146,18 +148,21 @@ def combine(
         frame[2] = s * drift[0, 2] + lap
         ahead, mixture = go_on(footing, angle), mixed(weights[0])
 
-    unit, spin = np.empty((clips, 4)), np.empty((clips, 3))
-    q, rates = np.empty((rotations, 4)), np.empty((rotations, 3, 3))
+    unit, spin = work_array((clips, 4)), work_array((clips, 3))
+    q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     for joint in range(rotations):
         group = int(figure[_GROUPS + joint])
         _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
-    root, end, lower = np.empty((4, 3)), np.empty((4, 3)), np.zeros(4)
+    root, end, lower = work_array((4, 3)), work_array((4, 3)), work_array(4)
+    lower[:] = 0.0
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
-        root[:, :2] += correction[:, :2]
+        for k in range(4):
+            root[k, 0] += correction[k, 0]
+            root[k, 1] += correction[k, 1]
     elif limbs > 0:
         clearance = slice(3 + 4 * rotations + END - 1, value.shape[1], END)
         lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)

@@ -11,6 +11,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, HapticMap
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 from controllers.state import Array, Pose
+from controllers.work_array import work_array
 
 EXPRESSIVE = 6
 FADE_FROM = 2.0 * np.pi / 3.0  # angle of the stylus from which its turn fades, to nothing at half a turn [rad]
@@ -35,9 +36,9 @@ def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
     angle = np.sqrt(a * a + b * b + c * c)
     faded, slope = blend_weight(angle, FADE_FROM, np.pi)
     turn[0], turn[1], turn[2] = a, b, c
-    unit = np.eye(3)
     for k in range(3):
-        rate = rotation_vector_rate(-a, -b, -c, unit[k, 0], unit[k, 1], unit[k, 2])
+        e_x, e_y, e_z = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+        rate = rotation_vector_rate(-a, -b, -c, e_x, e_y, e_z)
         # The angle grows by the share of ω about the axis; where it does not matter the slope is zero.
         fading = slope * turn[k] / max(angle, FADE_FROM)
         for i in range(3):
@@ -74,7 +75,7 @@ def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float
 def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array) -> None:
     """Turn one joint, its quaternion (4,) and, unless it has no rows, its derivative (3, 6)."""
     v = logarithm(q[0], q[1], q[2], q[3])
-    e, by_turn, by_there = np.empty(3), np.empty(3), np.empty(3)
+    e, by_turn, by_there = work_array(3), work_array(3), work_array(3)
     for i in range(3):
         gain = row[_GAIN + i]
         e[i], slope, by_there[i] = yielded(gain * turn[i], v[i], row[_LOW + i], row[_HIGH + i])
@@ -110,7 +111,7 @@ def express(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         The base map's; updated.
     """
-    turn, rates = np.empty(3), np.empty((3, 3))
+    turn, rates = work_array(3), work_array((3, 3))
     stylus_turn(x, turn, rates)
     for n in range(int(params[_JOINTS])):
         row = params[_ROWS + _ROW * n : _ROWS + _ROW * (n + 1)]
