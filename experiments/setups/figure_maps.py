@@ -28,9 +28,10 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
-from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
+from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joints
 from experiments.setups.balance import balanced
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.setups.carried import carried, not_borne, verdict_on
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -81,14 +82,19 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
     played = [clips[i % len(clips)] for i in range(len(motions))]
     loops = [closed_loop(checked_clip(poses, fps, f"clip {i}"), fps) for i, (poses, fps) in enumerate(motions)]
-    owner = grounded(played)
+
+    def with_legs_of(owner: int) -> CylindricalMap:
+        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
+
+    def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
+        return carried([with_legs_of(owner) for owner in range(len(clips))], clips, lap)
+
     if not same(clips) and not keeps_pace(played, in_step(loops, lap), lap):
-        apart = CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
-        return _about_circle(place, apart, clips).said(apart.remarks)
+        return replace(_about_circle(place, with_legs_of(grounded(played)), clips), refined=carrying)
     made = _cylinder(motions, radii, (-reach, reach), legs, lap)
 
-    def refined() -> CylindricalMap:
-        return balanced(made, figure, lap) if same(clips) or moves_alike(made, lap) else only_arms(made, owner)
+    def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
+        return (balanced(made, figure, lap), ()) if same(clips) or moves_alike(made, lap) else carrying()
 
     return replace(_about_circle(place, made, clips), refined=refined)
 
@@ -106,8 +112,11 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     lap = place.curve.duration
     made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap)
 
-    def refined() -> CompositeMap:
-        return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+    def refined() -> tuple[CompositeMap, tuple[str, ...]]:
+        if carries_alike(made, lap):
+            return made, ()
+        apart = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+        return apart, not_borne(verdict_on(apart, lap), clips[0].name)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 
@@ -151,7 +160,7 @@ def _river_clips_parts(
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
     parts = _about_circle(place, made, clips)
-    return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
+    return replace(parts, plays_rivers=True, refined=lambda: (with_rests(made, figure), ()))
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

@@ -50,7 +50,7 @@ MAPS = [
     swaying(),
     Composite(*CLIPS, (1, 2, 3), R, LEGS),
     lifted(),
-    Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS, upper=(3, 4), legs_of=2),
+    Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS, upper=(3, 4), legs_of=2).with_share(0.25),
 ]
 
 
