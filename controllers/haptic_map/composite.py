@@ -49,6 +49,8 @@ class Composite(AnimationMap):
         Limbs of the lower body that stand (see `limbs`).
     lap : float, optional
         As in `Cylindrical`.
+    apart : bool
+        Whether strides of the clips need not be in step.
 
     Raises
     ------
@@ -66,17 +68,21 @@ class Composite(AnimationMap):
         r_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
         lap: float | None = None,
+        apart: bool = False,
     ) -> None:
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
-        self.r_range, self.upper_joints = r_range, tuple(upper_joints)
+        self.r_range, self.upper_joints, self.apart = r_range, tuple(upper_joints), apart
         numbers = checked_interval("r_range", r_range, 1e-3)
-        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs, lap)
+        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs, lap,
+                         apart)  # fmt: skip
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
+        if self.apart:
+            numbers["apart"] = np.ones(1)
         return numbers | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
@@ -94,4 +100,4 @@ class Composite(AnimationMap):
         lower, red, blue = clips
         r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
         upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
-        return Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays))
+        return Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
