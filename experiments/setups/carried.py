@@ -8,11 +8,10 @@ that slide, sink or bend beyond their ranges are taken only where the others do 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
@@ -30,6 +29,9 @@ SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # [m], [m], [rad]: what leg
 _SECONDS, _FPS = 20.0, 120.0
 _PUSHED = 0.17  # of the domain: 2.5 N against 300 N/m, in 50 mm
 _EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and in which one has moved the hand
+
+
+Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
 class Verdict(NamedTuple):
@@ -56,7 +58,7 @@ class Verdict(NamedTuple):
         return -self.fell, self.residual
 
 
-def verdict_on(made: AnimationMap, lap: float) -> Verdict:
+def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
     """Let the physical figure follow a map about a circle for 20 s, and keep how; needs compiled code."""
 
     def find() -> Array:
@@ -70,13 +72,12 @@ def verdict_on(made: AnimationMap, lap: float) -> Verdict:
     return Verdict(*kept_array(kept_folder(__name__), "verdict", made_of, (1, 2), find)[0].tolist())
 
 
-def _domain(made: AnimationMap) -> Array:
+def _domain(made: Cylindrical | Composite) -> Array:
     """Intervals of r and z [m] that a hand goes through."""
-    assert isinstance(made, Cylindrical | Composite)
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
 
 
-def toured(made: AnimationMap, lap: float) -> Clip:
+def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
 
     It keeps its pace where it wanders. A push leaves the field's speed over the ground as it is, so that a hand that is
@@ -99,7 +100,7 @@ def toured(made: AnimationMap, lap: float) -> Clip:
     return Clip(poses, _FPS, "blend")
 
 
-def sound(made: AnimationMap, lap: float) -> bool:
+def sound(made: Cylindrical | Composite, lap: float) -> bool:
     """Whether soles do not sink or skate, and joints stay about within their ranges; kept, and needs compiled code."""
 
     def find() -> Array:
@@ -112,35 +113,29 @@ def sound(made: AnimationMap, lap: float) -> bool:
     return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
 
 
-def carried(maps: Sequence[Cylindrical], clips: Sequence[Clip], lap: float) -> tuple[Cylindrical, tuple[str, ...]]:
+def carried(maps: Sequence[Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
     """The map whose legs carry the others' arms best, and what is to be said of it; needs compiled code.
 
     Parameters
     ----------
-    maps : sequence of Cylindrical
-        With the legs of each clip.
-    clips : sequence of Clip
-        For their names.
+    maps : sequence of Cylindrical or Composite
+        With the legs of one clip each.
+    names : sequence of str
+        Of these clips.
     lap : float
         [s].
     """
-    fit = [made for made in maps if sound(made.with_share(0.0), lap)]
-    best, found = maps[0], Verdict(np.inf, 0.0)
-    for candidates in (fit, [made for made in maps if made not in fit]):
+    fit = [i for i, made in enumerate(maps) if sound(made.with_share(0.0), lap)]
+    best, name, found = maps[0], names[0], Verdict(np.inf, 0.0)
+    for candidates in (fit, [i for i in range(len(maps)) if i not in fit]):
         for share in SHARES:
-            for made in (one.with_share(share) for one in candidates):
+            for i in candidates:
+                made = maps[i].with_share(share)
                 verdict = verdict_on(made, lap)
                 if verdict.worse() < found.worse():
-                    best, found = made, verdict
+                    best, name, found = made, names[i], verdict
             if found.bearable:
                 return best, ()
-    return best, not_borne(found, clips[best.legs_of].name)
-
-
-def not_borne(found: Verdict, name: str) -> tuple[str, ...]:
-    """What is said of a map that the physical figure does not follow."""
-    if found.bearable:
-        return ()
     falls = np.isfinite(found.fell)
     told = f"falls at {found.fell:.1f} s" if falls else f"lacks {100 * found.residual:.0f} % of weight"
-    return (f"the physical figure {told} with the legs of {name}, the best of these clips at this lap",)
+    return best, (f"the physical figure {told} with the legs of {name}, the best that is found at this lap",)

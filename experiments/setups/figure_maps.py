@@ -31,7 +31,7 @@ from experiments.files.map_files import load_figure_map, map_digest
 from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joints
 from experiments.setups.balance import balanced
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
-from experiments.setups.carried import carried, not_borne, verdict_on
+from experiments.setups.carried import carried
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -85,7 +85,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
 
     def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
-        return carried([with_legs_of(owner) for owner in range(len(clips))], clips, lap)
+        return carried([with_legs_of(owner) for owner in range(len(clips))], [clip.name for clip in clips], lap)
 
     if _out_of_step(clips, len(motions), lap):
         return replace(_about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
@@ -115,7 +115,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         if carries_alike(made, lap):
             return made, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
-        return only, not_borne(verdict_on(only, lap), clips[0].name)
+        return carried([only], [clips[0].name], lap)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 

@@ -13,13 +13,13 @@ from models.mocap.library import embedded
 
 R, Z, LAP = (0.0227, 0.0727), (-0.025, 0.025), 4.4
 LEGS = figure_legs(figure_model())
-CLIPS = [embedded(name) for name in ("run", "walk", "cheer", "angry")]
+NAMES = ("run", "walk", "cheer", "angry")
 STANDS = np.inf
 
 
 @pytest.fixture(scope="module")
 def maps() -> list[Cylindrical]:
-    motions = [(clip.poses, clip.fps) for clip in CLIPS]
+    motions = [(clip.poses, clip.fps) for clip in map(embedded, NAMES)]
     return [Cylindrical(motions, R, Z, LEGS, None, LAP, arms(LEGS), owner) for owner in range(4)]
 
 
@@ -39,7 +39,7 @@ def judged(monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Ve
 def test_legs_are_those_with_which_least_is_lacking(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.04, STANDS)}
     asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, told = carried(maps, CLIPS, LAP)
+    best, told = carried(maps, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (3, 1.0, ())
     assert asked == [(owner, 1.0) for owner in range(4)]
 
@@ -48,7 +48,7 @@ def test_arms_that_no_legs_bear_are_blended_in_by_less(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
-    best, told = carried(maps, CLIPS, LAP)
+    best, told = carried(maps, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (2, 0.25, ())
 
 
@@ -57,18 +57,18 @@ def test_legs_that_slide_are_taken_only_where_no_others_stand(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
     judged(monkeypatch, verdicts, {1, 2, 3})
-    assert carried(maps, CLIPS, LAP)[0].legs_of == 1
+    assert carried(maps, NAMES, LAP)[0].legs_of == 1
     judged(monkeypatch, {(0, 1.0): Verdict(0.01, STANDS)}, {1, 2, 3})
-    assert carried(maps, CLIPS, LAP)[0].legs_of == 0
+    assert carried(maps, NAMES, LAP)[0].legs_of == 0
 
 
 def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     judged(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
-    best, told = carried(maps, CLIPS, LAP)
+    best, told = carried(maps, NAMES, LAP)
     assert (best.legs_of, best.share) == (2, 0.5)
-    assert told == ("the physical figure falls at 9.0 s with the legs of cheer, the best of these clips at this lap",)
+    assert told == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
     judged(monkeypatch, {(1, 0.0): Verdict(0.14, STANDS)}, set())
-    assert carried(maps, CLIPS, LAP)[1][0].startswith("the physical figure lacks 14 % of weight with the legs of walk")
+    assert carried(maps, NAMES, LAP)[1][0].startswith("the physical figure lacks 14 % of weight with the legs of walk")
 
 
 def test_the_hand_that_tries_a_map_sees_all_of_it(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
