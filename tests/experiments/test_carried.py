@@ -36,8 +36,20 @@ def judged(monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Ve
     return asked
 
 
-def test_legs_are_those_with_which_least_is_lacking(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.04, STANDS)}
+def test_legs_are_the_first_that_carry_the_others_well(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
+    asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
+    best, told = carried(maps, NAMES, LAP)
+    assert (best.legs_of, best.share, told) == (1, 1.0, ())
+    assert asked == [(0, 1.0), (1, 1.0)]
+
+
+def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
     asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
     best, told = carried(maps, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (3, 1.0, ())
