@@ -160,8 +160,6 @@ class RunConfig:
     def __post_init__(self) -> None:
         if (self.mode.kind == "lead") != (self.map.kind == "led"):
             raise ParameterError("a figure is led by the mode lead and its own map; expected both, or neither")
-        if self.mode.kind == "lead" and self.figure.kind == "none":
-            raise ParameterError("the mode lead with the figure none: nobody to lead; expected another figure")
         if (self.mode.kind == "lead") != (self.user.does == "lead"):
             raise ParameterError(
                 f"the user {self.user.does!r} and the mode {self.mode.kind!r}: a hand leads in the mode lead only"

@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields, is_dataclass, replace
 from math import inf, nan
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
@@ -321,6 +322,7 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
         from_json(RunConfig, text, "f.json")
 
 
-def test_a_figure_that_is_not_there_is_not_led() -> None:
-    with pytest.raises(ParameterError, match=r"^the mode lead with the figure none: nobody to lead"):
-        run_config(mode="lead", figure="none")
+def test_a_hand_leads_a_walker_without_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--mode", "lead", "--figure", "none", "--seconds", "1", "--out", str(tmp_path / "run")]) == 0
+    assert "from the curve" in capsys.readouterr().out
+    assert (tmp_path / "run/report.html").exists()
