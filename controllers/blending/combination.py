@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.borrowed import borrowed
 from controllers.legs.floor import keep_above
 from controllers.legs.footing import go_on, keep_footing, mixed
 from controllers.legs.limbs import END, LIMB, Limb, place_limb
@@ -21,6 +22,7 @@ from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.motion.mean import mean_derivative, mean_rotation
 from controllers.rotations import multiply, relative
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
 _WAYS = 3  # parameters of a pose: θ, and two by which only the weights change
@@ -38,7 +40,7 @@ def figure_channels(figure: Array) -> int:
     return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])
 
 
-@njit
+@njit(forceinline=True)
 def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
     """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
     for i in range(value.shape[0]):
@@ -124,12 +126,26 @@ def combine(
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
+    _combine(
+        borrowed(figure), borrowed(value), borrowed(slope), borrowed(drifts), angle, borrowed(weights),
+        borrowed(changes), borrowed(correction), borrowed(chain), borrowed(memory), borrowed(footing), borrowed(soles),
+        ground, floor, borrowed(pose), borrowed(jacobian),
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def _combine(
+    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
+    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
+    floor: float, pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
     clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
     tangents = _WAYS if jacobian.shape[0] > 0 else 0
 
-    drift, shift, turn = np.zeros((1 + _WAYS, 3)), np.empty((2, 3)), np.empty(3)
+    drift, shift, turn = work_array((1 + _WAYS, 3)), work_array((2, 3)), work_array(3)
+    drift[:] = 0.0
     for i in range(clips):
         for k in range(3):
             drift[0, k] += weights[0, i] * drifts[i, k]
@@ -138,7 +154,7 @@ def combine(
     update_lap(memory, angle, drift[0])
     # The root is in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead, mixture = np.empty(3), 0.0, 0.0
+    frame, ahead, mixture = work_array(3), 0.0, 0.0
     if footing.shape[0] > 0:
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
@@ -146,15 +162,16 @@ def combine(
         frame[2] = s * drift[0, 2] + lap
         ahead, mixture = go_on(footing, angle), mixed(weights[0])
 
-    unit, spin = np.empty((clips, 4)), np.empty((clips, 3))
-    q, rates = np.empty((rotations, 4)), np.empty((rotations, 3, 3))
+    unit, spin = work_array((clips, 4)), work_array((clips, 3))
+    q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     for joint in range(rotations):
         group = int(figure[_GROUPS + joint])
         _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
-    root, end, lower = np.empty((4, 3)), np.empty((4, 3)), np.zeros(4)
+    root, end, lower = work_array((4, 3)), work_array((4, 3)), work_array(4)
+    lower[:] = 0.0
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
         root[:, :2] += correction[:, :2]

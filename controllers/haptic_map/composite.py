@@ -12,6 +12,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, kept_lap
 from controllers.legs.limbs import Limb
 from controllers.state import Array
+from controllers.work_array import work_array
 
 COMPOSITE = 2
 _CLIPS = 3
@@ -21,10 +22,11 @@ _R_MIN, _R_MAX, _BLEND = range(3)
 @njit
 def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of `Composite`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    chain = np.empty((3, 6))
+    chain = work_array((3, 6))
     radius, angle = cylinder(x, chain)
     a, slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
-    weights, changes = np.zeros((2, _CLIPS)), np.zeros((2, 3, _CLIPS))
+    weights, changes = work_array((2, _CLIPS)), work_array((2, 3, _CLIPS))
+    weights[:], changes[:] = 0.0, 0.0
     weights[0, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - a, a
     changes[1, 1, 1], changes[1, 1, 2] = -slope, slope
     blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)

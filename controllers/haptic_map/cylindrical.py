@@ -18,6 +18,7 @@ from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT, correction, interpolation, packed_table, table_channels
 from controllers.state import Array
+from controllers.work_array import work_array
 
 CYLINDRICAL = 1
 _CLIPS = 4
@@ -32,26 +33,26 @@ _ROWS = 512  # of it round the lap, at most
 @njit
 def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of `Cylindrical`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    chain = np.empty((3, 6))
+    chain = work_array((3, 6))
     radius, angle = cylinder(x, chain)
     a, a_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     b, b_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX])
     owner = int(params[_OWN_LEGS]) - 1
     last = 1 if owner >= 0 else 0
-    weights, changes = np.zeros((1 + last, _CLIPS)), np.zeros((1 + last, 3, _CLIPS))
+    weights, changes = work_array((1 + last, _CLIPS)), work_array((1 + last, 3, _CLIPS))
+    weights[:], changes[:] = 0.0, 0.0
     weights[0, max(owner, 0)] = 1.0
     for i in range(_CLIPS):
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
         weights[last, i], changes[last, 1, i], changes[last, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
     size = int(params[_TABLE_SIZE])
-    d = np.empty((4, 0))
+    table = params[_TABLE : _TABLE + size]
+    d = work_array((4, table_channels(table) if size > 0 else 0))
     if size > 0:
-        table = params[_TABLE : _TABLE + size]
-        d = np.empty((4, table_channels(table)))
         i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
         j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
-        correction(table, angle, i, j, d)
+        correction(table, angle, i, j, d, jacobian.shape[0] > 0)
         d[2] *= i_slope
         d[3] *= j_slope
     blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)

@@ -11,6 +11,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS_TANGENT, CompiledMap, HapticMap
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 from controllers.state import Array, Pose
+from controllers.work_array import work_array
 
 EXPRESSIVE = 6
 FADE_FROM = 2.0 * np.pi / 3.0  # angle of the stylus from which its turn fades, to nothing at half a turn [rad]
@@ -74,7 +75,7 @@ def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float
 def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array) -> None:
     """Turn one joint, its quaternion (4,) and, unless it has no rows, its derivative (3, 6)."""
     v = logarithm(q[0], q[1], q[2], q[3])
-    e, by_turn, by_there = np.empty(3), np.empty(3), np.empty(3)
+    e, by_turn, by_there = work_array(3), work_array(3), work_array(3)
     for i in range(3):
         gain = row[_GAIN + i]
         e[i], slope, by_there[i] = yielded(gain * turn[i], v[i], row[_LOW + i], row[_HIGH + i])
@@ -110,7 +111,7 @@ def express(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         The base map's; updated.
     """
-    turn, rates = np.empty(3), np.empty((3, 3))
+    turn, rates = work_array(3), work_array((3, 3))
     stylus_turn(x, turn, rates)
     for n in range(int(params[_JOINTS])):
         row = params[_ROWS + _ROW * n : _ROWS + _ROW * (n + 1)]

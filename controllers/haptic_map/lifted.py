@@ -35,6 +35,7 @@ from controllers.motion.lap import MEMORY
 from controllers.motion.loops import checked_clip
 from controllers.saturation import clamped
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array, work_integers
 
 LIFTED = 3
 
@@ -72,10 +73,10 @@ def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chan
         chain[1, k] *= r_slope
         chain[2, k] *= z_slope
     total = near.shape[0]
-    sites, slopes = np.empty((total, SITE)), np.empty((total, SITE))
+    sites, slopes = work_array((total, SITE)), work_array((total, SITE))
     neighbours = params[int(params[_NEAR_AT]) :]
     count = near_clips(neighbours, angle, r, z, near, sites, slopes)
-    place, change = np.empty(2), np.empty((3, 2))
+    place, change = work_array(2), work_array((3, 2))
     if not draw_in(r, z, sites[:count], slopes[:count], place, change):
         near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
         return angle, count
@@ -92,12 +93,12 @@ def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chan
 @njit
 def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
     """Kernel of `Lifted`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    total, chain = int(params[_CLIPS]), np.empty((3, 6))
-    near, w, changes = np.empty(total, dtype=np.int64), np.empty((1, total)), np.empty((1, 3, total))
+    total, chain = int(params[_CLIPS]), work_array((3, 6))
+    near, w, changes = work_integers(total), work_array((1, total)), work_array((1, 3, total))
     angle, count = _weigh(params, x, chain, near, w[0], changes[0])
     figure = params[_FIGURE:]
     channels = figure_channels(figure)
-    value, slope, drifts = np.empty((count, channels)), np.empty((count, channels)), np.empty((count, 3))
+    value, slope, drifts = work_array((count, channels)), work_array((count, channels)), work_array((count, 3))
     frames = params[int(params[_FRAMES_AT]) :]
     for i in range(count):
         interpolate_frames(frames, near[i], angle, value[i], slope[i])
@@ -105,13 +106,13 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
             drifts[i, k] = params[int(params[_DRIFTS_AT]) + 3 * near[i] + k]
     _lags(params[int(params[_LAG_AT]) :], int(figure[1]), angle, channels, value, slope)
     pairs = params[int(params[_PAIRS_AT]) :]
-    d = np.empty((4, pair_channels(pairs)))
+    d = work_array((4, pair_channels(pairs)))
     if d.shape[1] > 0:
         pair_correction(pairs, angle, near[:count], w[0, :count], changes[0, :, :count], d)
     limbs, ground, at = int(figure[1]), 0.0, int(params[_SOLES_AT])
     for i in range(count):
         ground += w[0, i] * params[at + 1 + near[i]]
-    soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else np.empty((0, 0, 3))
+    soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else work_array((0, 0, 3))
     combine(
         figure, value, slope, drifts, angle, w[:, :count], changes[:, :, :count], d, chain, memory[:MEMORY],
         memory[MEMORY:], soles, ground, params[at], pose, jacobian,

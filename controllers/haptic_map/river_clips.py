@@ -27,6 +27,7 @@ from controllers.legs.limbs import Limb
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
 from controllers.state import Array, Pose
+from controllers.work_array import work_array
 
 RIVER_CLIPS = 5
 # The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
@@ -41,7 +42,7 @@ _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 @njit
 def _phase_near(params: Array, curve: int, x: Array, last: float) -> float:
     """Phase of the curve's point nearest to the stylus; where it passes twice, of the branch that goes on."""
-    found = np.empty((BRANCHES, 2))
+    found = work_array((BRANCHES, 2))
     start, end = params[curve + START], params[curve + END]
     best, nearest = np.nan, _NEIGHBOUR * (end - start)
     for k in range(branches(params, curve, x[0], x[1], x[2], params[_TUBE], found)):
@@ -68,10 +69,12 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     slope = 0.0
     for i in range(3):
         slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
-    chain = np.zeros((3, 6))
+    chain = work_array((3, 6))
+    chain[:] = 0.0
     for i in range(3):
         chain[0, i] = pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
-    weights, changes = np.zeros((1, rivers)), np.zeros((1, 3, rivers))
+    weights, changes = work_array((1, rivers)), work_array((1, 3, rivers))
+    weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0
     angle = pace * (phase - params[curve + START])
     blend(params[int(params[_BLEND]) :], angle, weights, changes, chain, memory, pose, jacobian)
@@ -103,7 +106,8 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
     """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
-    curve, found, x, v = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2)), np.empty(3), np.empty(3)
+    curve = int(params[_CURVES + int(memory[RIVER])])
+    found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
     outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[_TUBE], found) == 0
     if outside or abs(rate) > _RACES:
         return True

@@ -10,6 +10,7 @@ from numba import njit
 
 from controllers.rotations import rotate
 from controllers.state import Array, Quat
+from controllers.work_array import work_array
 
 SOFTNESS = 2e-3  # [m] of the minimum of a sole's heights
 _ROUND = 4e-3  # s [m]
@@ -34,7 +35,7 @@ def keep_above(floor: float, sole: Array, end: Array, q: Quat, rate: Array, tang
     tangents : int
         n, or 0 to leave the derivatives alone.
     """
-    least, heights = np.inf, np.empty(sole.shape[0])
+    least, heights = np.inf, work_array(sole.shape[0])
     for i in range(sole.shape[0]):
         _, _, heights[i] = rotate(q[0], q[1], q[2], q[3], sole[i, 0], sole[i, 1], sole[i, 2])
         least = min(least, heights[i])

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 
 _SOFTNESS = 0.003  # [m] of the minimum, and s
 _ROOM = 0.006  # [m] x₀
@@ -53,7 +54,8 @@ def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: 
         Written: c [m] and its derivatives by θ and the two.
     """
     clips, limbs = value.shape
-    mean, rates, own, change = np.zeros(limbs), np.zeros((limbs, 3)), np.empty((limbs, 1)), np.empty(1)
+    mean, rates, own, change = work_array(limbs), work_array((limbs, 3)), work_array((limbs, 1)), work_array(1)
+    mean[:], rates[:] = 0.0, 0.0
     for i in range(clips):
         for j in range(limbs):
             mean[j] += weights[i] * value[i, j]

@@ -16,11 +16,12 @@ from numba import njit
 
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Quat
+from controllers.work_array import work_array
 
 _Normal = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@njit
+@njit(forceinline=True)
 def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
     """Entries A11, A12, A13, A22, A23, A33 and g1, g2, g3."""
     a11 = a12 = a13 = a22 = a23 = a33 = g1 = g2 = g3 = 0.0
@@ -54,7 +55,7 @@ def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, floa
     )
 
 
-@njit
+@njit(forceinline=True)
 def _polish(unit: Array, weights: Array, q: Quat) -> bool:
     """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; tells whether A is positive definite at the end."""
     e = _normal_equations(unit, weights, q)
@@ -74,7 +75,8 @@ def _polish(unit: Array, weights: Array, q: Quat) -> bool:
 @njit
 def _dominant(unit: Array, weights: Array, q: Quat) -> None:
     """Eigenvector of the largest eigenvalue of M by squaring it 24 times: slow, and sure."""
-    m = np.zeros((4, 4))
+    m = work_array((4, 4))
+    m[:] = 0.0
     for i in range(unit.shape[0]):
         # Negative weights are made up for by a multiple of the identity, which turns no eigenvector.
         for j in range(4):
@@ -82,7 +84,7 @@ def _dominant(unit: Array, weights: Array, q: Quat) -> None:
         for j in range(4):
             for k in range(4):
                 m[j, k] += weights[i] * unit[i, j] * unit[i, k]
-    square = np.empty((4, 4))
+    square = work_array((4, 4))
     for _ in range(24):
         trace = m[0, 0] + m[1, 1] + m[2, 2] + m[3, 3]
         for j in range(4):
@@ -103,7 +105,7 @@ def _dominant(unit: Array, weights: Array, q: Quat) -> None:
         q[j] = m[j, column] / np.sqrt(norm)
 
 
-@njit
+@njit(forceinline=True)
 def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
     """Weighted mean of rotations.
 

@@ -37,6 +37,7 @@ from models.humanoid.skeleton import (
 from sim.body.contact_forces import N_EDGES
 from sim.body.falls import fall_state
 from sim.body.figure_state import REPORT_SIZE, Array, FigureGains, FigureState
+from sim.body.mass_matrix import mass_matrix
 from sim.body.whole_body import figure_torque
 from sim.compilation.units import unit_function
 from sim.errors import SimError
@@ -112,7 +113,6 @@ class Figure:
         n, qpos, dof = len(CONTACTS), int(root.qposadr[0]), int(root.dofadr[0])
         bodies, dofs = slice(body, body + len(BODIES)), slice(dof, dof + N_TANGENT)
         motors = slice(motor, motor + _N_MOTORS)
-        world_M = np.zeros((m.nv, m.nv))
         radius = float(m.geom_size[spheres[0], 0])
         stature = DEFAULT_STATURE * radius / CONTACT_RADIUS
         legs = [[BODIES.index(f"{side}_{name}") for name in ("thigh", "shank", "foot")] for side in ("left", "right")]
@@ -125,7 +125,7 @@ class Figure:
             contact_body=np.array([int(m.geom_bodyid[sphere]) - body for sphere in spheres]),
             twin_qpos=self.twin_data.qpos, twin_contact_pos=self.twin_data.geom_xpos,
             twin_contact=np.array([int(twin.geom(name).id) for name in CONTACTS]),
-            world_M=world_M, M=world_M[dofs, dofs], parent=np.array([segment.parent for segment in SEGMENTS]),
+            mass=mass_matrix(m, d, dofs), parent=np.array([segment.parent for segment in SEGMENTS]),
             legs=np.array(legs), torque_limit=m.actuator_ctrlrange[motors, 1].copy(),
             weight=float(m.body_subtreemass[body]) * float(np.linalg.norm(m.opt.gravity)),
             stature=stature, radius=radius,

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.borrowed import borrowed
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.map_feed import feed_maps, feed_rows
@@ -185,21 +186,9 @@ def field_force(servo: Servo) -> None:
     actuate(device, field.force)
 
 
-@entry_point
-def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
-    """Run n ticks from tick number `first`, or replay them.
-
-    Parameters
-    ----------
-    servo : Servo
-        Everything in it is updated.
-    first, n : int
-        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
-    replay : bool
-        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
-    ticks, frames : TickLog, FrameLog
-        Written (or read, see `replay`) row by row.
-    """
+@njit
+def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """`run_block`, over arrays that it borrows."""
     plant, device, every = servo.plant, servo.device, servo.figure_ticks
     for k in range(n):
         t = (first + k) * plant.period
@@ -236,6 +225,24 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             frames.ground[row] = plant.ground
         advance(device, plant, t, replay, ticks.applied[k])
         ticks.user[k] = device.force
+
+
+@entry_point
+def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """Run n ticks from tick number `first`, or replay them.
+
+    Parameters
+    ----------
+    servo : Servo
+        Everything in it is updated.
+    first, n : int
+        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
+    replay : bool
+        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
+    ticks, frames : TickLog, FrameLog
+        Written (or read, see `replay`) row by row.
+    """
+    _run(borrowed(servo), first, n, replay, borrowed(ticks), borrowed(frames))
 
 
 def rearm_servo(servo: Servo) -> None:

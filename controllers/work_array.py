@@ -1,0 +1,80 @@
+"""Work arrays of a compiled kernel on its stack: a servo's tick takes nothing from the heap.
+
+`numpy.empty` in compiled code takes memory from the heap in every call. A work array lies in the frame of the function
+that asks for it, as a local array does in C: it must not be returned, nor kept beyond that call. In Python, and so
+where a kernel is evaluated on symbols, it is `numpy.empty`.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+from numba.np.arrayobj import populate_array
+
+from controllers.state import Array, IntArray
+
+
+def work_array(shape: int | tuple[int, ...]) -> Array:
+    """Array of numbers that are not set, on the stack of the compiled caller.
+
+    Parameters
+    ----------
+    shape : int or tuple of int
+        Where it is not a constant, the caller must not ask again in a loop: the stack would grow with each turn.
+    """
+    return np.empty(shape)
+
+
+def work_integers(shape: int | tuple[int, ...]) -> IntArray:
+    """`work_array` of whole numbers."""
+    return np.empty(shape, np.int64)
+
+
+def _on_stack(kind: types.Type) -> Any:
+    """Array on the caller's stack, of a kind of numbers."""
+
+    @intrinsic(prefer_literal=True)
+    def array(_: Any, shape: Any) -> Any:
+        sizes = list(shape) if isinstance(shape, types.BaseTuple) else [shape]
+        made, constant = types.Array(kind, len(sizes), "C"), all(isinstance(size, types.Literal) for size in sizes)
+
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            index, number = context.get_value_type(types.intp), context.get_value_type(kind)
+            if constant:
+                shapes = [index(size.literal_value) for size in sizes]
+                count = index(int(np.prod([size.literal_value for size in sizes])))
+                # In the function's first block: one place, however often it is asked for in a loop.
+                data = cgutils.alloca_once(builder, number, count)
+            else:
+                parts = cgutils.unpack_tuple(builder, given[0]) if isinstance(shape, types.BaseTuple) else [given[0]]
+                shapes = [context.cast(builder, p, size, types.intp) for p, size in zip(parts, sizes, strict=True)]
+                count = index(1)
+                for size in shapes:
+                    count = builder.mul(count, size)
+                data = builder.alloca(number, count)
+            itemsize = index(context.get_abi_sizeof(number))
+            strides = [itemsize]
+            for size in reversed(shapes[1:]):
+                strides.insert(0, builder.mul(strides[0], size))
+            array = context.make_array(made)(context, builder)
+            populate_array(array, data, shapes, strides, itemsize, None)
+            return array._getvalue()
+
+        return made(shape), generate
+
+    return array
+
+
+_numbers, _integers = _on_stack(types.float64), _on_stack(types.int64)
+
+
+@overload(work_array, prefer_literal=True, strict=False, inline="always")
+def _work_array(shape: Any) -> Any:
+    return lambda shape: _numbers(shape)
+
+
+@overload(work_integers, prefer_literal=True, strict=False, inline="always")
+def _work_integers(shape: Any) -> Any:
+    return lambda shape: _integers(shape)
