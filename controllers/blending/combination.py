@@ -212,6 +212,9 @@ def _combine(
             pose[3 + 4 * joint + j] = q[joint, j]
     if tangents:
         for j in range(jacobian.shape[1]):
+            if chain[0, j] == 0.0 and chain[1, j] == 0.0 and chain[2, j] == 0.0:
+                jacobian[:, j] = 0.0
+                continue
             for i in range(3):
                 jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
             for joint in range(rotations):

@@ -72,7 +72,9 @@ def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Arr
         b = wall_slope(y, params[limits + 2], params[limits + 3], k, m)
         c = wall_slope(z, params[limits + 4], params[limits + 5], k, m)
         # ṙ = D(r) ω for a local ω, and D(r)ᵀ = D(−r).
-        torque[0], torque[1], torque[2] = rotation_vector_rate(-x, -y, -z, a, b, c)
+        torque[0], torque[1], torque[2] = 0.0, 0.0, 0.0
+        if a != 0.0 or b != 0.0 or c != 0.0:
+            torque[0], torque[1], torque[2] = rotation_vector_rate(-x, -y, -z, a, b, c)
     speed = np.sqrt(rates[0] * rates[0] + rates[1] * rates[1] + rates[2] * rates[2])
     if speed > gains.speed:
         share = gains.damping * (speed - gains.speed) / speed

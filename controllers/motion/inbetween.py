@@ -73,10 +73,10 @@ def correction(table: Array, angle: float, a: float, b: float, d: Array, slopes:
                 first = _TABLE + (((row + k) * (nodes + 2) + i + m) * (nodes + 2) + j + n) * channels
                 share = in_a[m] * in_b[n]
                 by_a, by_b = steps * in_a_slope[m] * in_b[n], steps * in_a[m] * in_b_slope[n]
+                values = table[first : first + channels]
                 for c in range(channels):
-                    d[0, c] += w * share * table[first + c]
+                    d[0, c] += w * share * values[c]
                 for c in range(channels if slopes else 0):
-                    value = table[first + c]
-                    d[1, c] += w_slope * share * value
-                    d[2, c] += w * by_a * value
-                    d[3, c] += w * by_b * value
+                    d[1, c] += w_slope * share * values[c]
+                    d[2, c] += w * by_a * values[c]
+                    d[3, c] += w * by_b * values[c]
