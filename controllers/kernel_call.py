@@ -43,6 +43,33 @@ call_as_given = cast(Callable[[int, tuple[Any, ...]], None], _call_as_given)
 """`kernel_call` of kernels whose arguments have the very types of those given."""
 
 
+@intrinsic
+def _lend(typingctx: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        place = cgutils.alloca_once_value(builder, values[0])
+        return builder.bitcast(place, context.get_value_type(signature.return_type))
+
+    return types.CPointer(value)(value), generate
+
+
+lend = cast(Callable[[tuple[Any, ...]], Any], _lend)
+"""Where a tuple lies in the compiled caller's frame, for kernels that it calls: they are handed one number in the place
+of all its arrays, number by number. Valid as long as the caller runs."""
+
+
+@intrinsic
+def _lent(typingctx: Any, place: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kind = context.get_value_type(signature.return_type).as_pointer()
+        return builder.load(builder.bitcast(values[0], kind))
+
+    return place.dtype(place), generate
+
+
+lent = cast(Callable[[Any], Any], _lent)
+"""The tuple that was lent; nothing checks that it still is."""
+
+
 def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     convention, arguments = context.call_conv, signature.args[1].types
     kernel = convention.get_function_type(types.void, arguments).as_pointer()

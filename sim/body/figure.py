@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from controllers.kernel_call import call_as_given, lend
 from models.humanoid.skeleton import (
     BODIES,
     CONTACT_RADIUS,
@@ -35,11 +36,12 @@ from models.humanoid.skeleton import (
     SEGMENTS,
 )
 from sim.body.contact_forces import N_EDGES
+from sim.body.drive import drive_unit
 from sim.body.falls import fall_state
 from sim.body.figure_state import REPORT_SIZE, Array, FigureGains, FigureState
 from sim.body.mass_matrix import mass_matrix
 from sim.body.whole_body import figure_torque
-from sim.compilation.units import unit_function
+from sim.compilation.compiled import entry_point
 from sim.errors import SimError
 
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
@@ -49,7 +51,9 @@ _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
 
 
-_update = unit_function(figure_torque.__module__, figure_torque.__qualname__)  # the same unit as in the servo's loop
+@entry_point
+def _update(drive: int, s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    call_as_given(drive, (lend((s, q_r, v_r, a_r)),))
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ class Figure:
         q_r, v_r, a_r : Array
             Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
         """
-        _update(self.state, q_r, v_r, a_r)
+        _update(drive_unit(self.state).address(), self.state, q_r, v_r, a_r)
 
     def _state(self) -> FigureState:
         m, d, twin = self.model, self.data, self.twin

@@ -1,9 +1,12 @@
 """The control of the physical figure, compiled: see `sim.body.figure` for its equations."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from controllers.borrowed import borrowed
+from controllers.kernel_call import lent
 from controllers.work_array import work_array
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
@@ -29,16 +32,17 @@ _N_FOOT = 4  # contact points of a foot
 
 
 @njit
-def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+def figure_torque(place: Any) -> None:
     """Set the motors' torques and the root's residual wrench for the reference of this control tick.
 
     Parameters
     ----------
-    s : FigureState
-        Reads the state, and the dynamics of the last physics step; writes `ctrl`, `applied` and `report`.
-    q_r, v_r, a_r : Array
-        Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
+    place
+        Where is lent (`controllers.kernel_call.lend`): the `FigureState`, whose state is read, and the dynamics of the
+        last physics step, and whose `ctrl`, `applied` and `report` are written; reference pose (75), velocity (57) and
+        acceleration (57), in the conventions of qpos and qvel.
     """
+    s, q_r, v_r, a_r = lent(place)
     _act(borrowed(s), borrowed(q_r), borrowed(v_r), borrowed(a_r))
 
 

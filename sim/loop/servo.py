@@ -31,7 +31,7 @@ from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array
-from sim.body.drive import BodyState, follow, follow_addresses
+from sim.body.drive import BodyState, follow, follow_addresses, lend_followed
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
 from sim.devices.device import DeviceState, actuate, advance, link_device, sense
@@ -186,10 +186,11 @@ def field_force(servo: Servo) -> None:
     actuate(device, field.force)
 
 
-@njit
+@njit(forceinline=True)
 def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
     """`run_block`, over arrays that it borrows."""
     plant, device, every = servo.plant, servo.device, servo.figure_ticks
+    followed = lend_followed(servo.figure, servo.reference, servo.argument, servo.field.memory[:TRACE_SIZE])
     for k in range(n):
         t = (first + k) * plant.period
         update_figure = (first + k) % every == 0
@@ -201,8 +202,7 @@ def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames:
             sense(device, t)
             field_force(servo)
             if update_figure:
-                trace = servo.field.memory[:TRACE_SIZE]
-                follow(servo.units, servo.figure, servo.reference, servo.argument, trace)
+                follow(servo.units, servo.figure, followed)
             ticks.hand[k] = device.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force
