@@ -18,12 +18,12 @@ _Value = TypeVar("_Value")
 @intrinsic
 def _borrowed(typingctx: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return _without_owner(context, builder, value, values[0])
+        return without_owner(context, builder, value, values[0])
 
     return value(value), generate
 
 
-def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The value of a type, in which no array knows whose memory it is in."""
     if isinstance(kind, types.Array):
         array = make_array(kind)(context, builder, value)
@@ -32,7 +32,7 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         return array._getvalue()
     if isinstance(kind, types.BaseTuple):
         for i, part in enumerate(cast(Any, kind).types):
-            inner = _without_owner(context, builder, part, builder.extract_value(value, i))
+            inner = without_owner(context, builder, part, builder.extract_value(value, i))
             value = builder.insert_value(value, inner, i)
     return value
 
@@ -44,5 +44,6 @@ class _Borrowed(Protocol):
 borrowed = cast(_Borrowed, _borrowed)
 """An array, or a tuple with arrays in it, whose references are not counted; for compiled code only.
 
-What it is made from must outlive every use of it: compiled code may neither return it nor keep it.
+What it is made from must outlive every use of it: compiled code may neither return it nor keep it. It is to be handed
+on to a function at once: numba takes assignments to what is made in the same function for dead, and drops them.
 """

@@ -12,6 +12,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from controllers.borrowed import without_owner
+
 
 def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, ...]], None]:
     """Call of kernels with given types of arguments, for compiled code: ``call(address, (argument, ...))``.
@@ -61,13 +63,14 @@ of all its arrays, number by number. Valid as long as the caller runs."""
 def _lent(typingctx: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         kind = context.get_value_type(signature.return_type).as_pointer()
-        return builder.load(builder.bitcast(values[0], kind))
+        tuple_ = builder.load(builder.bitcast(values[0], kind))
+        return without_owner(context, builder, signature.return_type, tuple_)
 
     return place.dtype(place), generate
 
 
 lent = cast(Callable[[Any], Any], _lent)
-"""The tuple that was lent; nothing checks that it still is."""
+"""The tuple that was lent, its references not counted (`controllers.borrowed`); nothing checks that it still is."""
 
 
 def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:

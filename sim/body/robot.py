@@ -67,6 +67,11 @@ class RobotState(NamedTuple):
 def robot_torque(place: Any) -> None:
     """Set the motors' torques for what is lent: state, reference angles [rad], rates, accelerations, (7,) each."""
     s, q_r, v_r, a_r = lent(place)
+    _act(s, q_r, v_r, a_r)
+
+
+@njit
+def _act(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     n = s.qpos.shape[0]
     saturated = 0

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from controllers.borrowed import borrowed
 from controllers.kernel_call import lent
 from controllers.work_array import work_array
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
@@ -43,7 +42,7 @@ def figure_torque(place: Any) -> None:
         acceleration (57), in the conventions of qpos and qvel.
     """
     s, q_r, v_r, a_r = lent(place)
-    _act(borrowed(s), borrowed(q_r), borrowed(v_r), borrowed(a_r))
+    _act(s, q_r, v_r, a_r)
 
 
 @njit(forceinline=True)

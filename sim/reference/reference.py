@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, typeof, types
 
-from controllers.borrowed import borrowed
 from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, VECTOR
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
@@ -63,7 +62,7 @@ def update_reference(place: Any) -> None:
         trace of the field (see `controllers.fields.instructions`), which river has the hand, and where on it that is.
     """
     reference, stylus, trace = lent(place)
-    _advance(borrowed(reference), borrowed(stylus), borrowed(trace))
+    _advance(reference, stylus, trace)
 
 
 @njit(forceinline=True)
