@@ -19,6 +19,7 @@ leg cannot give is residual too. No spring holds the root. A figure that falls l
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -103,7 +104,11 @@ class Figure:
         q_r, v_r, a_r : Array
             Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
         """
-        _update(drive_unit(self.state).address(), self.state, q_r, v_r, a_r)
+        _update(self._kernel, self.state, q_r, v_r, a_r)
+
+    @cached_property
+    def _kernel(self) -> int:
+        return drive_unit(self.state).address()  # of the same unit as in the servo's loop
 
     def _state(self) -> FigureState:
         m, d, twin = self.model, self.data, self.twin
