@@ -174,7 +174,9 @@ def _combine(
     lower[:] = 0.0
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
-        root[:, :2] += correction[:, :2]
+        for k in range(4):
+            root[k, 0] += correction[k, 0]
+            root[k, 1] += correction[k, 1]
     elif limbs > 0:
         clearance = slice(3 + 4 * rotations + END - 1, value.shape[1], END)
         lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)

@@ -16,6 +16,7 @@ from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 _TERMS = 3  # as many mixtures of two are met exactly
 _ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
@@ -96,7 +97,7 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
     b0, b1, b2, b3 = basis(angle * scale - row)
     c0, c1, c2, c3 = basis_slope(angle * scale - row)
     stride = pairs * _TERMS * channels
-    table, rates = _INDEX + total * total + row * stride, np.empty(3)
+    table, rates = _INDEX + total * total + row * stride, work_array(3)
     d[:] = 0.0
     for a in range(len(clips)):
         for b in range(len(clips)):

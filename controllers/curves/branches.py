@@ -14,6 +14,7 @@ from controllers.curves.bounds import NODE
 from controllers.curves.closest_point import chord_square, nearest_on_piece
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC, PIECE, PIECES, TREE
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array, work_integers
 
 BRANCHES = 8  # of one curve at most; further ones are not seen
 
@@ -23,7 +24,7 @@ def _runs(blob: Array, at: int, px: float, py: float, pz: float, radius: float, 
     """Runs of pieces that come nearer than the radius, as rows [first, last, likely nearest]; returns their number."""
     pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
     breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
-    nodes = np.empty(64, np.int64)
+    nodes = work_integers(64)
     nodes[0] = 1
     top, count = 1, 0
     likely = math.inf
@@ -85,7 +86,7 @@ def branches(blob: Array, at: int, px: float, py: float, pz: float, radius: floa
     """
     if not np.isfinite(px + py + pz):
         return 0
-    runs, scratch = np.empty((BRANCHES, 3), np.int64), np.empty((48, 8))
+    runs, scratch = work_integers((BRANCHES, 3)), work_array((48, 8))
     pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
     breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
     count = _runs(blob, at, px, py, pz, radius, runs, scratch)

@@ -28,6 +28,7 @@ from controllers.curves.trajectory import (
     wrap_phase,
 )
 from controllers.state import Array
+from controllers.work_array import work_array, work_integers
 
 _TIE = 1e-11  # [m] a bound that promises less than this is not followed
 
@@ -185,8 +186,8 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         return blob[at + START], np.nan
     pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
     breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
-    scratch = np.empty((48, 8))
-    nodes, squares = np.empty(64, np.int64), np.empty(64)
+    scratch = work_array((48, 8))
+    nodes, squares = work_integers(64), work_array(64)
     best: float = math.inf
     best_t = float(blob[at + START])
     # From the warm leaf upwards, each sibling of an ancestor is searched if it is in reach; without one, the root.

@@ -6,6 +6,7 @@ from numba import njit
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, PIECE, find_piece, wrap_phase
 from controllers.rotations import multiply
 from controllers.state import Array
+from controllers.work_array import work_array
 
 _Quat = tuple[float, float, float, float]
 
@@ -21,7 +22,7 @@ def curve_orientation(blob: Array, at: int, t: float) -> tuple[_Quat, tuple[floa
     piece = find_piece(blob, at, t)
     u = t - blob[at + int(blob[at + BREAKS]) + piece]
     row = at + int(blob[at + COEFFICIENTS]) + piece * PIECE + 3
-    s, d = np.empty(4), np.empty(4)
+    s, d = work_array(4), work_array(4)
     for k in range(4):
         a, b, c, e = blob[row + k], blob[row + 7 + k], blob[row + 14 + k], blob[row + 21 + k]
         s[k], d[k] = a + u * (b + u * (c + u * e)), b + u * (2.0 * c + 3.0 * u * e)

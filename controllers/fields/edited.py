@@ -19,6 +19,7 @@ from controllers.fields.law import Law, Program
 from controllers.fields.river import River, river_flow
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, Array
+from controllers.work_array import work_array
 
 _SPACING = 0.01  # [s] between samples of a performance: finer than a hand moves, coarser than encoders count
 _LONGEST_TICK = 0.05  # [s] a recording that waits does not leap after a pause
@@ -67,7 +68,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     if not np.isfinite(time + p[0] + p[1] + p[2]):
         wrench[:] = np.nan
     elif start <= s <= end:
-        there, speed = np.empty(3), np.empty(3)
+        there, speed = work_array(3), work_array(3)
         there[0], there[1], there[2] = curve_point(params, performed, s)
         speed[0], speed[1], speed[2] = curve_velocity(params, performed, s)
         follow = FollowGains(gains.k_r, gains.b_d, gains.river_inverse_square)

@@ -19,6 +19,7 @@ from controllers.fields.instructions import TRACE_RIVER, leave_trace
 from controllers.fields.law import Law, Program
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+from controllers.work_array import work_array
 
 
 class Crossing(NamedTuple):
@@ -118,7 +119,7 @@ def _branch_mismatch(
 def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int:
     """Branches of all rivers in whose tubes p is, as rows of the table; returns their number."""
     count, crossing = 0, _crossing(params, at)
-    found = np.empty((BRANCHES, 2))
+    found = work_array((BRANCHES, 2))
     for number in range(int(crossing.rivers)):
         river, speeds, curve = _river(params, at, number)
         for k in range(branches(params, curve, p[0], p[1], p[2], river.epsilon, found)):
@@ -212,7 +213,7 @@ def higher_order_wrench(
         return
     wrench[:] = 0.0
     crossing = _crossing(params, at)
-    table = np.empty((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE))
+    table = work_array((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE))
     count = _candidates(params, at, p, _look(crossing.look, memory, slot, hand[HAND_TIME], v), table)
     if crossing.discrete > 0.0:
         winner = _discrete(params, at, table, count, memory, slot)

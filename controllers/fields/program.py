@@ -14,6 +14,7 @@ from controllers.fields.algebra import blend, gate, limit
 from controllers.fields.instructions import LAW_ARGUMENTS, STACK, TRACE_DISTANCE, TRACE_ROW, Join
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 _call = kernel_call(LAW_ARGUMENTS)
 
@@ -57,7 +58,7 @@ def evaluate(units: IntArray, ops: IntArray, params: Array, memory: Array, hand:
     ControllerError
         If the address of a kernel is 0.
     """
-    stack = np.empty((STACK, 6))
+    stack = work_array((STACK, 6))
     top = 0
     memory[TRACE_DISTANCE] = np.inf
     for row in range(ops.shape[0]):

@@ -26,6 +26,7 @@ from controllers.fields.law import Law, MapFeed, Program
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.rotations import logarithm, rotation_vector_rate
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array
+from controllers.work_array import work_array
 
 _COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9  # of a joint: three intervals follow; a hinge has one
 
@@ -101,7 +102,7 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
     nq, nv = int(gains.nq), int(gains.nv)
     pose, rest = memory[slot : slot + nq], slot + nq
     jacobian = memory[rest : rest + nv * STYLUS_TANGENT].reshape((nv, STYLUS_TANGENT))
-    rates, torque = np.zeros(3), np.empty(3)
+    rates, torque = work_array(3), work_array(3)
     wrench[:] = 0.0
     for n in range(int(gains.joints)):
         joint = at + _HEADER + n * _JOINT

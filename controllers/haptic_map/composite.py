@@ -1,6 +1,7 @@
 """The red-blue composite map: one clip walks, two others fight over its arms (Donald & Henle 2000, Figs. 5 to 7)."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 from numba import njit
@@ -16,7 +17,7 @@ from controllers.work_array import work_array
 
 COMPOSITE = 2
 _CLIPS = 3
-_R_MIN, _R_MAX, _BLEND = range(3)
+_R_MIN, _R_MAX, _SHARE, _BLEND = range(4)
 
 
 @njit
@@ -27,8 +28,9 @@ def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     a, slope = blend_weight(radius, params[_R_MIN], params[_R_MAX])
     weights, changes = work_array((2, _CLIPS)), work_array((2, 3, _CLIPS))
     weights[:], changes[:] = 0.0, 0.0
-    weights[0, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - a, a
-    changes[1, 1, 1], changes[1, 1, 2] = -slope, slope
+    share = params[_SHARE]
+    weights[0, 0], weights[1, 0], weights[1, 1], weights[1, 2] = 1.0, 1.0 - share, share * (1.0 - a), share * a
+    changes[1, 1, 1], changes[1, 1, 2] = -share * slope, share * slope
     blend(params[_BLEND:], angle, weights, changes, chain, memory, pose, jacobian)
 
 
@@ -36,7 +38,8 @@ class Composite(AnimationMap):
     r"""The lower body of one clip, the upper body blended between two.
 
     θ = atan2(y, x) is the phase, the radius blends red (inside) and blue (outside): weights 1 − u(r) and u(r) for
-    the joints of the upper body, which ease in at the edges (C²). Root and all other joints are the lower clip's. h
+    the joints of the upper body, which ease in at the edges (C²). Root and all other joints are the lower clip's, and a
+    share 1 − λ of the upper body where it cannot carry more of the others (`with_share`). h
     depends neither on the height nor on the orientation of the stylus; on the axis r = 0 it is not defined.
 
     Parameters
@@ -51,6 +54,8 @@ class Composite(AnimationMap):
         Limbs of the lower body that stand (see `limbs`).
     lap : float, optional
         As in `Cylindrical`.
+    apart : bool
+        Whether strides of the clips need not be in step.
 
     Raises
     ------
@@ -68,17 +73,45 @@ class Composite(AnimationMap):
         r_range: tuple[float, float],
         limbs: Sequence[Limb] = (),
         lap: float | None = None,
+        apart: bool = False,
     ) -> None:
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
-        self.r_range, self.upper_joints = r_range, tuple(upper_joints)
+        self.r_range, self.upper_joints, self.apart = r_range, tuple(upper_joints), apart
         numbers = checked_interval("r_range", r_range, 1e-3)
-        super().__init__(COMPOSITE, composite_map, (lower, red, blue), numbers, upper_joints, limbs, lap)
+        super().__init__(COMPOSITE, composite_map, (lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
+                         apart)  # fmt: skip
+        self.share = 1.0
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Whether red and blue are blended in by a part only."""
+        if self.share == 1.0:
+            return ()
+        return (f"the lower body bears {100 * self.share:.0f} % of the others' arms",)
+
+    def with_share(self, share: float) -> "Composite":
+        """The same map with another share λ of red and blue: 0 leaves the upper body to the lower clip.
+
+        Raises
+        ------
+        ParameterError
+            If it is not from 0 to 1.
+        """
+        if not 0.0 <= share <= 1.0:
+            raise ParameterError(f"the share of other clips' joints is from 0 to 1, got {share}")
+        other = copy(self)
+        other._params = self._params.copy()
+        other._params[_SHARE] = other.share = share
+        return other
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
+        numbers["share"] = np.array([self.share])
+        if self.apart:
+            numbers["apart"] = np.ones(1)
         return numbers | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
 
     @staticmethod
@@ -96,4 +129,6 @@ class Composite(AnimationMap):
         lower, red, blue = clips
         r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
         upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
-        return Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays))
+        share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
+        made = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
+        return made.with_share(share)

@@ -23,7 +23,7 @@ from controllers.work_array import work_array
 CYLINDRICAL = 1
 _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")
-_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _TABLE_SIZE, _TABLE = range(7)
+_R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _SHARE, _TABLE_SIZE, _TABLE = range(8)
 _NODES = 13  # of the corrections' table, across the blend each way
 _BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
 _EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
@@ -46,6 +46,10 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         w_r, d_r = (a, a_slope) if i % 2 == 1 else (1.0 - a, -a_slope)
         w_z, d_z = (b, b_slope) if i >= 2 else (1.0 - b, -b_slope)
         weights[last, i], changes[last, 1, i], changes[last, 2, i] = w_r * w_z, d_r * w_z, w_r * d_z
+    if owner >= 0:
+        weights[1] *= params[_SHARE]
+        changes[1] *= params[_SHARE]
+        weights[1, owner] += 1.0 - params[_SHARE]
     size = int(params[_TABLE_SIZE])
     table = params[_TABLE : _TABLE + size]
     d = work_array((4, table_channels(table) if size > 0 else 0))
@@ -53,8 +57,9 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
         j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
         correction(table, angle, i, j, d, jacobian.shape[0] > 0)
-        d[2] *= i_slope
-        d[3] *= j_slope
+        for k in range(d.shape[1]):
+            d[2, k] *= i_slope
+            d[3, k] *= j_slope
     blend_corrected(params[_TABLE + size :], angle, weights, changes, d, chain, memory, pose, jacobian)
 
 
@@ -82,7 +87,8 @@ class Cylindrical(AnimationMap):
     they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
 
     Clips that step differently have no mean that steps: a foot that one of them plants, another one lifts. With `upper`
-    joints only these are blended; root and legs are those of one clip everywhere, and so are its feet.
+    joints only these are blended; root and legs are those of one clip everywhere, and so are its feet. Where it bears
+    no more, only a share λ of the others' joints is blended into its own: weights are λ w_i + (1 − λ) of that clip.
 
     A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
     the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
@@ -116,6 +122,8 @@ class Cylindrical(AnimationMap):
         Of the ends at the mixtures, at equal steps of the lap; none without limbs.
     drifts : Array, shape (4, 3)
         ξ of each clip.
+    share : float
+        λ (see `with_share`).
 
     Raises
     ------
@@ -142,9 +150,9 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, 1e-3), *checked_interval("z_range", z_range, -np.inf))
         if not 0 <= legs_of < _CLIPS:
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
-        self.upper, self.legs_of = tuple(upper), legs_of
+        self.upper, self.legs_of, self.share = tuple(upper), legs_of, 1.0
         legs = 1.0 + legs_of if self.upper else 0.0
-        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 0.0), upper, limbs, lap,
+        super().__init__(CYLINDRICAL, cylindrical_map, clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
         self._numbers = numbers
         self._nodes, self.mixtures = _mixtures(_NODES)
@@ -175,7 +183,10 @@ class Cylindrical(AnimationMap):
         if not self.upper:
             return ()
         owner = _ORDINALS[self.legs_of]
-        return (f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's",)
+        told = f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's"
+        if self.share < 1.0:
+            told += f", which bear {100 * self.share:.0f} % of the others' arms"
+        return (told,)
 
     def places(self, angles: Array) -> Array:
         """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
@@ -201,12 +212,27 @@ class Cylindrical(AnimationMap):
         other._correct(values)
         return other
 
+    def with_share(self, share: float) -> "Cylindrical":
+        """The same map with another share λ of other clips' joints: 0 leaves them to the clip whose legs they are.
+
+        Raises
+        ------
+        ParameterError
+            If it is not from 0 to 1, or all joints are blended.
+        """
+        if not (self.upper and 0.0 <= share <= 1.0):
+            raise ParameterError(f"a map with legs of one clip takes a share of other joints from 0 to 1, got {share}")
+        other = copy(self)
+        other._params = self._params.copy()
+        other._params[_SHARE] = other.share = share
+        return other
+
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
         arrays = {"domain": np.array([self.r_range, self.z_range])}
         if self.upper:
             arrays["upper_joints"] = np.array(self.upper, dtype=np.float64)
-            arrays["legs_of"] = np.array([float(self.legs_of)])
+            arrays["legs_of"], arrays["share"] = np.array([float(self.legs_of)]), np.array([self.share])
         if self.limbs:
             arrays["corrections"] = self.corrections
         return arrays | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
@@ -229,6 +255,8 @@ class Cylindrical(AnimationMap):
             raise ParameterError(f"'upper_joints' of the map must be finite, got {upper}")
         clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
         owner = int(kept(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
-        return Cylindrical(
+        share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
+        made = Cylindrical(
             clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints, owner
         )  # fmt: skip
+        return made.with_share(share) if joints else made

@@ -36,9 +36,9 @@ def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
     angle = np.sqrt(a * a + b * b + c * c)
     faded, slope = blend_weight(angle, FADE_FROM, np.pi)
     turn[0], turn[1], turn[2] = a, b, c
-    unit = np.eye(3)
     for k in range(3):
-        rate = rotation_vector_rate(-a, -b, -c, unit[k, 0], unit[k, 1], unit[k, 2])
+        e_x, e_y, e_z = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+        rate = rotation_vector_rate(-a, -b, -c, e_x, e_y, e_z)
         # The angle grows by the share of ω about the axis; where it does not matter the slope is zero.
         fading = slope * turn[k] / max(angle, FADE_FROM)
         for i in range(3):

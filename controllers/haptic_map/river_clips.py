@@ -198,6 +198,8 @@ class RiverClips(AnimationMap):
         Limbs whose ends are placed: feet that stand (see `limbs`).
     lap : float, optional
         Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+    apart : bool
+        Whether strides of the clips need not be in step.
 
     Raises
     ------
@@ -213,6 +215,7 @@ class RiverClips(AnimationMap):
         tube: float,
         limbs: Sequence[Limb] = (),
         lap: float | None = None,
+        apart: bool = False,
     ) -> None:
         if len(clips) != len(curves) or not curves:
             raise ParameterError(
@@ -224,7 +227,8 @@ class RiverClips(AnimationMap):
         if not tube > 0.0:
             raise ParameterError(f"the tube of a map of rivers must be positive, got {tube} m")
         self.curves, self._tube = tuple(curves), tube
-        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs, lap)
+        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs, lap,
+                         apart)  # fmt: skip
 
     def _header(self, rests: Sequence[Array]) -> Array:
         """What the kernel reads before the blend."""

@@ -22,6 +22,7 @@ from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
 from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
+from controllers.work_array import work_array
 
 _STANDS, _FREE = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
 _MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0
@@ -130,7 +131,7 @@ def keep_footing(
     """
     state = footing[_ENDS + _END * limb : _ENDS + _END * (limb + 1)]
     points, cosine, sine = sole.shape[0], np.cos(frame[2]), np.sin(frame[2])
-    levers, before = np.empty((points, 3)), np.empty((points, 3))
+    levers, before = work_array((points, 3)), work_array((points, 3))
     turn = _yawed(frame[2] + state[_OFFSET + 2], q)
     low = _levers(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]

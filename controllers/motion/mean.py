@@ -75,7 +75,7 @@ def _polish(unit: Array, weights: Array, q: Quat) -> bool:
 @njit
 def _dominant(unit: Array, weights: Array, q: Quat) -> None:
     """Eigenvector of the largest eigenvalue of M by squaring it 24 times: slow, and sure."""
-    m = work_array((4, 4))
+    m, square = work_array((4, 4)), work_array((4, 4))
     m[:] = 0.0
     for i in range(unit.shape[0]):
         # Negative weights are made up for by a multiple of the identity, which turns no eigenvector.
@@ -84,7 +84,6 @@ def _dominant(unit: Array, weights: Array, q: Quat) -> None:
         for j in range(4):
             for k in range(4):
                 m[j, k] += weights[i] * unit[i, j] * unit[i, k]
-    square = work_array((4, 4))
     for _ in range(24):
         trace = m[0, 0] + m[1, 1] + m[2, 2] + m[3, 3]
         for j in range(4):

@@ -10,8 +10,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 NUMBERS = """
-table { font-size: .85rem; }
-th, td { padding: .25rem .7rem .25rem 0; text-align: right; white-space: nowrap; }
+table { font-size: .8rem; }
+th, td { padding: .25rem .55rem .25rem 0; text-align: right; white-space: nowrap; }
 th:first-child, td:first-child, .l { text-align: left; }
 td.says { white-space: normal; text-align: left; }
 tr.weak { color: #7b8698; }

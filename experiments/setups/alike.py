@@ -115,8 +115,3 @@ def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: fl
 def arms(legs: Sequence[Limb]) -> list[int]:
     """Joints of arms and head."""
     return [joint for joint in upper_joints(legs) if joint not in {BODIES.index(name) for name in _TRUNK}]
-
-
-def only_arms(made: Cylindrical, legs_of: int) -> Cylindrical:
-    """The same map in which only arms and head are blended: legs, root and trunk are those of one clip."""
-    return Cylindrical(made.clips, made.r_range, made.z_range, made.limbs, None, made.lap, arms(made.limbs), legs_of)

@@ -9,11 +9,9 @@ from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.preparation.poses import sole_points
-from models.mocap.ranges import beyond_ranges
 
 FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
 LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
-SINKS, BEYOND = 0.01, np.deg2rad(5.0)  # [m], [rad]: deeper soles, and joints further beyond their ranges, are unsound
 UPRIGHT = -0.5  # least vertical component of the pelvis axis: who kicks high leans by up to 97°, a cartwheel by 149°
 FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # of one that flies: it asks for 0.8 to 1.2 of gravity
 SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
@@ -52,19 +50,12 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
 
 
 def grounded(clips: Sequence[Clip]) -> int:
-    """The clip whose legs carry the arms of others, counted from 0: the first that stays on the floor.
+    """The clip by whose legs a lap is timed, counted from 0: the first that stays on the floor, or else the first.
 
-    Arms move the centre of mass, so flights of a clip are ballistic with its own arms alone. Of those that stay on the
-    floor, the first whose soles do not sink into it and whose joints are within their ranges, if there is one. Where
-    all fly, the first.
+    Whose legs carry the arms of others is found with the physical figure (`carried`); arms move the centre of mass, so
+    flights of a clip are ballistic with its own arms alone.
     """
-    stay = [i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0]
-    return next((i for i in stay if _sound(clips[i])), stay[0] if stay else 0)
-
-
-def _sound(clip: Clip) -> bool:
-    lowest = float(sole_points(clip.poses)[:, :, 2].min()) - CONTACT_RADIUS
-    return lowest > -SINKS and float(beyond_ranges(clip.poses).max()) < BEYOND
+    return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
 
 
 def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:

@@ -28,9 +28,10 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.kept import kept_array
 from experiments.files.map_files import load_figure_map, map_digest
-from experiments.setups.alike import arms, carries_alike, moves_alike, only_arms, upper_joints
+from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joints
 from experiments.setups.balance import balanced
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.setups.carried import carried
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -79,16 +80,19 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
     """
     motions, reach = _motions(clips, 4, "cylindrical"), place.reach
     radii, legs, lap = (place.radius - reach, place.radius + reach), figure_legs(figure), place.curve.duration
-    played = [clips[i % len(clips)] for i in range(len(motions))]
-    loops = [closed_loop(checked_clip(poses, fps, f"clip {i}"), fps) for i, (poses, fps) in enumerate(motions)]
-    owner = grounded(played)
-    if not same(clips) and not keeps_pace(played, in_step(loops, lap), lap):
-        apart = CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
-        return _about_circle(place, apart, clips).said(apart.remarks)
+
+    def with_legs_of(owner: int) -> CylindricalMap:
+        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
+
+    def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
+        return carried([with_legs_of(owner) for owner in range(len(clips))], [clip.name for clip in clips], lap)
+
+    if _out_of_step(clips, len(motions), lap):
+        return replace(_about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
     made = _cylinder(motions, radii, (-reach, reach), legs, lap)
 
-    def refined() -> CylindricalMap:
-        return balanced(made, figure, lap) if same(clips) or moves_alike(made, lap) else only_arms(made, owner)
+    def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
+        return (balanced(made, figure, lap), ()) if same(clips) or moves_alike(made, lap) else carrying()
 
     return replace(_about_circle(place, made, clips), refined=refined)
 
@@ -104,10 +108,14 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
     lower, red, blue = _motions(clips, 3, "composite")
     legs, radii = figure_legs(figure), (place.radius - place.reach, place.radius + place.reach)
     lap = place.curve.duration
-    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap)
+    apart = _out_of_step(clips, 3, lap)
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
 
-    def refined() -> CompositeMap:
-        return made if carries_alike(made, lap) else CompositeMap(lower, red, blue, arms(legs), radii, legs, lap)
+    def refined() -> tuple[CompositeMap, tuple[str, ...]]:
+        if carries_alike(made, lap):
+            return made, ()
+        only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
+        return carried([only], [clips[0].name], lap)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 
@@ -149,9 +157,12 @@ def _river_clips_parts(
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
     motions, place = _motions(clips, 3, part.kind), _place(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
-    made = RiverClipsMap(curves, motions, mode.river_tube, figure_legs(figure), place.curve.duration)
+    lap = place.curve.duration
+    made = RiverClipsMap(
+        curves, motions, mode.river_tube, figure_legs(figure), lap, _out_of_step(clips, 3, lap)
+    )  # fmt: skip
     parts = _about_circle(place, made, clips)
-    return replace(parts, plays_rivers=True, refined=lambda: with_rests(made, figure))
+    return replace(parts, plays_rivers=True, refined=lambda: (with_rests(made, figure), ()))
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
@@ -211,6 +222,14 @@ def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array,
     if not 1 <= len(clips) <= most:
         raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
     return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
+
+
+def _out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
+    """Whether a lap [s] of so many clips, fewer repeated, plays some too far from their pace if all step together."""
+    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    played = [i % len(clips) for i in range(count)]
+    in_time = in_step([loops[i] for i in played], lap)
+    return not same(clips) and not keeps_pace([clips[i] for i in played], in_time, lap)
 
 
 def _place(part: AnyMap) -> Place:

@@ -205,7 +205,7 @@ def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: 
     made, gait = led_map(clips[0], figure_legs(figure))
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
-        refined=lambda: balanced_on_ground(made, gait, figure),
+        refined=lambda: (balanced_on_ground(made, gait, figure), ()),
         remarks=lap_remark(clips[0]) + gait_remark(clips[0].name, made),
     )  # fmt: skip
 

@@ -94,7 +94,7 @@ class MapParts(Generic[Map]):
     curve : Trajectory
         Timed as the hand is to move.
     refined : callable, optional
-        The map, improved by what takes compiled code to find.
+        The map, improved by what takes compiled code to find, and what is then to be said.
     gains : FigureGains
         Of the physical figure.
     lap_seconds : float, optional
@@ -114,7 +114,7 @@ class MapParts(Generic[Map]):
     haptic_map: Map
     clips: tuple[Clip, ...]
     curve: Trajectory
-    refined: Callable[[], Map] | None = None
+    refined: Callable[[], tuple[Map, tuple[str, ...]]] | None = None
     gains: FigureGains = field(default_factory=FigureGains)
     lap_seconds: float | None = None
     moves: bool = False
@@ -136,8 +136,8 @@ class MapParts(Generic[Map]):
         """The same with the improved map; needs compiled code."""
         if self.refined is None:
             return self
-        made = self.refined()
-        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks)
+        made, told = self.refined()
+        return replace(self, haptic_map=made, remarks=self.remarks + made.remarks + told)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -114,6 +114,8 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     return {
         "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap,
         "pace": [round(one.duration / lap, 2) for one in played],
+        "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
+        "share": getattr(session.parts.maps.haptic_map, "share", None),
         "remarks": session.remarks, "off_pace": off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),

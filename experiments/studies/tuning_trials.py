@@ -1,7 +1,7 @@
 """Tuning against its baselines, repeated: the gain on held-back users, with a new search and new people every time.
 
-``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 5`` runs the tuning five times,
-each in a folder of its own, and goes on where it was stopped.
+``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 8 17`` runs replications 8 to 17
+of the tuning, each in a folder of its own, and goes on where it was stopped.
 """
 
 import sys
@@ -69,4 +69,5 @@ def _chosen(one: Tuned) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(told(tuning_trials(Path(sys.argv[1]), Path(sys.argv[2]), range(1, 1 + int(sys.argv[3]))))))
+    _, file, folder, first, last = sys.argv
+    print("\n".join(told(tuning_trials(Path(file), Path(folder), range(int(first), int(last) + 1)))))

@@ -16,11 +16,12 @@ from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.setups.defaults import resolved
 from experiments.trials.code_hash import code_hash
-from experiments.trials.design import Meeting, conditions, meetings
+from experiments.trials.design import Condition, Meeting, conditions, meetings
 from experiments.trials.errors import StudyError
 from experiments.trials.participants import participants
 from experiments.trials.study_config import StudyConfig, Words
 from models.mocap.library import embedded_names
+from sim.users.person import Person
 
 
 class Trial(NamedTuple):
@@ -50,8 +51,7 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
         If the design contradicts itself, a level sets what a run has not, or there is no such clip.
     """
     people = participants(study.users)
-    doing: Words = {"user": study.users.does, "person": people[0]}
-    bases = {number: _base(study, doing | c.words, c.levels) for number, c in enumerate(conditions(study))}
+    bases = {number: _base(study, people[0], condition) for number, condition in enumerate(conditions(study))}
     _check_apart(study, bases)
     trials: list[Trial] = []
     for meeting in meetings(study):
@@ -82,9 +82,10 @@ def key_of(config: RunConfig) -> str:
 
 
 def files_of(config: RunConfig) -> tuple[str, ...]:
-    """Files that a configuration names: clips that are not embedded, and the map's."""
+    """Files that a configuration names: clips that are not embedded, the map's, and the device's."""
     clips = tuple(name for name in config.map.clips if name not in embedded_names())
-    return clips + ((config.map.file,) if isinstance(config.map, MapFile) else ())
+    others = (config.map.file if isinstance(config.map, MapFile) else "", config.device.device_file)
+    return clips + tuple(name for name in others if name)
 
 
 @cache
@@ -100,16 +101,19 @@ def file_digest(name: str) -> str:
         return hashlib.sha256(Path(name).read_bytes()).hexdigest()
     except OSError as error:
         raise StudyError(
-            f"{name}: {error.strerror}; expected the file of a clip or a map, or one of the embedded clips, "
+            f"{name}: {error.strerror}; expected the file of a clip, a map or a device, or one of the embedded clips, "
             f"{', '.join(embedded_names())}"
         ) from None
 
 
-def _base(study: StudyConfig, words: Words, levels: Mapping[str, str]) -> RunConfig:
+def _base(study: StudyConfig, person: Person, condition: Condition) -> RunConfig:
+    words: Words = {"person": person, "seconds": study.seconds} | study.run | condition.words
+    if words.get("mode") != "lead":  # where the hand does nothing else
+        words.setdefault("user", study.users.does)
     try:
-        return run_config(**(study.run | words | {"seconds": study.seconds}))  # pyright: ignore
+        return run_config(**words)
     except ParameterError as error:
-        said = ", ".join(f"{factor} = {level}" for factor, level in levels.items())
+        said = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
         raise StudyError(f"study {study.name!r}, condition {said}: {error}") from None
     except TypeError as error:
         raise StudyError(

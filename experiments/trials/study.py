@@ -176,10 +176,11 @@ class Study:
         config = self.config
         kinds = {trial.config.figure.kind for trial in planned(replace(config, repetitions=1))}
         there = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
+        unasked = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure need not have the defaults
         for name in (*config.measures, config.ease, config.cost):
             if name not in MEASURES:
                 raise StudyError(f"study {config.name!r}: no measure {name!r}; there are {', '.join(MEASURES)}")
-            if name not in there and name in config.measures:
+            if name not in there and name not in unasked:
                 needed = MEASURES[name].figure
                 raise StudyError(
                     f"study {config.name!r}: {name!r} needs a figure that is {needed}; expected figure = {needed!r}"

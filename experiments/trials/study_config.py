@@ -26,7 +26,8 @@ class Users:
     seed : int
         Of the population that they are drawn from.
     does : str
-        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user".
+        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user"; they lead in the mode
+        "lead".
     """
 
     number: int = whole(1, default=12)
@@ -96,6 +97,8 @@ def study_from(values: Mapping[str, object], where: str) -> StudyConfig:
     ------
     ParameterError
         If it says something that a study has not, or leaves out what it must have.
+    StudyError
+        If a factor has no levels, or one of them twice.
     """
     given = dict(values)
     factors = given.get("factors", {})
@@ -106,10 +109,16 @@ def study_from(values: Mapping[str, object], where: str) -> StudyConfig:
 
 
 def _levels(name: str, levels: object) -> object:
+    if isinstance(levels, Mapping):
+        return cast(object, levels)
     if not isinstance(levels, list):
-        return levels
+        raise StudyError(f"factor {name!r} is {levels!r}; expected a list of values, or a table of levels")
     values = cast(list[object], levels)
-    return {" ".join(map(str, v)) if isinstance(v, list) else str(v): {name: v} for v in values}  # pyright: ignore
+    names = [" ".join(map(str, v)) if isinstance(v, list) else str(v) for v in values]  # pyright: ignore
+    if len(set(names)) < len(names):
+        twice = next(one for one in names if names.count(one) > 1)
+        raise StudyError(f"factor {name!r} has level {twice} twice; expected each value once")
+    return {level: {name: value} for level, value in zip(names, values, strict=True)}
 
 
 def read_toml(path: Path, what: str) -> dict[str, object]:

@@ -4,10 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import CodeType
 from typing import Any, Literal
 
 import numpy as np
 
+from controllers.certificates.report import hash_of
 from controllers.errors import ParameterError
 from experiments.certify.certify_simulation import certify
 from experiments.run_result import Run
@@ -106,7 +108,7 @@ def tune(
     search, users = search or Search(), tuple(panel) or (sim.user,)
     # What there is not is told, and what has to be compiled is, before anything runs.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
-    study = _study(search, space)
+    study = _study(search, _name(sim, space, cost, len(users), seconds, search))
     complete, ranges = (optuna.trial.TrialState.COMPLETE,), _ranges(space)
     for asked in range(len(study.trials), REFUSED_MOST * search.candidates):
         if len(study.get_trials(states=complete)) >= search.candidates:
@@ -135,14 +137,27 @@ def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     return {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
 
 
-def _study(search: Search, space: Mapping[str, tuple[float, float]]) -> Any:
+def _name(
+    sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: int, seconds: float, search: Search
+) -> str:
+    """Of a search in its journal: one of another simulation, space or cost does not go on with its numbers."""
+    code = getattr(cost, "__code__", None)
+    does = (
+        (code.co_code, code.co_names, [str(value) for value in code.co_consts if not isinstance(value, CodeType)])
+        if code
+        else type(cost).__qualname__
+    )
+    means = (search.sampler, search.seed, search.costs, search.allow_unknown)
+    return f"hvf.tune {hash_of((sim.description(), sorted(space.items()), does, users, seconds, means))}"
+
+
+def _study(search: Search, name: str) -> Any:
     import optuna
 
     from experiments.tuning.storage import storage_of
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     kept = None if search.journal is None else storage_of(search.journal)
-    name = f"hvf.tune {sorted(space.items())}"
     directions: list[Literal["minimize", "maximize"]] = ["minimize"] * search.costs
     return optuna.create_study(storage=kept, study_name=name, load_if_exists=True, directions=directions)
 

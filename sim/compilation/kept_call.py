@@ -1,4 +1,4 @@
-"""A compiled function that is handed its arguments once: a call then takes one number, and makes no memory.
+"""A compiled function that is handed its arguments once: a call then takes none, and makes no memory.
 
 Else each of the arrays in its arguments is taken apart anew in every call, with a header of its own from the heap. The
 arguments lie as compiled code holds them in memory that is kept, and the function is called by its address.
@@ -13,29 +13,36 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from controllers.state import Array
 from sim.compilation.compiled import entry_point
 
 _ADDRESS, _NUMBER = types.uintp, types.int64
 
 
 class KeptCall:
-    """Call of a compiled function, whose other arguments are kept.
+    """Call of a compiled function, whose arguments are kept.
 
     Parameters
     ----------
     function : callable
         Compiled; it returns nothing, and does not keep its arguments.
     before, after : tuple
-        Of its arguments, those before and after the whole number that a call hands over.
+        Of its arguments, those before and after the whole number.
+    number : Array, optional
+        Where the whole number lies that the function takes between them, shape (1,); by default it takes none.
     """
 
-    def __init__(self, function: Callable[..., None], before: tuple[Any, ...], after: tuple[Any, ...] = ()):
-        self._call, self._release = _compiled(function, numba.typeof(before), numba.typeof(after))
-        self._address = keep_arguments((before, after))
+    def __init__(
+        self, function: Callable[..., None], before: tuple[Any, ...], number: Array | None = None,
+        after: tuple[Any, ...] = (),
+    ):  # fmt: skip
+        kept = before, () if number is None else (number,), after
+        self._call, self._release = _compiled(function, *(numba.typeof(part) for part in kept))
+        self._address = keep_arguments(kept)
 
-    def __call__(self, number: int) -> None:
+    def __call__(self) -> None:
         """Call the function."""
-        self._call(self._address, number)
+        self._call(self._address)
 
     def __del__(self) -> None:
         if hasattr(self, "_address"):
@@ -68,29 +75,32 @@ def keep_arguments(arguments: Any) -> int:
 
 
 @cache
-def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
-    """What calls a function with kept arguments, by their address and a number, and what lets them go."""
-    together, parts = types.Tuple((before, after)), (*before.types, _NUMBER, *after.types)
+def _compiled(function: Any, before: Any, number: Any, after: Any) -> tuple[Any, Any]:
+    """What calls a function with kept arguments, by their address, and what lets them go."""
+    kinds = (before, number, after)
+    together, parts = types.Tuple(kinds), (*before.types, *(_NUMBER for _ in number.types), *after.types)
     function.compile(parts)
     found = function.overloads[parts]
     code = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
 
-    def calling(_: Any, address: Any, number: Any) -> Any:
+    def calling(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             kept = builder.load(_place(context, builder, together, given[0]))
-            first, last = (
-                cgutils.unpack_tuple(builder, builder.extract_value(kept, i), len(kinds.types))
-                for i, kinds in enumerate((before, after))
+            first, between, last = (
+                cgutils.unpack_tuple(builder, builder.extract_value(kept, i), len(kind.types))
+                for i, kind in enumerate(kinds)
             )
+            places = (context.make_array(number[0])(context, builder, value) for value in between)
+            whole = [builder.fptosi(builder.load(place.data), context.get_value_type(_NUMBER)) for place in places]
             shape = context.call_conv.get_function_type(types.none, parts)
             where = builder.inttoptr(context.get_constant(types.uintp, code), shape.as_pointer())
-            arguments = [*first, given[1], *last]
+            arguments = [*first, *whole, *last]
             status, _ = context.call_conv.call_function(builder, where, types.none, parts, arguments)
             with cgutils.if_unlikely(builder, status.is_error):
                 context.call_conv.return_status_propagate(builder, status)
             return context.get_dummy_value()
 
-        return types.none(_ADDRESS, _NUMBER), generate
+        return types.none(_ADDRESS), generate
 
     def releasing(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -104,10 +114,10 @@ def _compiled(function: Any, before: Any, after: Any) -> tuple[Any, Any]:
     call: Any = intrinsic(calling)
     release: Any = intrinsic(releasing)
 
-    def call_at(address: int, number: int) -> None:
-        call(address, number)
+    def call_at(address: int) -> None:
+        call(address)
 
     def release_at(address: int) -> None:
         release(address)
 
-    return njit((_ADDRESS, _NUMBER), nogil=True)(call_at), njit((_ADDRESS,))(release_at)
+    return njit((_ADDRESS,), nogil=True)(call_at), njit((_ADDRESS,))(release_at)

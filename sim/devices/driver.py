@@ -12,6 +12,7 @@ import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numba import njit
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
@@ -83,6 +84,19 @@ def fresh_telemetry() -> Array:
     return telemetry
 
 
+@njit
+def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
+    """`Arrivals.note`; `clocks` (3,) are the last difference of the clocks, the least, and when the last one came."""
+    delay = now - made
+    if math.isnan(clocks[0]):
+        clocks[1], told[JITTER] = delay, 0.0
+    else:
+        told[JITTER] += (abs(delay - clocks[0]) - told[JITTER]) / 16.0
+        clocks[1] = min(delay, clocks[1] + DRIFT * (now - clocks[2]))
+    clocks[0], clocks[2] = delay, now
+    told[STALENESS] = delay - clocks[1]
+
+
 class Arrivals:
     """Jitter and staleness of readings from when they came and when the device says that it made them.
 
@@ -96,22 +110,15 @@ class Arrivals:
     """
 
     def __init__(self, telemetry: Array):
-        self._told, self._delay, self._quickest, self._came = telemetry, math.nan, math.nan, math.nan
+        self._told, self._clocks = telemetry, np.full(3, np.nan)
 
     def again(self) -> None:
         """A device that began again has another clock."""
-        self._delay = math.nan
+        self._clocks[0] = math.nan
 
     def note(self, now: float, made: float) -> None:
         """A reading came at `now` that was made at `made`, each by its own clock [s]."""
-        delay, told = now - made, self._told
-        if math.isnan(self._delay):
-            self._quickest, told[JITTER] = delay, 0.0
-        else:
-            told[JITTER] += (abs(delay - self._delay) - told[JITTER]) / 16.0
-            self._quickest = min(delay, self._quickest + DRIFT * (now - self._came))
-        self._delay, self._came = delay, now
-        told[STALENESS] = delay - self._quickest
+        note_arrival(self._told, self._clocks, now, made)
 
 
 class Driver(Protocol):

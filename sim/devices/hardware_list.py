@@ -9,10 +9,12 @@
 | `dhd` | a device of Force Dimension |
 """
 
+import contextlib
+import ctypes
 import importlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +23,7 @@ from sim.devices.dhd import DHD, DhdDevice
 from sim.devices.driver import Driver
 from sim.devices.hdapi import HDAPI, HdapiDevice
 from sim.devices.hid import HidHandle, HidPhantom
+from sim.devices.hidapi_node import HidapiNode
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
@@ -142,13 +145,35 @@ def open_hid(path: str) -> HidHandle:
         If it cannot be opened, with what to do about it.
     """
     handle = hid_backend().device()
-    try:
+    with _said_why(path):
         handle.open_path(path.encode())
+    return handle
+
+
+def open_node(path: str) -> HidHandle | HidapiNode:
+    """A node by hidapi's own functions, or where its package does not export them by its binding.
+
+    Raises
+    ------
+    SimError
+        As `open_hid`.
+    """
+    library = ctypes.CDLL(hid_backend().__file__)
+    if not hasattr(library, "hid_read_timeout"):
+        return open_hid(path)
+    with _said_why(path):
+        return HidapiNode(library, path)
+
+
+@contextlib.contextmanager
+def _said_why(path: str) -> Generator[None, None, None]:
+    """Say why a node cannot be opened."""
+    try:
+        yield
     except OSError:
         if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
             raise SimError(f"no permission to open {path}; `hvf hardware doctor` prints the udev rule") from None
         raise SimError(f"{path} cannot be opened: it is gone, or another program has it") from None
-    return handle
 
 
 def open_device(name: str) -> Driver:
@@ -192,7 +217,7 @@ def _the_one(which: str, kind: str) -> FoundDevice:
 
 def _open_phantom(which: str) -> Driver:
     device = _the_one(which, "phantom")
-    return HidPhantom(open_hid(device.path), device.path)
+    return HidPhantom(open_node(device.path), device.path)
 
 
 def _open_spacemouse(which: str) -> Driver:

@@ -15,39 +15,35 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from controllers.safety.faults import Fault, first_not_finite
+from controllers.safety.faults import Fault
 from controllers.state import Array
+from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol
-from sim.devices.driver import (
-    BAD,
-    LOST,
-    READ,
-    ROUND_TRIP,
-    TEMPERATURE,
-    Arrivals,
-    DeviceIdentity,
-    DriverFault,
-    fresh_telemetry,
+from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_THETA
+from sim.devices.hid_reports import (
+    N_BOOT,
+    N_ENABLED,
+    N_LAST,
+    N_WATCHDOG,
+    TOLD_ENABLE,
+    TOLD_FAULT,
+    TOLD_GIVEN,
+    TOLD_NEW,
+    TOLD_NOW,
+    TOLD_SIZE,
+    TOLD_VALUE,
+    WATCHDOG,
+    HidMemory,
+    judge_report,
+    make_command,
 )
-from sim.devices.exchange import (
-    READING_CLOCK,
-    READING_GIMBAL,
-    READING_SEQUENCE,
-    READING_SWITCH,
-    READING_THETA,
-)
+from sim.devices.hidapi_node import Bytes, HidapiNode
 from sim.errors import SimError
 
-WATCHDOG = 0.01
-"""Time without a command after which the firmware switches the motors off [s]: twice the silence after which a command
-is no longer valid here, so that it acts when this process no longer can, and not before."""
-HOTTEST = 100.0
-"""Motor temperature that is a fault [°C]: 25 below what Maxon allows an RE 25's winding."""
-_BAD_IN_ROW = 3  # a disturbance spoils one report or two; a cable or a device that is broken goes on
 _DRAIN = 64  # reports that Linux keeps for a hidraw node
-_SENT = 256  # commands whose time is kept, for the round trip
-_CELSIUS = protocol.TEMPERATURE_UNIT
-_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
+_RESET = float(Fault.DEVICE_RESET)
 
 
 class HidHandle(Protocol):
@@ -66,7 +62,7 @@ class HidPhantom:
 
     Parameters
     ----------
-    handle : HidHandle
+    handle : HidHandle or HidapiNode
         Open; owned from here on.
     transport : str
         For people, such as ``/dev/hidraw3``.
@@ -81,20 +77,19 @@ class HidPhantom:
         If it speaks another major version, or is gone.
     """
 
-    def __init__(self, handle: HidHandle, transport: str, clock: Callable[[], float] = time.perf_counter):
+    def __init__(self, handle: HidHandle | HidapiNode, transport: str, clock: Callable[[], float] = time.perf_counter):
         self._handle, self._clock = handle, clock
         self._transport = transport
         handle.set_nonblocking(True)
-        self._take_identity()
         self.telemetry = fresh_telemetry()
-        self._arrivals = Arrivals(self.telemetry)
+        self._hid = HidMemory.fresh(self.telemetry)
+        self._take_identity()
         self._take_calibration()
-        self._last: int | None = None  # number of the last input report
-        self._taken = self._bad = 0
-        self._sent, self._sent_at = 0, np.full(_SENT, np.nan)
-        self._enabled_since: int | None = None  # number of the output report that switched the motors on
-        self._again = False  # the motors went off while nobody was there: switch off, then on
-        self._given = math.nan  # device's time of the reading that was handed out last
+        self._told, self._reading, self._off = items(self._hid.told), items(self._hid.reading), np.zeros(3)
+        self._judge, self._make = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
+        incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
+        incoming = incoming[: protocol.REPORT_SIZE + 1]  # a byte of room shows a report that is too long
+        self._receive, self._send = _transfers(handle, incoming, outgoing)
 
     def _feature(self, number: int) -> Any:
         try:
@@ -110,9 +105,10 @@ class HidPhantom:
             )
         if int(who["major"]) != protocol.VERSION[0]:
             raise DriverFault(Fault.VERSION_WRONG, int(who["major"]) + int(who["minor"]) / 10)
-        self._who, self._boot = who, int(who["boot"])
-        self._peak: Array = who["peak_torque"] * protocol.PEAK_UNIT
-        self._watchdog_us = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
+        self._who, numbers = who, self._hid.numbers
+        numbers[N_BOOT] = int(who["boot"])
+        numbers[N_WATCHDOG] = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
+        self._hid.peak[:] = who["peak_torque"] * protocol.PEAK_UNIT
         self._capabilities = int(who["capabilities"])
 
     def _take_calibration(self) -> None:
@@ -123,15 +119,13 @@ class HidPhantom:
                 f"{self._transport}: the calibration has counts a turn {counts.tolist()} and motor turns "
                 f"{turns.tolist()}; expected none to be 0"
             )
-        self._zero: Array = found["zero"].astype(np.float64)
-        self._angle: Array = 2.0 * np.pi / counts
-        self._turns: Array = turns
+        self._hid.zero[:], self._hid.angle[:], self._hid.turns[:] = found["zero"], 2.0 * np.pi / counts, turns
         who = self._who
         self.identity = DeviceIdentity(
             who["name"].decode(errors="replace"), self._transport, who["serial"].decode(errors="replace"),
             who["firmware"].decode(errors="replace"), bool(self._capabilities & protocol.HAS_MOTORS),
             bool(self._capabilities & protocol.HAS_WATCHDOG), bool(found["flags"] & protocol.CALIBRATED),
-            self._boot,
+            int(self._hid.numbers[N_BOOT]),
         )  # fmt: skip
 
     def calibrate(self, theta: Array, gimbal: Array) -> None:
@@ -146,131 +140,60 @@ class HidPhantom:
         reading = np.zeros(READING_GIMBAL + 3)
         if not self.read(reading, 0.1):
             raise SimError(f"{self._transport}: no reading came within 0.1 s, so there is nothing to calibrate")
-        counts = self._zero + reading[READING_THETA:] / self._angle
+        counts = self._hid.zero + reading[READING_THETA:] / self._hid.angle
         wanted = protocol.blank(protocol.CALIBRATION)
         wanted["flags"] = protocol.CALIBRATED
-        wanted["zero"] = np.rint(counts - np.concatenate([theta, gimbal]) / self._angle)
-        wanted["counts_per_turn"] = np.rint(2.0 * np.pi / self._angle / protocol.COUNT_UNIT)
-        wanted["motor_turns"] = np.rint(self._turns / protocol.TURN_UNIT)
+        wanted["zero"] = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
+        wanted["counts_per_turn"] = np.rint(2.0 * np.pi / self._hid.angle / protocol.COUNT_UNIT)
+        wanted["motor_turns"] = np.rint(self._hid.turns / protocol.TURN_UNIT)
         self._handle.send_feature_report(protocol.sealed(wanted))
         self._take_calibration()
-        if not np.array_equal(self._zero, wanted["zero"]):
+        if not np.array_equal(self._hid.zero, wanted["zero"]):
             raise SimError(f"{self._transport} did not keep the calibration; expected its motors to be off")
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; readings carry the device's time since its power-up."""
-        new, taken = False, 0
+        told, taken, new = self._told, 0, False
         try:
-            # A byte of room shows a report that is too long.
-            raw = self._handle.read(protocol.REPORT_SIZE + 1, math.ceil(timeout * 1e3))
-            while raw:
-                new = self._take(bytes(raw), reading) or new
-                taken += 1
-                raw = self._handle.read(protocol.REPORT_SIZE + 1) if taken < _DRAIN else []
+            size = self._receive(math.ceil(timeout * 1e3))
+            while size > 0:
+                told[TOLD_SIZE], told[TOLD_NOW] = size, self._clock()
+                self._judge()
+                if told[TOLD_FAULT] != 0.0:
+                    self._refuse()
+                new, taken = told[TOLD_NEW] > 0.0 or new, taken + 1
+                size = self._receive(0) if taken < _DRAIN else 0
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         if new:
-            self._given = float(reading[READING_CLOCK])
+            np.copyto(reading, self._hid.reading)
+            told[TOLD_GIVEN] = self._reading[READING_CLOCK]
         return new
 
-    def _take(self, raw: bytes, reading: Array) -> bool:
-        """Judge one input report, and write the reading that it has; whether it is a new one."""
-        if len(raw) != protocol.REPORT_SIZE or raw[0] != protocol.INPUT:
-            self.telemetry[BAD] += 1.0
-            raise DriverFault(Fault.REPORT_MALFORMED, len(raw))
-        if not protocol.is_sound(raw):
-            self.telemetry[BAD] += 1.0
-            self._bad += 1
-            if self._bad >= _BAD_IN_ROW:
-                raise DriverFault(Fault.CHECKSUM_WRONG, self._bad)
-            return False
-        self._bad = 0
-        report = protocol.unpacked_input(raw)
-        self._judge_boot(report.boot)
-        if self._last is None:
-            self._take_over(report)
-        if not self._is_next(report.sequence):
-            return False
-        reading[READING_THETA : READING_GIMBAL + 3] = (report.encoder - self._zero) * self._angle
-        reading[READING_SWITCH] = report.flags & protocol.SWITCH
-        reading[READING_CLOCK] = report.time_us * 1e-6
-        self._taken += 1
-        reading[READING_SEQUENCE] = self._taken
-        self._measure(report)
-        self._judge_status(report.status)
-        self._judge_watchdog(report)
-        return True
+    def _refuse(self) -> None:
+        """Raise what is wrong with a report."""
+        if self._told[TOLD_FAULT] == _RESET:
+            self._judge_boot()
+        raise DriverFault(Fault(int(self._told[TOLD_FAULT])), self._told[TOLD_VALUE])
 
-    def _take_over(self, report: protocol.InputReport) -> None:
-        """Go on where another program stopped: with its numbers, and with motors that its silence switched off."""
-        if not 0 <= report.answered <= self._sent:
-            self._sent = report.answered
-        self._again = bool(report.status & protocol.STATUS_WATCHDOG)
-
-    def _judge_boot(self, boot: int) -> None:
+    def _judge_boot(self) -> None:
         """A device that began again is asked anew who it is: with its zero it has lost what it was armed by.
 
         One that still knows its zero may be cleared and armed; any other stays a fault for as long as it is open.
         """
-        before = self._boot
-        if boot == before:
-            return
-        self._last = self._enabled_since = None
-        self._arrivals.again()
+        numbers = self._hid.numbers
+        before = int(numbers[N_BOOT])
+        numbers[[N_LAST, N_ENABLED]] = -1
+        self._hid.clocks[0] = math.nan  # it has another clock
         try:
             self._take_identity()
             self._take_calibration()
         except DriverFault:
             raise
         except SimError:  # no sound answer
-            self._boot = before
+            numbers[N_BOOT] = before
         if not self.identity.calibrated:
-            self._boot = before
-        raise DriverFault(Fault.DEVICE_RESET)
-
-    def _is_next(self, number: int) -> bool:
-        """Whether a report's number is ahead of the last one's; the same one again is refused, an older one a fault."""
-        ahead = 1 if self._last is None else (number - self._last + 2**31) % 2**32 - 2**31
-        if ahead <= 0:
-            self.telemetry[BAD] += 1.0
-            if ahead < 0:
-                raise DriverFault(Fault.SEQUENCE_BACK, -ahead)
-            return False
-        self.telemetry[LOST] += ahead - 1.0
-        self.telemetry[READ] += 1.0
-        self._last = number
-        return True
-
-    def _measure(self, report: protocol.InputReport) -> None:
-        now, told = self._clock(), self.telemetry
-        for i, celsius in enumerate(report.temperature):
-            told[TEMPERATURE + i] = math.nan if celsius == protocol.NO_TEMPERATURE else celsius * _CELSIUS
-        if 0 <= self._sent - report.answered < _SENT and report.answered > 0:
-            told[ROUND_TRIP] = now - self._sent_at[report.answered % _SENT] - report.held_us * 1e-6
-        self._arrivals.note(now, report.time_us * 1e-6)
-
-    def _judge_status(self, status: int) -> None:
-        hottest = -math.inf
-        for celsius in self.telemetry[TEMPERATURE : TEMPERATURE + 3].tolist():
-            hottest = max(hottest, celsius)  # what is not a number is left out
-        if status & protocol.STATUS_HOT or hottest >= HOTTEST:
-            raise DriverFault(Fault.OVER_TEMPERATURE, hottest)
-        told = status & _ERRORS
-        if told:
-            raise DriverFault(Fault.DEVICE_REPORTED, told)
-
-    def _judge_watchdog(self, report: protocol.InputReport) -> None:
-        """The firmware switched off: a fault where commands went out and did not arrive, and else a gap.
-
-        After a gap the force is ramped in again by who drives, so the motors may be switched on again.
-        """
-        since = self._enabled_since
-        if since is None or not report.status & protocol.STATUS_WATCHDOG or report.answered < since:
-            return
-        if report.time_us * 1e-6 - self._given > 0.5 * WATCHDOG:
-            self._again = True
-        else:
-            raise DriverFault(Fault.DEVICE_REPORTED, protocol.STATUS_WATCHDOG)
+            numbers[N_BOOT] = before
 
     def write(self, torque: Array, enable: bool) -> None:
         """See `sim.devices.driver.Driver.write`; a torque is cut at the peak torque that the device tells.
@@ -280,23 +203,16 @@ class HidPhantom:
         DriverFault
             If the device is gone, or a torque is not finite: then the motors are off.
         """
-        if not np.isfinite(torque).all():
+        told = self._told
+        np.copyto(self._hid.torque, torque)
+        told[TOLD_ENABLE], told[TOLD_NOW] = enable, self._clock()
+        self._make()
+        if told[TOLD_FAULT] != 0.0:
+            value = told[TOLD_VALUE]
             self.let_go()
-            raise DriverFault(Fault.FORCE_NOT_FINITE, first_not_finite(torque))
-        self._sent += 1
-        enable, self._again = enable and not self._again, False
-        if not enable:
-            self._enabled_since = None
-        elif self._enabled_since is None:
-            self._enabled_since = self._sent
-        shaft = np.clip(torque / self._turns, -self._peak, self._peak) / protocol.TORQUE_UNIT if enable else np.zeros(3)
-        report = protocol.packed_output(
-            enable, self._boot, self._sent % 2**32, self._watchdog_us, np.rint(shaft).astype(int).tolist(),
-            self._last or 0,
-        )  # fmt: skip
-        self._sent_at[self._sent % _SENT] = self._clock()
+            raise DriverFault(Fault.FORCE_NOT_FINITE, value)
         try:
-            written = self._handle.write(report)
+            written = self._send()
         except (OSError, ValueError):  # hidapi's binding raises ValueError once it is closed
             written = -1
         if written < 0:
@@ -305,9 +221,27 @@ class HidPhantom:
     def let_go(self) -> None:
         """Motors off, at once; never raises."""
         with contextlib.suppress(DriverFault):
-            self.write(np.zeros(3), False)
+            self.write(self._off, False)
 
     def close(self) -> None:
         """Let go, and give the device back."""
         self.let_go()
         self._handle.close()
+
+
+def _transfers(
+    handle: HidHandle | HidapiNode, incoming: Bytes, outgoing: Bytes
+) -> tuple[Callable[[int], int], Callable[[], int]]:
+    """What receives a report, in so many milliseconds, and what sends one."""
+    if isinstance(handle, HidapiNode):
+        return handle.transfers(incoming, outgoing)
+
+    def receive(timeout_ms: int) -> int:
+        raw = handle.read(len(incoming), timeout_ms)
+        incoming[: len(raw)] = raw
+        return len(raw)
+
+    def send() -> int:
+        return handle.write(outgoing.tobytes())
+
+    return receive, send

@@ -5,9 +5,8 @@ All integers are little-endian. Byte 0 is the report's number, the last four are
 of up to 32).
 """
 
-import struct
 import zlib
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,37 +49,6 @@ LAYOUTS = {INPUT: INPUT_REPORT, OUTPUT: OUTPUT_REPORT, IDENTITY: IDENTITY_REPORT
 
 TORQUE_UNIT, PEAK_UNIT, TEMPERATURE_UNIT, COUNT_UNIT, TURN_UNIT = 1e-6, 1e-5, 0.01, 1e-3, 1e-3
 """Of a torque [N m], a peak torque [N m], a temperature [°C], counts a turn, and motor turns a joint turn."""
-
-
-_INPUT = struct.Struct("<BBHIQ6i3hHIIHHI")
-_OUTPUT_HEAD = struct.Struct("<BBHII3iI32x")
-
-
-class InputReport(NamedTuple):
-    """What an input report tells, field by field as in `INPUT_REPORT`: a record of NumPy's is slow to take apart."""
-
-    flags: int
-    status: int
-    sequence: int
-    time_us: int
-    encoder: tuple[int, ...]
-    temperature: tuple[int, ...]
-    boot: int
-    answered: int
-    held_us: int
-    refused: int
-
-
-def unpacked_input(report: bytes) -> InputReport:
-    """The fields of the 64 bytes of an input report."""
-    f = _INPUT.unpack(report)
-    return InputReport(f[1], f[2], f[3], f[4], f[5:11], f[11:14], f[14], f[15], f[16], f[17])
-
-
-def packed_output(enable: bool, boot: int, sequence: int, watchdog_us: int, torque: list[int], answers: int) -> bytes:
-    """The 64 bytes of an output report; fields as in `OUTPUT_REPORT`."""
-    head = _OUTPUT_HEAD.pack(OUTPUT, ENABLE if enable else 0, boot, sequence, watchdog_us, *torque, answers)
-    return head + zlib.crc32(head).to_bytes(4, "little")
 
 
 def blank(report: int) -> npt.NDArray[Any]:

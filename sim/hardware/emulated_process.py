@@ -18,14 +18,19 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from sim.devices.driver import LOST, READ, ROUND_TRIP, Arrivals, DriverFault, fresh_telemetry
+from sim.compilation.compiled import entry_point
+from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
+from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, fresh_telemetry, note_arrival
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
+from sim.hardware.packets import BROKEN, NOTHING, monotonic, receive, transmit, wait_for_packet
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
 
 WATCHDOG = 0.02
 """Time without a command after which the device lets go [s]: twenty periods at 1 kHz."""
+_OFF = bytes(32)
 _SENT_AT, _PACKET = READING_SIZE, READING_SIZE + 1  # in a reading's packet: when it was sent, and how many numbers
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
 """What a bystander sees of the device: torques of its motors [N m], how often its watchdog let go, its clock [s]."""
@@ -83,6 +88,72 @@ def _command(packets: socket.socket, timeout: float) -> Array | None:
     return np.frombuffer(packet) if len(packet) == 32 else None
 
 
+class Link(NamedTuple):
+    """The servo's end of the packets, as compiled code holds it.
+
+    Attributes
+    ----------
+    descriptor : int
+        Of the socket.
+    packet, reading : Array
+        The last packet that came, with room for one number more, and the last reading, of `READING_SIZE`.
+    command : Array
+        Torques [N m], and 1 where the motors are to be on, shape (4,).
+    telemetry, clocks : Array
+        Of `sim.devices.driver`.
+    told : Array
+        See `TOLD_NEW`.
+    """
+
+    descriptor: int
+    packet: Array
+    reading: Array
+    command: Array
+    telemetry: Array
+    clocks: Array
+    told: Array
+
+
+TOLD_NEW, TOLD_SIZE, TOLD_WENT, TOLD_SENT, TOLD_SEQUENCE, TOLD_WAIT, TOLD_LENGTH = range(7)
+"""Readings taken; size of the packet that ended it, `NOTHING` where none did; what came of the last command, and when
+it was sent [s]; number of the last reading; how long one is waited for [s]."""
+
+
+@entry_point
+def take_readings(link: Link) -> None:
+    """Take all readings that are there, or the first that comes in time."""
+    told, telemetry = link.told, link.telemetry
+    told[TOLD_NEW], told[TOLD_SIZE] = 0.0, NOTHING
+    waited = False
+    while True:
+        size = receive(link.descriptor, link.packet)
+        if size == NOTHING and not waited and told[TOLD_NEW] == 0.0:
+            wait_for_packet(link.descriptor, told[TOLD_WAIT])
+            waited = True
+            continue
+        if size != 8 * _PACKET:
+            told[TOLD_SIZE] = size
+            break
+        for i in range(READING_SIZE):
+            link.reading[i] = link.packet[i]
+        told[TOLD_NEW] += 1.0
+    if told[TOLD_NEW] == 0.0:
+        return
+    number, now = link.reading[READING_SEQUENCE], monotonic()
+    telemetry[ROUND_TRIP] = now - told[TOLD_SENT]
+    telemetry[READ] += 1
+    telemetry[LOST] += max(0.0, number - told[TOLD_SEQUENCE] - 1.0) if told[TOLD_SEQUENCE] > 0.0 else 0.0
+    note_arrival(telemetry, link.clocks, now, link.packet[_SENT_AT])
+    told[TOLD_SEQUENCE] = number
+
+
+@entry_point
+def send_command(link: Link) -> None:
+    """Send the command, and note when."""
+    link.told[TOLD_SENT] = monotonic()
+    link.told[TOLD_WENT] = transmit(link.descriptor, link.command)
+
+
 class EmulatedDriver:
     """Driver of an emulated Phantom in another process.
 
@@ -96,59 +167,42 @@ class EmulatedDriver:
 
     def __init__(self, packets: socket.socket, calibrated: bool = True):
         packets.setblocking(False)
-        self._packets, self._sent, self._sequence = packets, time.monotonic(), 0.0
-        self._command, self._packet = np.zeros(4), np.zeros(_PACKET + 1)  # room that shows a packet that is too long
-        self.telemetry = fresh_telemetry()
-        self._arrivals = Arrivals(self.telemetry)
+        self._packets, self.telemetry, told = packets, fresh_telemetry(), np.zeros(TOLD_LENGTH)
+        self._reading, self._command = np.zeros(READING_SIZE), np.zeros(4)
+        link = Link(
+            packets.fileno(), np.zeros(_PACKET + 1), self._reading, self._command, self.telemetry, np.full(3, np.nan),
+            told,
+        )  # fmt: skip
+        told[TOLD_SENT] = time.monotonic()
+        self._torque, self._told = self._command[:3], items(told)
+        self._take, self._send = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
         """As `sim.devices.driver.Driver`."""
-        new = self._take(reading)
-        if not new and select.select([self._packets], [], [], timeout)[0]:
-            new = self._take(reading)
-        while new and self._take(reading):
-            pass
-        if not new:
-            return False
-        number, now = float(reading[READING_SEQUENCE]), time.monotonic()
-        self.telemetry[ROUND_TRIP] = now - self._sent
-        self.telemetry[READ] += 1
-        self.telemetry[LOST] += max(0.0, number - self._sequence - 1.0) if self._sequence else 0.0
-        self._arrivals.note(now, float(self._packet[_SENT_AT]))
-        self._sequence = number
-        return True
-
-    def _take(self, reading: Array) -> bool:
-        """Take the next packet; False if there is none."""
-        try:
-            size = self._packets.recv_into(self._packet.data)
-        except BlockingIOError:
-            return False
-        except OSError:
-            size = 0
-        if size == 0:
+        told = self._told
+        told[TOLD_WAIT] = timeout
+        self._take()
+        if told[TOLD_SIZE] == BROKEN:
             raise DriverFault(Fault.UNPLUGGED)
-        if size != 8 * _PACKET:
-            raise DriverFault(Fault.REPORT_MALFORMED, size)
-        reading[:] = self._packet[:READING_SIZE]
-        return True
+        if told[TOLD_SIZE] != NOTHING:
+            raise DriverFault(Fault.REPORT_MALFORMED, told[TOLD_SIZE])
+        np.copyto(reading, self._reading)
+        return told[TOLD_NEW] > 0.0
 
     def write(self, torque: Array, enable: bool) -> None:
         """As `sim.devices.driver.Driver`."""
-        self._command[:3], self._command[3] = torque, float(enable)
-        self._sent = time.monotonic()
-        try:
-            self._packets.send(self._command.data)
-        except BlockingIOError:
-            pass  # the device does not keep up; its readings will be stale
-        except OSError:
-            raise DriverFault(Fault.UNPLUGGED) from None
+        np.copyto(self._torque, torque)
+        self._command[3] = enable
+        self._send()
+        if self._told[TOLD_WENT] == BROKEN:
+            raise DriverFault(Fault.UNPLUGGED)
+        # Where there was no room, the device does not keep up; its readings will be stale.
 
     def let_go(self) -> None:
         """As `sim.devices.driver.Driver`."""
         try:
-            self._packets.send(bytes(32))
+            self._packets.send(_OFF)
         except OSError:
             return
 

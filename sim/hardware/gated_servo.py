@@ -9,10 +9,11 @@ from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import Array
 from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
-from sim.hardware.gated_tick import GateMemory, gated_tick
+from sim.hardware.gated_tick import TOLD_HEAT, TOLD_PUSHES, GateMemory, gated_tick
 from sim.loop.loop import make_logs, tick_channels
 from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
@@ -34,6 +35,8 @@ for _name, _shape in CHANNELS.items():
     _at = max((s.stop for s in _PLACES.values()), default=0)
     _PLACES[_name] = slice(_at, _at + (_shape[0] if _shape else 1))
 ROW_SIZE = _PLACES["temperature"].stop
+MISSED, LATENESS, COMPUTE = (_PLACES[_name].start for _name in ("missed", "lateness", "compute"))
+"""Places of a row that the clock fills."""
 
 
 def columns(rows: Array) -> dict[str, Array]:
@@ -91,22 +94,27 @@ class Ticker:
         self.gated = GateMemory.of(parts.gate, parts.driver.identity.own_weight)
         self._ticks, frames = make_logs(parts.servo, 1)
         field = parts.servo.field
-        self._block = KeptCall(run_block, (parts.servo,), (1, False, self._ticks, frames))
-        self._gate = KeptCall(gated_tick, (self._device, self.gated, field.limiter, field.tank, field.force))
-        self._timeout = READ_SHARE * parts.gate.period
-        self.row, self._number = np.zeros(ROW_SIZE), np.zeros(1)
-        self._views = {name: self.row[place] for name, place in _PLACES.items()}
+        # All that a tick needs lies in arrays that are kept, and is reached by views that are: it makes no memory.
+        self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
+        self._number, self._request = np.zeros(1), np.zeros(1)
+        self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
+        self._told, self._faults = items(self.gated.told), items(self._device.faults)
+        self._block = KeptCall(run_block, (parts.servo,), self._number, (1, False, self._ticks, frames))
+        gate = self._device, self.gated, field.limiter, field.tank, field.force
+        self._gate = KeptCall(gated_tick, gate, self._request)
         self._sources = self._row_sources()
+        self._keep_row = KeptCall(gather, (addresses_of(self._sources), self.row))
 
     def _row_sources(self) -> list[Array]:
-        """Where the numbers of a row come from, one after the other: views, so that keeping a row makes no memory."""
+        """Where the numbers of a row come from, one after the other: views."""
         device, gated, told = self._device, self.gated, self.parts.driver.telemetry
         one = {
             "tick": (self._number, 0), "fault": (device.faults, FAULT_CODE),
             "fault_value": (device.faults, FAULT_VALUE), "gaps": (device.faults, FAULT_GAPS),
             "state": (gated.gate, GATE_STATE), "gain": (gated.gate, GATE_GAIN),
-            "share": (gated.gate, GATE_SHARE), "heat": (gated.told, 0), "sequence": (device.reading, READING_SEQUENCE),
-            "clock": (device.reading, READING_CLOCK), "round_trip": (told, ROUND_TRIP), "jitter": (told, JITTER),
+            "share": (gated.gate, GATE_SHARE), "heat": (gated.told, TOLD_HEAT),
+            "sequence": (device.reading, READING_SEQUENCE), "clock": (device.reading, READING_CLOCK),
+            "round_trip": (told, ROUND_TRIP), "jitter": (told, JITTER),
             "staleness": (told, STALENESS), "lost": (told, LOST), "refused": (told, BAD),
         }  # fmt: skip
         sources = {name: channel.reshape(-1) for name, channel in tick_channels(self._ticks, 1).items()}
@@ -116,9 +124,8 @@ class Ticker:
             "theta": device.reading[READING_THETA : READING_THETA + 3],
             "gimbal": device.reading[READING_GIMBAL : READING_GIMBAL + 3],
             "temperature": told[TEMPERATURE : TEMPERATURE + 3],
-            "missed": self._views["missed"], "lateness": self._views["lateness"], "compute": self._views["compute"],
         }  # fmt: skip
-        return [sources[name] for name in CHANNELS]
+        return [sources.get(name, self.row[_PLACES[name]]) for name in CHANNELS]  # the clock's are told later
 
     @property
     def state(self) -> State:
@@ -134,31 +141,32 @@ class Ticker:
         """Latch a fault, from the next tick on."""
         latch(self._device.faults, int(fault), float(self._device.hand[0]), value)
 
-    def tick(self, number: int, request: int = NO_REQUEST) -> None:
-        """Read, compute, write: tick `number`, whose time is ``number T``.
+    def tick(self, number: float, request: int = NO_REQUEST) -> None:
+        """Read, compute, write: tick `number`, a whole number, whose time is ``number T``.
 
         A driver's fault is latched, and the motors are let go; nothing is raised.
         """
         parts, device = self.parts, self._device
         try:
             if parts.driver.read(device.reading, self._timeout):
-                device.reading[READING_THETA : READING_THETA + 3] -= parts.offset
+                np.subtract(self._theta, parts.offset, out=self._theta)
         except DriverFault as found:
             self.fail(found.fault, found.value)
         if request == CLEAR:
             rearm_servo(parts.servo)
-        self._block(number)
-        self._gate(request)
+        self._number[0], self._request[0] = number, request
+        self._block()
+        self._gate()
+        pushes = self._told[TOLD_PUSHES] > 0.0
         try:
-            parts.driver.write(self.gated.torque, self.gated.pushes)
+            parts.driver.write(self.gated.torque, pushes)
         except DriverFault as found:
             self.fail(found.fault, found.value)
-        if not self.gated.pushes and device.faults[FAULT_CODE] != 0.0:
+        if not pushes and self._faults[FAULT_CODE] != 0.0:
             parts.driver.let_go()
-        self._number[0] = number
-        np.concatenate(self._sources, out=self.row)
+        self._keep_row()
 
-    def note_time(self, missed: int, lateness: float, compute: float) -> None:
+    def note_time(self, missed: float, lateness: float, compute: float) -> None:
         """Add to the row what the clock says: deadlines missed so far, lateness and computing time of this tick [s]."""
-        view = self._views
-        view["missed"][0], view["lateness"][0], view["compute"][0] = missed, lateness, compute
+        row = self.row
+        row[MISSED], row[LATENESS], row[COMPUTE] = missed, lateness, compute

@@ -25,6 +25,7 @@ HOT = 0.98
 """Share of what a motor can dissipate from which on a demand that stays is a fault."""
 
 MOTORS_HOT = int(Fault.MOTORS_HOT)
+TOLD_HEAT, TOLD_PUSHES = 0, 1
 
 
 class GateMemory(NamedTuple):
@@ -37,7 +38,7 @@ class GateMemory(NamedTuple):
     heat : Array
         Of the motors (`controllers.safety.thermal`), shape (3,).
     told : Array
-        [share of a motor's heat that is used], shape (1,).
+        [share of a motor's heat that is used, 1 while the motors are on], shape (2,).
     force, torque : Array
         What gets through [N], and is commanded to the motors [N m], shape (3,).
     cooling : float
@@ -62,13 +63,8 @@ class GateMemory(NamedTuple):
         """Memory of a gate before its first tick; its motors are cold."""
         return cls(
             gate.params(), gate.detector.params(), gate.fresh_memory(), gate.detector.fresh_memory(), np.zeros(3),
-            np.zeros(1), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME), own_weight,
+            np.zeros(2), np.zeros(3), np.zeros(3), 1.0 - math.exp(-gate.period / THERMAL_TIME), own_weight,
         )  # fmt: skip
-
-    @property
-    def pushes(self) -> bool:
-        """Whether the motors are on."""
-        return bool(pushes(int(self.gate[GATE_STATE])))
 
 
 @entry_point
@@ -100,13 +96,15 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     weight = gravity_torques((memory[0], memory[1], memory[2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - held_back * weight[i]))
-    gated.told[0] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
+    gated.told[TOLD_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
     if gated.own_weight:
         for i in range(3):
             torque[i] += weight[i]
-    if gated.told[0] > HOT:
-        latch(faults, MOTORS_HOT, device.hand[0], gated.told[0])
-    if faults[FAULT_CODE] != 0.0 or not pushes(int(gated.gate[GATE_STATE])):
+    if gated.told[TOLD_HEAT] > HOT:
+        latch(faults, MOTORS_HOT, device.hand[0], gated.told[TOLD_HEAT])
+    on = pushes(int(gated.gate[GATE_STATE]))
+    gated.told[TOLD_PUSHES] = 1.0 if on else 0.0
+    if faults[FAULT_CODE] != 0.0 or not on:
         force[:] = 0.0
         torque[:] = 0.0
     book_force(tank, force)

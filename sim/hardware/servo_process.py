@@ -16,22 +16,27 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from controllers.errors import ControllerError, ParameterError
 from controllers.safety.arming import NO_REQUEST
 from controllers.safety.faults import Fault
+from controllers.state import Array, IntArray
 from models.errors import ModelError
+from sim.compilation.compiled import entry_point
+from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
-from sim.hardware.gated_servo import GatedServo, Ticker
+from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
-from sim.hardware.shared import Ring, SharedNumbers
-from sim.hardware.spread import Quantiles, Spread
+from sim.hardware.shared import Ring, SharedNumbers, append_row, read_whole, write_whole
+from sim.hardware.spread import Quantiles, Spread, count_time
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """What controls tell the servo: a number that changes, the number of a request, the request, 1 to end."""
 
-_PARENT_EVERY = 100  # ticks between two looks at whether there are controls still
+_getppid = types.ExternalFunction("getppid", types.int32())
 
 
 @dataclass(frozen=True)
@@ -88,9 +93,9 @@ class Ended(NamedTuple):
     compute, lateness : Quantiles
         Of a tick.
     memory_growth : float
-        Of the resident memory since the first second [MB].
+        Of the resident memory since the first tick [MB].
     descriptors : int
-        Open files more than after the first second.
+        Open files more than at the first tick.
     broken : str
         The program's own failure, if that was the end.
     """
@@ -142,6 +147,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
     finally:
         parts.driver.let_go()
         channels.told.send(process.ended(broken))
+        process.close()
         parts.driver.close()
 
 
@@ -149,8 +155,29 @@ def _leave(number: int, frame: object) -> None:
     raise SystemExit(0)
 
 
+@entry_point
+def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
+    """Read what the controls order (as `sim.hardware.shared.read_whole`), and whose child this process is, (1,)."""
+    read_whole(count, shared, whole, order)
+    parent[0] = _getppid()
+
+
+@entry_point
+def leave_row(
+    row: Array, status_count: IntArray, status: Array, count: IntArray, rows: Array, compute: Spread, lateness: Spread
+) -> None:
+    """Show a tick's row to the others, and count its times."""
+    write_whole(status_count, status, row)
+    append_row(count, rows, row)
+    count_time(compute, float(row[COMPUTE]))
+    count_time(lateness, float(row[LATENESS]))
+
+
 class ServoProcess:
     """A servo against the clock: what `serve` runs.
+
+    A tick takes nothing from the heap: compiled code works on arrays that are kept, and what Python counts and
+    compares are floating-point numbers, which it takes from a list of its own; whole numbers above 256 it makes anew.
 
     Parameters
     ----------
@@ -161,12 +188,16 @@ class ServoProcess:
     """
 
     def __init__(self, ticker: Ticker, channels: Channels, clock: ServoClock):
-        self._ticker, self._channels, self._clock = ticker, channels, clock
+        self._ticker, self._told, self._clock = ticker, channels.told, clock
         self._period = ticker.parts.gate.period
-        self._order = np.zeros(ORDER_SIZE)
-        self._ordered = self._order.data  # whose items are Python's numbers
-        self._compute, self._lateness = Spread(), Spread()
-        self._ticks = self._missed = 0
+        order, parent = np.zeros(ORDER_SIZE), np.zeros(1)
+        self._order, self._parent = items(order), items(parent)
+        self._compute, self._lateness = Spread.empty(), Spread.empty()
+        orders, status, rows = channels.orders, channels.status, channels.rows
+        self._hear = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
+        self._rows, shown = rows.numbers, (status.count, status.numbers, rows.count, rows.numbers)
+        self._leave = KeptCall(leave_row, (ticker.row, *shown, self._compute, self._lateness))
+        self._ticks = self._missed = 0.0
         self._heard, self._beat, self._done = time.monotonic(), -1.0, 0.0
         self._resources = _resources()
 
@@ -176,29 +207,29 @@ class ServoProcess:
             self._ticker.tick(0)
         said = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._ticker.tick(0)
+        self._rows.sum()  # what is touched for the first time takes a page from the system
         self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # what came while nobody was there to read
-        self._channels.told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
+        self._resources = _resources()
+        self._told.send(Ready(self._ticker.parts.driver.identity, self._period, said))
 
     def run(self) -> None:
         """Tick at absolute deadlines, until there is an order to end, or nobody who could give one."""
-        period, parent = self._period, os.getppid()
+        period, parent = self._period, float(os.getppid())
         begin = self._heard = time.monotonic()
-        number, settled = 1, round(1.0 / period)
+        number = 1.0
         while True:
             late = wait_until(begin + number * period)
-            skipped = int(late / period)
+            skipped = late // period
             self._missed += skipped
             number += skipped
-            if not self.turn(number, late) or (self._ticks % _PARENT_EVERY == 0 and os.getppid() != parent):
+            if not self.turn(number, late) or self._parent[0] != parent:
                 return
-            number += 1
-            if self._ticks == settled:
-                self._resources = _resources()
+            number += 1.0
 
-    def turn(self, number: int, late: float) -> bool:
+    def turn(self, number: float, late: float) -> bool:
         """Do tick `number`, which begins late by so much [s]; False, and none, if there is an order to end."""
-        now, order, ticker, channels = time.monotonic(), self._ordered, self._ticker, self._channels
-        channels.orders.read(self._order)
+        now, order, ticker = time.monotonic(), self._order, self._ticker
+        self._hear()
         if order[ORDER_STOP] > 0.0:
             return False
         if late > self._clock.late:
@@ -209,21 +240,21 @@ class ServoProcess:
             ticker.fail(Fault.CONTROL_LOST, now - self._heard)
         new, self._done = order[ORDER_NUMBER] != self._done, order[ORDER_NUMBER]
         ticker.tick(number, int(order[ORDER_REQUEST]) if new else NO_REQUEST)
-        compute = time.monotonic() - now
-        ticker.note_time(self._missed, late, compute)
-        channels.status.write(ticker.row)
-        channels.rows.append(ticker.row)
-        self._compute.add(compute)
-        self._lateness.add(late)
-        self._ticks += 1
+        ticker.note_time(self._missed, late, time.monotonic() - now)
+        self._leave()
+        self._ticks += 1.0
         return True
+
+    def close(self) -> None:
+        """Let go of the memory that is shared, before it is closed."""
+        del self._hear, self._leave, self._rows
 
     def ended(self, broken: str) -> Ended:
         """What to say at the end."""
         memory, descriptors = (now - then for now, then in zip(_resources(), self._resources, strict=True))
         return Ended(
-            self._ticks, self._missed, self._compute.quantiles(), self._lateness.quantiles(), memory, int(descriptors),
-            broken,
+            int(self._ticks), int(self._missed), self._compute.quantiles(), self._lateness.quantiles(), memory,
+            int(descriptors), broken,
         )  # fmt: skip
 
 

@@ -1,22 +1,75 @@
 """Memory that processes share: numbers behind a sequence lock, and a ring of rows. Neither makes its writer wait.
 
-Numbers of eight bytes are written whole, and stores are seen in the order in which they are made, on x86; elsewhere a
-lock of this kind needs barriers that Python does not have.
+Numbers of eight bytes are written whole; barriers between count and numbers let every process, on every processor, see
+them in the order in which they are written.
 """
 
 import math
 from multiprocessing.shared_memory import SharedMemory
-from typing import Self, cast
+from typing import Any, Self
 
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 
-from controllers.state import Array
+from controllers.state import Array, IntArray
+from sim.compilation.compiled import entry_point
 
 _TRIES = 20  # so a writer that was stopped in the middle costs its reader microseconds
 
 
+def _fence(_: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+_barrier: Any = intrinsic(_fence)
+
+
+@entry_point
+def write_whole(count: IntArray, shared: Array, numbers: Array) -> None:
+    """`SharedNumbers.write`."""
+    count[0] += 1
+    _barrier()
+    for i in range(len(numbers)):
+        shared[i] = numbers[i]
+    _barrier()
+    count[0] += 1
+
+
+@entry_point
+def read_whole(count: IntArray, shared: Array, whole: Array, into: Array) -> bool:
+    """`SharedNumbers.read`; `whole` is as long as `into`, for what may not be whole."""
+    for _ in range(_TRIES):
+        before = count[0]
+        _barrier()
+        for i in range(len(whole)):
+            whole[i] = shared[i]
+        _barrier()
+        if before % 2 == 0 and before == count[0]:
+            for i in range(len(whole)):
+                into[i] = whole[i]
+            return True
+    return False
+
+
+@entry_point
+def append_row(count: IntArray, rows: Array, row: Array) -> None:
+    """`Ring.append`."""
+    place = count[0] % len(rows)
+    for i in range(len(row)):
+        rows[place, i] = row[i]
+    _barrier()
+    count[0] += 1
+
+
 class _Shared:
     """Memory of a whole number and an array; a process may end without closing it.
+
+    `count` and `numbers` are those, for compiled code; who keeps them lets them go before the memory is closed.
 
     Parameters
     ----------
@@ -29,12 +82,11 @@ class _Shared:
     def __init__(self, shape: tuple[int, ...], name: str | None):
         self._memory = SharedMemory(name, create=name is None, size=8 * (math.prod(shape) + 1))
         self._owner = name is None
-        # An item of a memoryview is one of Python's numbers, with no array made.
-        self._count = cast("memoryview[int]", self._memory.buf)[:8].cast("q")
-        self._numbers: Array = np.ndarray(shape, np.float64, self._memory.buf, 8)
+        self.count: IntArray = np.ndarray(1, np.int64, self._memory.buf)
+        self.numbers: Array = np.ndarray(shape, np.float64, self._memory.buf, 8)
         if self._owner:
-            self._count[0] = 0
-            self._numbers[:] = 0.0
+            self.count[0] = 0
+            self.numbers[:] = 0.0
 
     def close(self) -> None:
         """Let the memory go; who made it removes it."""
@@ -43,13 +95,12 @@ class _Shared:
             self._memory.unlink()
 
     def __del__(self) -> None:
-        if hasattr(self, "_numbers"):
+        if hasattr(self, "numbers"):
             self._unmap()
 
     def _unmap(self) -> None:
         # Memory cannot be given back while there are views into it.
-        self._count.release()
-        self._numbers = np.zeros(0)
+        self.count, self.numbers = np.zeros(0, np.int64), np.zeros(0)
         self._memory.close()
 
 
@@ -70,26 +121,18 @@ class SharedNumbers(_Shared):
 
     def __init__(self, size: int, name: str | None = None):
         super().__init__((size,), name)
-        self._size, self._whole = size, np.zeros(size)
+        self._size, self.whole = size, np.zeros(size)
 
     def __reduce__(self) -> tuple[type[Self], tuple[int, str]]:
         return type(self), (self._size, self._memory.name)
 
     def write(self, numbers: Array) -> None:
         """Write all of them, shape (size,)."""
-        self._count[0] += 1
-        self._numbers[:] = numbers
-        self._count[0] += 1
+        write_whole(self.count, self.numbers, numbers)
 
     def read(self, into: Array) -> bool:
         """Read all of them, shape (size,); False, and nothing, if a writer was stopped in the middle of them."""
-        for _ in range(_TRIES):
-            before = self._count[0]
-            self._whole[:] = self._numbers
-            if before % 2 == 0 and before == self._count[0]:
-                into[:] = self._whole
-                return True
-        return False
+        return read_whole(self.count, self.numbers, self.whole, into)
 
 
 class Ring(_Shared):
@@ -112,8 +155,7 @@ class Ring(_Shared):
 
     def append(self, row: Array) -> None:
         """Append a row, shape (width,), and count it only then."""
-        self._numbers[self._count[0] % self._shape[0]] = row
-        self._count[0] += 1
+        append_row(self.count, self.numbers, row)
 
     def take(self) -> tuple[Array, int]:
         """What has been appended since the last call.
@@ -125,10 +167,10 @@ class Ring(_Shared):
         lost : int
             Rows before them that were overwritten.
         """
-        rows, first, count = self._shape[0], self._taken, self._count[0]
+        rows, first, count = self._shape[0], self._taken, int(self.count[0])
         begin = max(first, count - rows + 1)
-        taken = self._numbers[np.arange(begin, count) % rows]
+        taken = self.numbers[np.arange(begin, count) % rows]
         # What was written over meanwhile: the row that is being written, and those before it.
-        sound = max(begin, self._count[0] - rows + 1)
+        sound = max(begin, int(self.count[0]) - rows + 1)
         self._taken = count
         return taken[min(sound, count) - begin :], min(sound, count) - first

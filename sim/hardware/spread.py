@@ -1,9 +1,11 @@
 """How long something took, over any number of times, in memory that does not grow."""
 
-from array import array
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
+
+from controllers.state import Array, IntArray
 
 BIN = 1e-6  # [s]
 _BINS = 100_000  # so up to 0.1 s; what is longer is counted in the last
@@ -19,22 +21,28 @@ class Quantiles(NamedTuple):
     times: int
 
 
-class Spread:
-    """Counts times by the microsecond."""
+class Spread(NamedTuple):
+    """Times counted by the microsecond: how many in each, shape (`_BINS`,), and the longest [s], shape (1,)."""
 
-    def __init__(self) -> None:
-        self._counts = array("q", bytes(8 * _BINS))
-        self._longest = 0.0
+    counts: IntArray
+    longest: Array
 
-    def add(self, seconds: float) -> None:
-        """Count a time [s]."""
-        self._counts[min(_BINS - 1, int(seconds / BIN))] += 1
-        self._longest = max(self._longest, seconds)
+    @classmethod
+    def empty(cls) -> "Spread":
+        """Nothing is counted."""
+        return cls(np.zeros(_BINS, np.int64), np.zeros(1))
 
     def quantiles(self) -> Quantiles:
         """What has been counted; zeros where nothing was."""
-        total = np.cumsum(np.frombuffer(self._counts, np.int64))
+        total = np.cumsum(self.counts)
         count = int(total[-1])
         p50, p99, p999 = (float(np.searchsorted(total, share * count) + 1) * BIN for share in (0.5, 0.99, 0.999))
-        longest = self._longest
+        longest = float(self.longest[0])
         return Quantiles(min(p50, longest), min(p99, longest), min(p999, longest), longest, count)
+
+
+@njit
+def count_time(spread: Spread, seconds: float) -> None:
+    """Count a time [s]."""
+    spread.counts[min(_BINS - 1, int(seconds / BIN))] += 1
+    spread.longest[0] = max(spread.longest[0], seconds)

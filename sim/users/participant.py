@@ -78,8 +78,9 @@ class Participant:
     def _numbers(self, period: float, reflex: int, seen: int) -> at.Array:
         person, n = self.person, np.zeros(at.N_NUMBERS)
         for name in ("grip", "stiffening", "grip_stiffness", "grip_damping", "strength", "fatigue", "reflex_gain",
-                     "skill", "felt_noise", "seen_noise", "refractory", "horizon", "motor_noise", "force_noise",
-                     "correction", "caution", "entrainment", "learning"):  # fmt: skip
+                     "skill", "felt_noise", "felt_force_noise", "direction_noise", "seen_noise", "refractory",
+                     "horizon", "motor_noise", "force_noise", "correction", "caution", "entrainment",
+                     "learning"):  # fmt: skip
             n[getattr(at, name.upper())] = getattr(person, name)
         n[at.PERIOD], n[at.WISH_PERIOD], n[at.LAP] = period, self.wishes.period, self.wishes.lap
         n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen

@@ -17,7 +17,8 @@ class Interval(NamedTuple):
     unit : str
         Of both.
     source : str
-        Where the interval is from. "(m)" marks a paper that is quoted from memory.
+        Where the interval is from. "(a)" marks a paper of which the abstract was read, "(q)" one as it is quoted by who
+        read it, "(m)" one quoted from memory; see docs/validation/published-numbers.md.
     """
 
     least: float
@@ -31,41 +32,62 @@ INTERVALS = {
     "skill": Interval(
         0.0, 1.0, "", "share of the arm's inertia that the motor command foresees; most of it: Gordon et al. 1994 II"
     ),
-    "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012: 1 to 3 N on this very device; up to 10 N when asked to"),
+    "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012 (a): 1 to 3 N on this very device; up to 10 N when asked to"),
     "mass": Interval(0.1, 2.5, "kg", "Speich et al. 2005: 1.46 kg (m); hand and wrist alone some 0.1 to 0.5 kg"),
     "stiffness": Interval(20.0, 800.0, "N/m", "Mussa-Ivaldi et al. 1985, Tsuji et al. 1995 (m): some 50 to 800 N/m"),
-    "damping_ratio": Interval(0.1, 1.2, "", "Perreault et al. 2004 (m): 0.3; Tsuji et al. 1995 (m): 0.2 to 0.6"),
+    "damping_ratio": Interval(
+        0.1, 1.2, "", "Perreault et al. 2004: alike for all people (q), 0.3 (m); Tsuji et al. 1995 (m): 0.2 to 0.6"
+    ),
     "anisotropy": Interval(1.0, 5.0, "", "Mussa-Ivaldi et al. 1985 (m): axes of the stiffness ellipse, 1.5 to 4"),
     "grip_stiffness": Interval(
         100.0, 3000.0, "N/m", "Speich et al. 2005 (m): 375 N/m; Hajian & Howe 1997 (m): to 1255"
     ),
     "grip_damping": Interval(1.0, 20.0, "N s/m", "Speich et al. 2005 (m): 7.9 N s/m; Hajian & Howe 1997 (m): 2 to 8"),
-    "stiffening": Interval(0.0, 1.0, "1/N", "Hasser & Cutkosky 2002: stiffness and damping rise steadily with grip"),
-    "strength": Interval(2.0, 60.0, "N", "a hand on a pen: below tip pinch, some 70 N (Mathiowetz 1985, m)"),
-    "fatigue": Interval(
-        0.0, 4.0, "1/min", "Frey-Law et al. 2012: rate F of a three-compartment model; grip 0.6 (m); 0 for none"
+    "stiffening": Interval(
+        0.0, 1.0, "1/N", "Hasser & Cutkosky 2002 (a), Tsuji et al. 1995 (q): stiffness and damping rise with grip"
     ),
-    "reflex_delay": Interval(0.03, 0.06, "s", "short and long latency stretch reflexes of the arm"),
+    "strength": Interval(
+        2.0, 60.0, "N", "a hand on a pen: below tip pinch, 78 N of men of 30 to 34 years (Mathiowetz et al. 1985, q)"
+    ),
+    "fatigue": Interval(
+        0.0, 4.0, "1/min", "Frey-Law et al. 2012 (a): F of a three-compartment model, 0.35 to 1.1; 0 for none"
+    ),
+    "reflex_delay": Interval(
+        0.03, 0.06, "s", "Kurtzer 2015 (a): short latency reflex of the arm 20 to 45 ms, long latency from 50 ms on"
+    ),
     "reflex_gain": Interval(0.0, 0.5, "", "share of stiffness and damping that is reflex, not muscle"),
     "visual_delay": Interval(
-        0.15, 0.25, "s", "time to correct on what is seen: Keele & Posner 1968 (m): 190 to 260 ms"
+        0.15,
+        0.25,
+        "s",
+        "until what is seen is corrected: Saunders & Knill 2005 (a) 0.12 to 0.2, Keele & Posner 1968 (q) 0.26",
     ),
-    "felt_noise": Interval(0.0, 0.02, "m", "van Beers et al. 1998 (m): proprioceptive localisation 5 to 10 mm"),
+    "felt_noise": Interval(
+        0.0, 0.02, "m", "van Beers et al. 1998 (a): shoulder and elbow are felt to 0.6 to 1.1°, 5 to 10 mm at the hand"
+    ),
+    "felt_force_noise": Interval(
+        0.0, 0.2, "", "Pang, Tan & Durlach 1991 (a): the just noticeable difference of a force is roughly 7 % of it"
+    ),
     "seen_noise": Interval(0.0, 0.01, "m", "van Beers et al. 1998 (m): visual localisation 1 to 3 mm"),
-    "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993: some 170 ms between corrections in tracking"),
-    "horizon": Interval(
-        0.15, 0.8, "s", "duration of a submovement in tracking: Miall, Weir & Stein 1993 find them at 0.5 to 1.8 Hz"
+    "direction_noise": Interval(
+        0.0, 0.2, "rad", "Gordon et al. 1994 I (a): an angle, the same for short ways and long ones; 3 to 6° (m)"
     ),
-    "motor_noise": Interval(0.0, 0.05, "s", "Meyer et al. 1988: the spread of endpoints is linear in A/T"),
+    "refractory": Interval(0.1, 0.25, "s", "Miall, Weir & Stein 1993 (a): some 170 ms between corrections in tracking"),
+    "horizon": Interval(
+        0.15, 0.8, "s", "duration of a submovement in tracking: Miall, Weir & Stein 1993 (a) find them at 0.5 to 1.8 Hz"
+    ),
+    "motor_noise": Interval(0.0, 0.05, "s", "Meyer et al. 1988 (a): the spread of endpoints is linear in A/T"),
     "force_noise": Interval(0.0, 0.1, "", "Jones et al. 2002 (m): coefficient of variation of force, 2 to 5 %"),
     "tremor": Interval(
-        0.0, 0.35, "m/s²", "normative study of postural tremor, Arch Neurol 39:358, 1982: 0.015 to 0.34"
+        0.0, 0.35, "m/s²", "Wade, Gresty & Findley 1982, postural tremor of 97 people (a): 0.015 to 0.34"
     ),
-    "tremor_frequency": Interval(6.0, 12.0, "Hz", "Lakie et al. 2015: a clear peak between 6 and 12 Hz"),
+    "tremor_frequency": Interval(6.0, 12.0, "Hz", "Lakie et al. 2015 (a): a clear peak between 6 and 12 Hz"),
     "correction": Interval(0.0, 1.0, "", "share of a perceived error that the next submovement makes up for"),
     "caution": Interval(1.0, 4.0, "", "standard deviations of her own scatter that a person keeps within a target"),
     "entrainment": Interval(0.0, 5.0, "1/s", "how fast her own clock gives way to a motion that runs ahead or behind"),
-    "learning": Interval(0.0, 0.5, "", "Thoroughman & Shadmehr 2000 (m): share learned a repetition, 0.1 to 0.3"),
+    "learning": Interval(
+        0.0, 0.5, "", "share learned a repetition: Smith et al. 2006 (q): 0.23, of which 0.21 is soon forgotten"
+    ),
 }
 """Interval of every number of a `Person`, with its unit and its source."""
 
@@ -110,6 +132,10 @@ class Person:
         Of what is seen [s].
     felt_noise, seen_noise : float
         Standard deviation of a place that is felt, and of one that is seen [m].
+    felt_force_noise : float
+        Standard deviation of a force that is felt, over the force.
+    direction_noise : float
+        Standard deviation of the angle by which a movement is felt to go in a wrong direction [rad].
     refractory : float
         Least time between two decisions [s].
     horizon : float
@@ -153,7 +179,9 @@ class Person:
     reflex_gain: float = 0.15
     visual_delay: float = 0.2
     felt_noise: float = 0.006
+    felt_force_noise: float = 0.07
     seen_noise: float = 0.0004
+    direction_noise: float = 0.1
     refractory: float = 0.15
     horizon: float = 0.42
     motor_noise: float = 0.0078

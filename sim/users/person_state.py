@@ -11,10 +11,10 @@ from sim.users.wishes import WISH_SIZE
 
 IntArray = npt.NDArray[np.int64]
 
-(GRIP, STIFFENING, GRIP_STIFFNESS, GRIP_DAMPING, STRENGTH, FATIGUE, REFLEX_GAIN, SKILL, FELT_NOISE, SEEN_NOISE,
- REFRACTORY, HORIZON, MOTOR_NOISE, FORCE_NOISE, TREMOR_GAIN, TREMOR_A, TREMOR_B, CORRECTION, CAUTION, ENTRAINMENT,
- LEARNING, PERIOD, WISH_PERIOD, LAP, REFLEX_TICKS, SEEN_TICKS, LOOK_TICKS,
- N_NUMBERS) = range(28)  # fmt: skip
+(GRIP, STIFFENING, GRIP_STIFFNESS, GRIP_DAMPING, STRENGTH, FATIGUE, REFLEX_GAIN, SKILL, FELT_NOISE, FELT_FORCE_NOISE,
+ DIRECTION_NOISE, SEEN_NOISE, REFRACTORY, HORIZON, MOTOR_NOISE, FORCE_NOISE, TREMOR_GAIN, TREMOR_A, TREMOR_B,
+ CORRECTION, CAUTION, ENTRAINMENT, LEARNING, PERIOD, WISH_PERIOD, LAP, REFLEX_TICKS, SEEN_TICKS, LOOK_TICKS,
+ N_NUMBERS) = range(30)  # fmt: skip
 """Numbers of a person, of her wishes, and her delays in ticks; the tremor's are of its filter."""
 
 (STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, CALM,
@@ -25,11 +25,12 @@ engaged, impedance over that of the reference grip, and until
 when the hand was where it should be [s]."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,
- TREMOR, TREMOR_BEFORE, FELT_FORCE, SHOWN, N_VECTORS) = range(18)  # fmt: skip
+ TREMOR, TREMOR_BEFORE, FELT_FORCE, MISFELT, SHOWN, VEERED, ASTRAY, N_VECTORS) = range(21)  # fmt: skip
 """Vectors in H: the hand's position and velocity; what the muscles drive it to (position, velocity, acceleration); the
 way that was intended so far; what sight adds to what is felt; noise of what is felt and seen; where she believes her
 hand is; the force that she wants; the reflexes'; noise of force; tremor now and a tick ago; the force that she
-feels; and the place that is shown."""
+feels, and the noise of that over the force; the place that is shown; by what angle her hand is felt to go in a wrong
+direction [rad], and how far that has led the felt place astray."""
 
 SENSED, DEVIATION, DEVIATING, SEEN, INTENT, PRESSED, PAST_SIZE = 0, 3, 6, 9, 12, 15, 18
 """Columns of what was: place that is felt, deviation from where she is driven and its rate, place that is seen, way

@@ -12,6 +12,7 @@ _SPREAD = {
     "grip_damping": 0.25, "strength": 0.25, "felt_noise": 0.25, "seen_noise": 0.2, "motor_noise": 0.2,
     "force_noise": 0.25, "tremor": 0.6, "tremor_frequency": 0.08, "reflex_delay": 0.12, "visual_delay": 0.07,
     "refractory": 0.1, "horizon": 0.12, "grip": 0.35, "entrainment": 0.3,
+    "direction_noise": 0.25,
 }  # fmt: skip
 """Standard deviation of the logarithm of each number between people: log-normal, so none is negative.
 

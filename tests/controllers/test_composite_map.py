@@ -39,10 +39,22 @@ def test_the_lower_body_is_one_clips_and_the_upper_turns_from_red_to_blue(angle)
     assert to_red > 0.05
 
 
+@pytest.mark.parametrize("angle", [0.3, 2.1, 5.9])
+def test_a_lower_body_that_bears_no_other_arms_keeps_its_own(angle):
+    none, some = MAP.with_share(0.0), MAP.with_share(0.25)
+    own, red = alone(IN_LOWER, angle), alone(IN_RED, angle)
+    np.testing.assert_allclose(difference(none.pose(stylus(0.05, angle, 0.0)), own), 0.0, atol=1e-9)
+    part = difference(some.pose(stylus(R[0], angle, 0.0)), own)[12:]
+    assert np.linalg.norm(part) == pytest.approx(0.25 * np.linalg.norm(difference(red, own)[12:]), rel=0.15)
+    assert (MAP.remarks, len(some.remarks)) == ((), 1)
+    with pytest.raises(ParameterError, match="from 0 to 1"):
+        MAP.with_share(-0.1)
+
+
 def test_the_derivative_agrees_with_differences_on_the_manifold():
     lower_leg = Limb((1, 2, 3), LEG.offsets, LEG.axis, LEG.points)
     four = [(np.hstack([poses, swinging(9, len(poses) - 1)[:, 7:11]]), fps) for poses, fps in (LOWER, RED, BLUE)]
-    h_map = Composite(*four, (4,), R, [lower_leg])
+    h_map = Composite(*four, (4,), R, [lower_leg]).with_share(0.6)
     rng, step, worst = np.random.default_rng(0), 1e-5, 0.0
     for _ in range(100):
         x = stylus(rng.uniform(0.02, 0.08), rng.uniform(0.01, 6.27), rng.uniform(-0.04, 0.04))

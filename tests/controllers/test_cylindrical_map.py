@@ -68,6 +68,30 @@ def test_root_and_legs_can_be_one_clips_everywhere(owner):
     assert ("first", "second", "third", "fourth")[owner] in arms.remarks[0]
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_share_of_other_joints_goes_that_part_of_the_way_to_them(share):
+    arms = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=1)
+    some = arms.with_share(share)
+    for corner in range(4):
+        for s in (0.1, 0.45, 0.8):
+            x = stylus(*_at(corner, s))
+            own, others = (
+                difference(some.pose(x), arms.with_share(0.0).pose(x)),
+                difference(arms.pose(x), arms.with_share(0.0).pose(x)),
+            )
+            np.testing.assert_allclose(own[:12], 0.0, atol=1e-12)
+            # The chordal mean of two rotations lies between them; its angle is near the share of theirs.
+            np.testing.assert_allclose(np.cross(own[12:], others[12:]), 0.0, atol=1e-9)
+            assert np.linalg.norm(own[12:]) == pytest.approx(share * np.linalg.norm(others[12:]), rel=0.15)
+    assert (f"{100 * share:.0f} % of the others' arms" in some.remarks[0]) == (share < 1.0)
+
+
+@pytest.mark.parametrize("made", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "too much"])
+def test_only_legs_of_one_clip_take_a_share_from_0_to_1(made):
+    with pytest.raises(ParameterError, match="share of other joints from 0 to 1"):
+        made.with_share(1.1 if made.upper else 0.5)
+
+
 def test_beyond_the_edges_nothing_is_extrapolated():
     for k, (r, z) in enumerate([(0.005, -0.2), (0.3, -0.1), (0.02, 0.2), (0.2, 0.31)]):
         np.testing.assert_array_equal(STILL.pose(stylus(r, 1.0, z)), STILL.pose(stylus(*_at(k, 1.0 / (2 * np.pi)))))
@@ -86,7 +110,10 @@ def test_the_blend_weight_eases_in_and_is_linear_between():
     np.testing.assert_allclose(np.diff(weight[(s > 0.2) & (s < 0.8)], 2), 0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("h_map", [STILL, MOVING], ids=["still", "moving"])
+ARMS = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=2).with_share(0.5)
+
+
+@pytest.mark.parametrize("h_map", [STILL, MOVING, ARMS], ids=["still", "moving", "arms"])
 def test_the_derivative_agrees_with_differences_on_the_manifold(h_map):
     rng = np.random.default_rng(0)
     step, worst = 1e-5, 0.0

@@ -59,6 +59,13 @@ def calibration() -> np.ndarray:
     return made
 
 
+def output_report(enable: bool, boot: int, sequence: int, watchdog_us: int, torque: list[int], answers: int) -> bytes:
+    made = protocol.blank(protocol.OUTPUT)
+    made["flags"], made["boot"], made["sequence"] = protocol.ENABLE if enable else 0, boot, sequence
+    made["watchdog_us"], made["torque"], made["answers"] = watchdog_us, torque, answers
+    return protocol.sealed(made)
+
+
 class Firmware:
     """The C state machine of `firmware/hvf_hid.c`, stepped from here, with sensors and motors as plain arrays."""
 

@@ -9,8 +9,23 @@ import pytest
 
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices import hid_protocol as protocol
+from sim.devices.driver import fresh_telemetry
+from sim.devices.exchange import READING_CLOCK, READING_SWITCH, READING_THETA
+from sim.devices.hid_reports import (
+    N_BOOT,
+    N_LAST,
+    N_SENT,
+    N_WATCHDOG,
+    TOLD_ENABLE,
+    TOLD_FAULT,
+    TOLD_NEW,
+    TOLD_SIZE,
+    HidMemory,
+    judge_report,
+    make_command,
+)
 from sim.errors import SimError
-from tests.devices.firmware import ROOT, Firmware, compiled
+from tests.devices.firmware import ROOT, Firmware, compiled, output_report
 from tests.devices.rig import Linkage
 
 STRUCTS = {
@@ -55,21 +70,30 @@ def test_every_field_lies_in_c_where_it_lies_in_python(tmp_path: Path) -> None:
     assert all(layout.itemsize == protocol.REPORT_SIZE for layout in STRUCTS.values())
 
 
-def test_taking_a_report_apart_and_putting_one_together_agree_with_the_layout() -> None:
-    rng = np.random.default_rng(9)
-    for _ in range(100):
-        raw = rng.bytes(64)
-        told, record = protocol.unpacked_input(raw), np.frombuffer(raw, protocol.INPUT_REPORT)[0]
-        for name, value in told._asdict().items():
-            np.testing.assert_array_equal(value, record[name], err_msg=name)
-        torque, answers = rng.integers(-(2**31), 2**31, 3).tolist(), int(rng.integers(0, 2**32))
-        made = np.frombuffer(
-            protocol.packed_output(True, 77, 2**32 - 1, 5000, torque, answers), protocol.OUTPUT_REPORT
-        )[0]
-        assert protocol.is_sound(made.tobytes())
-        assert made["torque"].tolist() == torque
-        fields = ("report", "flags", "boot", "sequence", "watchdog_us", "answers")
-        assert [int(made[name]) for name in fields] == [2, 1, 77, 2**32 - 1, 5000, answers]
+def test_reports_that_compiled_code_takes_apart_and_puts_together_are_those_of_the_layout() -> None:
+    rng, hid = np.random.default_rng(9), HidMemory.fresh(fresh_telemetry())
+    hid.angle[:], hid.turns[:], hid.peak[:] = 1.0, 1.0, 1e4
+    for k in range(100):
+        record = np.frombuffer(rng.bytes(64), protocol.INPUT_REPORT)[0].copy()
+        record["report"], record["status"], record["sequence"] = protocol.INPUT, 0, k + 1
+        record["temperature"] = rng.integers(1 - 2**15, 9000, 3)
+        hid.numbers[N_BOOT], hid.numbers[N_LAST] = record["boot"], k
+        hid.incoming.u8[:64], hid.told[TOLD_SIZE] = np.frombuffer(protocol.sealed(record), np.uint8), 64
+        judge_report(hid)
+        assert (hid.told[TOLD_FAULT], hid.told[TOLD_NEW]) == (0.0, 1.0)
+        np.testing.assert_array_equal(hid.reading[READING_THETA:], record["encoder"])
+        assert hid.reading[READING_SWITCH] == record["flags"] % 2
+        assert hid.reading[READING_CLOCK] == record["time_us"].astype(np.int64) * 1e-6
+        np.testing.assert_allclose(hid.telemetry[:3], record["temperature"] * protocol.TEMPERATURE_UNIT)
+
+        torque, sent = rng.integers(-(2**31), 2**31, 3), int(rng.integers(0, 2**32))
+        hid.torque[:], hid.told[TOLD_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
+        hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
+        make_command(hid)
+        made = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
+        assert made["torque"].tolist() == torque.tolist()
+        fields = ("flags", "boot", "sequence", "watchdog_us", "answers")
+        assert [int(made[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
 
 
 def test_constants_are_the_header_s(tmp_path: Path) -> None:
@@ -228,15 +252,18 @@ HEX = "0123456789abcdef "
 def test_the_page_s_bytes_are_those_of_the_firmware_and_of_the_driver(firmware: Firmware) -> None:
     """Units and signs, number by number: 1, −2, 3 mN m; 1000, −2000, 3000, 0, 100, −100 counts; 30 and 31 °C."""
     command = of_the_page(protocol.OUTPUT)
-    assert command == protocol.packed_output(True, 1, 7, 10_000, [1000, -2000, 3000], 42)
+    assert command == output_report(True, 1, 7, 10_000, [1000, -2000, 3000], 42)
     assert firmware.take(command)
     np.testing.assert_allclose(firmware.joint_torque, np.array([1e-3, -2e-3, 3e-3]) * PREMIUM_1_5.capstan, rtol=1e-12)
     firmware.sensors.encoder[:] = [1000, -2000, 3000, 0, 100, -100]
     firmware.sensors.pressed = 1
     told = firmware.tick()
     assert told == of_the_page(protocol.INPUT)
-    report = protocol.unpacked_input(told)
-    assert report == (1, 3, 1, 1000, (1000, -2000, 3000, 0, 100, -100), (3000, 3100, -32768), 1, 7, 1000, 0)
+    report = np.frombuffer(told, protocol.INPUT_REPORT)[0]
+    fields = ("flags", "status", "sequence", "time_us", "boot", "answered", "held_us", "refused")
+    assert [int(report[name]) for name in fields] == [1, 3, 1, 1000, 1, 7, 1000, 0]
+    assert report["encoder"].tolist() == [1000, -2000, 3000, 0, 100, -100]
+    assert report["temperature"].tolist() == [3000, 3100, protocol.NO_TEMPERATURE]
 
 
 @pytest.mark.parametrize("joint", range(3))
@@ -246,7 +273,7 @@ def test_a_positive_torque_in_the_bytes_turns_its_joint_so_that_its_encoder_coun
         linkage, k = Linkage(), 0
         for k in range(30):
             shafts = [torque * (i == joint) for i in range(3)]
-            assert firmware.take(protocol.packed_output(True, firmware.boot, k + 1, 10_000, shafts, 0))
+            assert firmware.take(output_report(True, firmware.boot, k + 1, 10_000, shafts, 0))
             linkage.turn(firmware.joint_torque)
             firmware.turn_to(linkage.angles())
             firmware.tick()

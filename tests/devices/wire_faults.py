@@ -282,7 +282,7 @@ def jump(wire: Wire, rng: np.random.Generator) -> int:
 
 def not_finite(wire: Wire, rng: np.random.Generator) -> int:
     """Integers hold no NaN; a calibration that was spoiled in memory would make one."""
-    wire.driver._angle[int(rng.integers(0, 6))] = np.nan
+    wire.driver._hid.angle[int(rng.integers(0, 6))] = np.nan
     return 0
 
 

@@ -48,9 +48,9 @@ def swaying():
 
 MAPS = [
     swaying(),
-    Composite(*CLIPS, (1, 2, 3), R, LEGS),
+    Composite(*CLIPS, (1, 2, 3), R, LEGS, apart=True).with_share(0.5),
     lifted(),
-    Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS, upper=(3, 4), legs_of=2),
+    Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS, upper=(3, 4), legs_of=2).with_share(0.25),
 ]
 
 

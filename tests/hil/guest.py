@@ -63,6 +63,7 @@ def main(library: str) -> None:
     check("readings are lost", link.lost, 0)
     check("readings are refused", link.refused, 0)
     check("readings come", link.readings > 200, True)
+    check("a round trip takes time", link.round_trip > 0.0, True)
     while driver.read(reading, 0.0):
         pass
 

@@ -17,6 +17,7 @@ class UhidDevice:
 
     def __init__(self, firmware: Firmware, name: str = "Reference", serial: str = "HVF-0001"):
         self.firmware, self.fd, self._lock = firmware, os.open("/dev/uhid", os.O_RDWR), threading.Lock()
+        self._begun: float | None = None  # when its clock was zero, while it goes on by itself
         descriptor = firmware.descriptor()
         who = (name.encode(), b"uhid", serial.encode(), len(descriptor))
         head = struct.pack("<I128s64s64sHHIIII", CREATE2, *who, _USB, 0x16C0, 0x0486, 1, 0)
@@ -34,18 +35,26 @@ class UhidDevice:
         self.send(report)
 
     def live(self, seconds: float, period: float = 1e-3) -> threading.Thread:
-        """Tick for a while, in a thread, in real time."""
+        """Tick for a while, in a thread, in real time; what arrives between two ticks is stamped with it too."""
 
         def run() -> None:
             begin, k = time.monotonic(), 0
+            self._begun = begin - 1e-6 * self.firmware.sensors.time_us
             while k * period < seconds:
                 k += 1
                 time.sleep(max(0.0, begin + k * period - time.monotonic()))
-                self.tick(period)
+                with self._lock:
+                    self._look_at_clock()
+                self.tick(0.0)
+            self._begun = None
 
         thread = threading.Thread(target=run)
         thread.start()
         return thread
+
+    def _look_at_clock(self) -> None:
+        if self._begun is not None:
+            self.firmware.sensors.time_us = round(1e6 * (time.monotonic() - self._begun))
 
     def unplug(self) -> None:
         """The device goes."""
@@ -58,6 +67,7 @@ class UhidDevice:
             if kind == OUTPUT:
                 (size,) = struct.unpack_from("<H", event, 4 + 4096)
                 with self._lock:
+                    self._look_at_clock()
                     self.firmware.take(event[4 : 4 + size])
             elif kind == GET_REPORT:
                 number, report = struct.unpack_from("<IB", event, 4)

@@ -23,6 +23,7 @@ from scipy.spatial import KDTree
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.haptic_map.lifting.cores import core_points
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 SITE = 4  # channels of a site: r, z, R, and the core b
 
@@ -103,7 +104,7 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
         Written: derivatives by θ, r and z.
     """
     m = sites.shape[0]
-    f, df = np.empty(m), np.empty((3, m))
+    f, df = work_array(m), work_array((3, m))
     nearest = 0
     for i in range(m):
         dr, dz, reach = r - sites[i, 0], z - sites[i, 1], sites[i, 2]
@@ -115,7 +116,8 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
         if f[i] > f[nearest]:
             nearest = i
     # All W are taken as shares of the largest, and places from its site: at a site both are exact.
-    top, v, dv, total, mean = f[nearest], np.empty(m), np.empty((3, m)), 0.0, np.zeros((4, 3))
+    top, v, dv, total, mean = f[nearest], work_array(m), work_array((3, m)), 0.0, work_array((4, 3))
+    mean[:] = 0.0
     for i in range(m):
         share = f[i] / top
         v[i] = share**3
@@ -123,7 +125,7 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
         for k in range(3):
             dv[k, i] = 3.0 * share * share * (df[k, i] - share * df[k, nearest]) / top
             mean[1 + k, 2] += dv[k, i]
-    place, d_place = np.empty((m, 2)), np.empty((m, 2))
+    place, d_place = work_array((m, 2)), work_array((m, 2))
     for i in range(m):
         for k in range(2):
             place[i, k], d_place[i, k] = sites[i, k] - sites[nearest, k], slopes[i, k] - slopes[nearest, k]
@@ -143,7 +145,8 @@ def near_weights(numbers: Array, r: float, z: float, sites: Array, slopes: Array
     determinant = a11 * a22 - a12 * a12
     u_r, u_z = r - sites[nearest, 0] - mean[0, 0], z - sites[nearest, 1] - mean[0, 1]
     g_r, g_z = (a22 * u_r - a12 * u_z) / determinant, (a11 * u_z - a12 * u_r) / determinant
-    e, de, square, d_square = np.empty(m), np.empty((3, m)), 0.0, np.zeros(3)
+    e, de, square, d_square = work_array(m), work_array((3, m)), 0.0, work_array(3)
+    d_square[:] = 0.0
     for i in range(m):
         e[i] = v[i] * ((place[i, 0] - mean[0, 0]) * g_r + (place[i, 1] - mean[0, 1]) * g_z)
         square += e[i] * e[i]

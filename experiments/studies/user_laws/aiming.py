@@ -29,13 +29,14 @@ def fitts(people: Sequence[Person], seed: int) -> Study:
         times.append(float(np.mean(found)) if len(found) else np.nan)
     x, y = np.array(difficulty), np.array(times)
     slope, intercept = np.polyfit(x, y, 1)
-    source = "stylus: Fitts 1954 as MacKenzie 1992 fits it, 122 ms/bit; tablet: MacKenzie et al. 1991, 204 (m)"
+    source = "Fitts 1954, by this index: 112 (q); MacKenzie & Buxton 1994: 167 to 225 (q)"
     return Study(
         "fitts", "Fitts' law: movement time over index of difficulty",
         (
             Law("Fitts: slope", 1e3 * slope, 100.0, 230.0, "ms/bit", source),
-            Law("Fitts: intercept", 1e3 * intercept, -200.0, 400.0, "ms", "Soukoreff & MacKenzie 2004 (m)"),
-            Law("Fitts: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "", "MacKenzie 1992: above 0.9 (m)"),
+            Law("Fitts: intercept", 1e3 * intercept, -200.0, 400.0, "ms",
+                "Fitts 1954: 28; MacKenzie & Buxton 1994: 200 to 240 (q)"),
+            Law("Fitts: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "", "Fitts 1954: 0.987 (q)"),
         ),
         x, y, ("log₂(A/W + 1) [bit]", "time from click to click [s]"), (float(slope), float(intercept)),
     )  # fmt: skip

@@ -81,7 +81,7 @@ def step_response(people: Sequence[Person], seed: int) -> Study:
             Law("Step response: mass", float(m), 0.1, 2.5, "kg", "Speich et al. 2005: 1.46; a wrist some 0.1 (m)"),
             Law("Step response: stiffness", float(k), 50.0, 800.0, "N/m", "Mussa-Ivaldi 1985, Tsuji 1995 (m)"),
             Law("Step response: damping ratio", float(b / (2.0 * np.sqrt(max(m * k, 1e-12)))), 0.2, 1.0, "",
-                "Perreault 2004: 0.3; Tsuji 1995: 0.2 to 0.6; fingertips up to 1 (m)"),
+                "Perreault 2004: alike for all people (q), 0.3; fingertips up to 1 (m)"),
         ),
         t, answers, ("time [s]", "displacement [m]"), joined=True,
     )  # fmt: skip
@@ -98,6 +98,6 @@ def grip(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "grip", "Stiffness at the stylus over grip",
         (Law("Grip: exponent of stiffness", float(slope), 0.1, 1.0, "",
-             "Hasser & Cutkosky 2002: rises with grip (a); below proportion: Hajian & Howe 1997 (m)", built_in=True),),
+             "Hasser & Cutkosky 2002: rises with grip; Van Doren 1998: in proportion (a)", built_in=True),),
         x, y, ("grip [N]", "stiffness [N/m]"), (float(slope), float(intercept)), log=True,
     )  # fmt: skip

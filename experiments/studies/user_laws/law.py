@@ -22,7 +22,7 @@ class Law:
         Of all three.
     source : str
         Of the interval; "(a)" marks a paper of which the abstract was read, "(q)" one as it is quoted by who read it,
-        and "(m)" one quoted from memory.
+        or in its authors' slides, and "(m)" one quoted from memory; see docs/validation/published-numbers.md.
     built_in : bool
         Whether the person is made by this very law, so that only what arm and device leave of it is tested.
     """

@@ -46,7 +46,8 @@ def practice(people: Sequence[Person], seed: int) -> Study:
     return Study(
         "practice", "Practice: error of a lap while the device pushes the same way in every lap",
         (
-            Law("Practice: share learned a repetition", rate, 0.05, 0.4, "", "Thoroughman & Shadmehr 2000 (m)", True),
+            Law("Practice: share learned a repetition", rate, 0.05, 0.4, "",
+                "Smith et al. 2006: 0.21 + 0.02 a trial (q)", built_in=True),
             Law("Practice: misfit of a power law over that of an exponential", worse, 1.0, 100.0, "",
                 "Heathcote et al. 2000: individual curves are exponential"),
         ),

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import isotonic_regression
 from scipy.signal import butter, sosfiltfilt
+from scipy.stats import norm
 
 from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
@@ -13,46 +15,79 @@ from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
 LAPS = 7  # of an ellipse, of which the first is practice
-STEERED, AT_LEAST = 9.0, 8  # [s] at each pace, and laps, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
-LAP_TIMES = (1.0, 1.4, 2.0, 2.8, 4.0)  # [s]
+DIFFICULTIES = (10.0, 15.0, 20.0, 30.0, 40.0)  # length over width: 10.7 to 42.7 of Yamanaka et al. 2017
+PACES = (0.6, 1.0, 1.7, 2.8, 4.5)  # of a lap that is practised [s]
+ERRORS = 0.064  # share of passages that touch a wall (Accot & Zhai 1997)
+PRACTISED, PASSED = 9, 9  # laps at a pace, and through a tunnel, of which the first and the last are not judged
+LEAST = 5  # of these that go round, at a pace that she can hold
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
-_PASSING = 1.645  # standard deviations above the mean that 95 % of a normal distribution lie below
 _SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
-    """Time of a lap over the length of a circular tunnel by its width (Accot & Zhai 1997).
+    """Time to pass a circular tunnel over its length by its width, by the published protocol (Accot & Zhai 1997).
 
-    The published slopes are of tunnels that are passed without a touch (Kulikov, MacKenzie & Stuerzlinger 2005 say so).
-    Here the pace is given, and the tunnel is as wide as 95 % of her laps need: twice the mean of the farthest that each
-    lap goes from the middle, and 1.645 standard deviations of that within people.
+    A tunnel of a given width is passed as fast as she can without touching its walls. She has practised: of each pace
+    she knows how far her laps go from the middle, and takes the fastest at which no more than `ERRORS` of them touch.
+    Fresh laps at that pace are judged, of which those that touch are errors and left out.
     """
-    difficulty = list[float]()
-    for lap in LAP_TIMES:
-        laps = max(AT_LEAST, round(STEERED / lap))
-        angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * lap, _SAMPLING) / lap
-        points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-        farthest = list[Array]()
-        for i, person in enumerate(people):
-            trace = trial(person, _wishes(points, lap), laps * lap, seed + i, points[0])
-            beside = np.abs(np.hypot(*trace.p[round(lap / PERIOD) :, :2].T) - RADIUS)
-            farthest.append(beside.reshape(laps - 1, -1).max(axis=1))
-        spread = np.sqrt(np.mean(np.var(farthest, axis=1, ddof=1)))
-        difficulty.append(2.0 * np.pi * RADIUS / float(2.0 * (np.mean(farthest) + _PASSING * spread)))
-    x, y = np.array(difficulty), np.array(LAP_TIMES)
+    widths = 2.0 * np.pi * RADIUS / np.array(DIFFICULTIES)
+    times, touched = np.full((len(people), len(widths)), np.nan), list[Array]()
+    for i, person in enumerate(people):
+        paces = _chosen_paces(person, widths, seed + i)
+        for k, (pace, width) in enumerate(zip(paces, widths, strict=True)):
+            farthest, lasted = _laps(person, pace, PASSED, seed + 1000 * (k + 1) + i)
+            touches = farthest > 0.5 * width
+            touched.append(touches)
+            if not np.all(touches):
+                times[i, k] = float(np.mean(lasted[~touches]))
+    x, y = np.array(DIFFICULTIES), np.nanmean(times, axis=0)
     slope, intercept = np.polyfit(x, y, 1)
     return Study(
         "steering", "Steering law: time of a lap over length by width",
         (
-            Law("Steering: slope", 1e3 * slope, 50.0, 200.0, "ms",
-                "Accot & Zhai 1997: 78 straight, some 150 circular (m)"),
+            Law("Steering: slope", 1e3 * slope, 47.7, 200.0, "ms",
+                "straight: Yamanaka et al. 2017, 47.7 (q), Accot & Zhai 1997, 78 (q); circular: some 150 (m)"),
             Law("Steering: R²", float(np.corrcoef(x, y)[0, 1] ** 2), 0.9, 1.0, "",
-                "Accot & Zhai 1999: r above 0.98 with five devices"),
+                "Accot & Zhai 1999: r above 0.98 with five devices (a)"),
+            Law("Steering: laps that touch", 100.0 * float(np.mean(np.concatenate(touched))), 0.0, 23.0, "%",
+                "Accot & Zhai 1997: 6.4 (q)", built_in=True),
         ),
         x, y, ("length / width", "time of a lap [s]"), (float(slope), float(intercept)),
     )  # fmt: skip
+
+
+def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
+    """Time of a lap [s] at which a share `ERRORS` of her laps touches the walls, of each width [m].
+
+    At a pace that she has practised her laps need the width of a normal distribution of how far they go; over paces it
+    falls (isotonic regression), and is linear between. A pace that she cannot hold is none.
+    """
+    held, needed = list[float](), list[float]()
+    for pace in PACES:
+        farthest, _ = _laps(person, pace, PRACTISED, seed)
+        if len(farthest) >= LEAST:
+            held.append(pace)
+            needed.append(float(2.0 * (np.mean(farthest) + norm.isf(ERRORS) * np.std(farthest, ddof=1))))
+    falling = isotonic_regression(needed, increasing=False).x
+    return np.interp(widths, falling[::-1], held[::-1])
+
+
+def _laps(person: Person, pace: float, laps: int, seed: int) -> tuple[Array, Array]:
+    """How far each lap goes from the middle [m], and how long it lasts [s], without the first one."""
+    angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * pace, _SAMPLING) / pace
+    points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    trace = trial(person, _wishes(points, pace), laps * pace, seed, points[0])
+    gone = np.unwrap(np.arctan2(trace.p[:, 1], trace.p[:, 0])) / (2.0 * np.pi)
+    beside = np.abs(np.hypot(*trace.p[:, :2].T) - RADIUS)
+    lap = np.floor(gone).astype(int)
+    whole = range(1, int(lap.max()))
+    return (
+        np.array([beside[lap == k].max() for k in whole]),
+        np.array([PERIOD * np.count_nonzero(lap == k) for k in whole]),
+    )
 
 
 def power_law(people: Sequence[Person], seed: int) -> Study:
@@ -73,10 +108,10 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
         speeds.append(speed[::40])
     x, y = np.concatenate(curvatures), np.concatenate(speeds)
     line = np.polyfit(np.log(x), np.log(y), 1)
-    source = "Lacquaniti et al. 1983: 1/3; adults' ellipses 0.28 to 0.38 (m)"
+    source = "Viviani & Flash 1995: 1/3; measured 0.28 to 0.35 (q)"
     return Study(
         "power-law", "Two-thirds power law: speed over curvature",
-        (Law("Power law: exponent β", float(np.mean(exponents)), 0.28, 0.38, "", source),),
+        (Law("Power law: exponent β", float(np.mean(exponents)), 0.28, 0.35, "", source),),
         x, y, ("curvature [1/m]", "speed [m/s]"), (float(line[0]), float(line[1])), log=True,
     )  # fmt: skip
 

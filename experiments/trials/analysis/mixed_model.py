@@ -20,10 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 LEVEL = 0.95
+_METHODS = ["bfgs", "lbfgs", "cg", "powell"]  # in turn; the last one needs no gradient at a variance of zero
 
 
 class Fit(NamedTuple):
-    """What the model says of a contrast; NaN where it could not be fitted.
+    """What the model says of a contrast; NaN where it could not be fitted, or the fit did not converge.
 
     Attributes
     ----------
@@ -79,12 +80,15 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a variance at zero, where it belongs for people who are alike
-            model = smf.mixedlm(fixed, data, groups="user", re_formula="~_x" if within else "~1").fit(reml=True)
+            made = smf.mixedlm(fixed, data, groups="user", re_formula="~_x" if within else "~1")
+            model = made.fit(reml=True, method=_METHODS)
             estimate, error = scale * float(model.params["_x"]), scale * float(model.bse["_x"])
     except (np.linalg.LinAlgError, ValueError):
         return NO_FIT
     if not (np.isfinite(error) and error > 0.0):
         return NO_FIT
+    if not model.converged:
+        return NO_FIT._replace(doubtful=True)
     reach = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * error
     p = 2.0 * float(t.sf(abs(estimate) / error, freedom))
-    return Fit(estimate, estimate - reach, estimate + reach, p, not model.converged)
+    return Fit(estimate, estimate - reach, estimate + reach, p, False)

@@ -28,7 +28,7 @@ def three_sentences(study: StudyConfig, found: Statistics, trials: int, failed: 
 def _answer(contrasts: Sequence[Contrast], measure: str, factor: str) -> str:
     name = MEASURES[measure].name.replace("_", " ")
     if not contrasts:
-        return f"Of {name}, nothing can be said: it has no numbers that differ."
+        return f"Of {name}, nothing can be said: it was not measured, or did not differ."
     told = "; ".join(_compared(contrast) for contrast in contrasts)
     return f"{name[0].upper()}{name[1:]}, by {factor}: {told}."
 

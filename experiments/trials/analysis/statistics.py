@@ -140,7 +140,7 @@ def statistics(
 
 
 _NO_MODEL = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
-_DOUBTFUL = "the mixed model did not converge; believe the bootstrap interval"
+_DOUBTFUL = "the mixed model did not converge; the bootstrap interval stands alone"
 
 
 def _modelled(
@@ -152,7 +152,7 @@ def _modelled(
     fit: Fit = fitted(
         rows, c.measure, c.factor, (c.level, c.reference), others, c.users - groups, c.factor not in between
     )
-    remark = _NO_MODEL if not np.isfinite(fit.p) else _DOUBTFUL if fit.doubtful else ""
+    remark = _DOUBTFUL if fit.doubtful else _NO_MODEL if not np.isfinite(fit.p) else ""
     if remark:
         remarks.setdefault(remark, []).append(f"{c.measure} with {c.level}")
     return replace(c, model=fit.estimate, model_low=fit.low, model_high=fit.high, p=fit.p)

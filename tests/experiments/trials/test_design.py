@@ -7,7 +7,7 @@ import pytest
 from controllers.errors import ParameterError
 from experiments.trials.design import balanced_rows, conditions, meetings
 from experiments.trials.errors import StudyError
-from experiments.trials.plan import planned
+from experiments.trials.plan import file_digest, planned
 from experiments.trials.study import Study
 from experiments.trials.study_config import read_toml, study_from
 
@@ -50,6 +50,20 @@ def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
     assert len({trial.key for trial in many}) == len(many)
 
 
+def test_people_lead_where_the_mode_is_to_lead() -> None:
+    made = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
+    assert {trial.config.user.does for trial in planned(made)} == {"lead"}
+
+
+def test_a_trial_is_of_the_content_of_its_device_s_file(tmp_path: Path) -> None:
+    file, keys = tmp_path / "device.json", set[str]()
+    for content in ("{}", '{"identified": {}}'):
+        file.write_text(content, encoding="utf-8")
+        file_digest.cache_clear()
+        keys.add(planned(study(run={"device_file": str(file)}))[0].key)
+    assert len(keys) == 2
+
+
 @pytest.mark.parametrize(
     ("values", "says"),
     [
@@ -69,6 +83,7 @@ def test_more_users_leave_the_trials_of_the_first_ones_as_they_are() -> None:
         ({"between": ["stiffness"], "users": {"number": 1}}, "2 groups between users and 1 users"),
         ({"run": {"seconds": 3}}, "sets 'seconds' as a word of its runs"),
         ({"factors": {"clips": {"a": {"clips": ["gone.bvh"]}, "b": {"clips": ["walk"]}}}}, "gone.bvh"),
+        ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
     ],
 )  # fmt: skip
 def test_a_design_that_contradicts_itself_is_refused_in_a_line(values: dict[str, object], says: str) -> None:
@@ -96,8 +111,21 @@ def test_what_a_study_has_not_is_refused_by_name(values: dict[str, object], says
 
 
 @pytest.mark.parametrize(
+    ("levels", "says"),
+    [([1, 2, 1], "has level 1 twice"), (3, "'stiffness' is 3; expected a list of values, or a table of levels")],
+)
+def test_levels_that_are_none_or_the_same_are_refused(levels: object, says: str) -> None:
+    with pytest.raises(StudyError, match=says):
+        study(factors={"stiffness": levels})
+
+
+@pytest.mark.parametrize(
     ("values", "says"),
-    [({"measures": ["speed"]}, "no measure 'speed'"), ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical")],
+    [
+        ({"measures": ["speed"]}, "no measure 'speed'"),
+        ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical"),
+        ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
+    ],
 )
 def test_a_measure_that_nobody_takes_is_refused(values: dict[str, object], says: str) -> None:
     with pytest.raises(StudyError, match=says):

@@ -1,4 +1,4 @@
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("optuna")
 
+import hvf
 from controllers.errors import ParameterError
 from experiments.certify.kept_stability import Stability, kept_stability
 from experiments.config.run_config import load_config
@@ -19,6 +20,7 @@ from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, chosen, front, search, violation_of
 from experiments.tuning.storage import storage_of
+from experiments.tuning.tune import TunedSimulation
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning
 
@@ -179,6 +181,10 @@ def test_the_shipped_tunings_can_be_read(name: str) -> None:
 
 
 @pytest.mark.slow
+def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
+    assert kept_stability(run_config(mode="lead")).verdict == "unknown"
+
+
 def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain() -> None:
     soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
     assert (soft.verdict, stiff.verdict) == ("certified", "refuted")
@@ -197,3 +203,21 @@ def test_a_tuning_ends_with_a_certified_configuration_that_a_run_takes(tmp_path:
     assert kept_stability(taken).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_search_from_python_goes_on_with_its_own_candidates_only(tmp_path: Path) -> None:
+    curve, search = hvf.circle(lap=2.0), hvf.Search(candidates=1, journal=tmp_path / "journal")
+    walk, space = hvf.Cylindrical(hvf.clips("walk"), around=curve), {"field.k_r": (100.0, 101.0)}
+
+    def found(damping: float, cost: Callable[[hvf.Run], float]) -> TunedSimulation:
+        field = hvf.Follow(curve, k_r=300, b_d=damping).limited(8.0)
+        sim = hvf.Simulation(field=field, haptic_map=walk)
+        return hvf.tune(sim, space, cost, seconds=0.2, search=search)
+
+    first = found(8.0, lambda run: 1.0)
+    assert found(8.0, lambda run: 1.0).costs == first.costs == (1.0,)
+    assert found(8.0, lambda run: 2.0).costs == (2.0,)
+    assert found(9.0, lambda run: 3.0 - 2.0).costs == (1.0,)
+    kept = storage_of(tmp_path / "journal")
+    assert len(kept.get_all_studies()) == 3

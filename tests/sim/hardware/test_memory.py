@@ -1,111 +1,88 @@
-"""What the servo's loop leaves behind in memory: nothing; and what it takes for the time of a tick."""
+"""The servo's loop takes nothing from the heap: not in compiled code, not in the Python that drives it, not in C."""
 
-import gc
-import multiprocessing
-import resource
-import socket
+import os
+import subprocess
 import sys
-import tracemalloc
-from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-from controllers.safety.arming import ARM, State
-from sim.devices.exchange import READING_SEQUENCE, READING_SIZE, READING_THETA
-from sim.hardware.emulated_process import EmulatedDriver
-from sim.hardware.gated_servo import ROW_SIZE, Ticker
-from sim.hardware.servo_process import (
-    ORDER_BEAT,
-    ORDER_NUMBER,
-    ORDER_REQUEST,
-    ORDER_SIZE,
-    Channels,
-    ServoClock,
-    ServoProcess,
+from controllers.safety.arming import ARM, NO_REQUEST, State
+from controllers.safety.gate import Gate
+from controllers.state import Array
+from experiments.config import maps, modes
+from experiments.config.run_config import RunConfig
+from experiments.hardware.parts import served, session_of, start_of
+from experiments.setups.defaults import resolved
+from models.scene import SceneConfig
+from sim.hardware.emulated import EmulatedPhantom
+from sim.hardware.gated_servo import GatedServo, Ticker
+from tests.devices.firmware import ROOT, compiled
+from tests.sim.hardware.emulation import AT_ONCE
+
+HERE, DEVICES = Path(__file__).parent, ROOT / "tests" / "devices"
+RESTRICTED = modes.Follow(
+    walls=modes.JointWalls(), governor=modes.SpeedGovernor(), orientation=modes.OrientationMoment(0.05)
 )
-from sim.hardware.shared import Ring, SharedNumbers
-from tests.sim.hardware.emulation import AT_ONCE, gated_servo
-
-TICKS, WARM = 10_000, 3_000
-TRANSIENT = 8_192
-"""Bytes that a tick may hold at once beyond what it keeps, of Python's: packets, numbers, frames of calls."""
-
-
-@pytest.fixture
-def turns() -> Iterator[Callable[[int], State]]:
-    """Runs the servo's loop for so many ticks, on a device of packets that answers each command; tells its state."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    orders, status, rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
-    told, heard = multiprocessing.get_context("spawn").Pipe(duplex=False)
-    parts = gated_servo(EmulatedDriver(ours), dead_man=False, **AT_ONCE)
-    ticker = Ticker(parts)
-    process = ServoProcess(ticker, Channels(orders, status, rows, heard), ServoClock(late=60.0, heartbeat=60.0))
-    command, packet, order = np.zeros(4), np.zeros(READING_SIZE + 1), np.zeros(ORDER_SIZE)
-    order[[ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST]] = 1.0, 1.0, ARM
-    orders.write(order)
-    done = [0]
-
-    def run(ticks: int) -> State:
-        for k in range(done[0], done[0] + ticks):
-            packet[0:2] = k + 1.0, k * 1e-3
-            packet[READING_THETA] = 0.05 * np.sin(k * 1e-3)
-            theirs.send(packet)
-            process.turn(k + 1, 0.0)
-            theirs.recv_into(command)
-        done[0] += ticks
-        return ticker.state
-
-    assert READING_SEQUENCE == 0
-    yield run
-    parts.driver.close()
-    for end in (theirs, told, heard, orders, status, rows):
-        end.close()
-
-
-def page_faults() -> int:
-    """Of this process so far: pages that the system had to give it."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+RUNS = {
+    "bunny": RunConfig(mode=modes.Bunny()),
+    "rivers": RunConfig(mode=modes.Rivers()),
+    "stretch": RunConfig(mode=modes.Stretch()),
+    "all that FOLLOW can have": RunConfig(mode=RESTRICTED, map=maps.Cylindrical(expressive=True)),
+    "walls of a composite": RunConfig(mode=modes.Follow(walls=modes.JointWalls()), map=maps.Composite()),
+}
 
 
 @pytest.mark.slow
-def test_ten_thousand_ticks_leave_no_block_of_memory_behind(turns) -> None:
+@pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
+@pytest.mark.parametrize("device", ["packets", "HID"])
+def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(device: str, tmp_path: Path) -> None:
+    """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself."""
+    library = compiled(tmp_path, HERE / "heap_calls.c")
+    environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
+    behind = [compiled(tmp_path, DEVICES / "mock_hidapi.c", ROOT / "firmware" / "hvf_hid.c")] if device == "HID" else []
+    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", *map(str, behind)]
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    state, calls, calls_of_a_thousand_numbers = said.split()
+    assert state == State.ACTIVE.name
+    assert int(calls) == 0
+    assert int(calls_of_a_thousand_numbers) > 1000  # the counter counts
+
+
+class Aside(EmulatedPhantom):
+    """A device whose time passes between two ticks, where nothing is counted."""
+
+    asked = np.zeros(3), False
+
+    def read(self, reading: Array, timeout: float) -> bool:
+        return True
+
+    def write(self, torque: Array, enable: bool) -> None:
+        self.asked = torque, enable
+
+    def pass_tick(self, reading: Array) -> None:
+        super().write(*self.asked)
+        super().read(reading, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RUNS)
+def test_no_field_that_a_device_can_be_given_takes_memory(name: str) -> None:
+    config = resolved(RUNS[name])
+    session, period = session_of(served(config)), config.clock.servo_period
+    driver = Aside(SceneConfig(servo_period=period), start_of(session), holds=0.0)
+    gate = Gate(period, permitted=True, dead_man=False, **AT_ONCE)
+    ticker, taken = Ticker(GatedServo(session.servo, session.world, driver, gate, np.zeros(3))), 0
     _nrt_python.memsys_enable_stats()
-    gc.collect()
-    gc.disable()
     try:
-        turns(WARM)  # lists of free numbers fill, which the collection has emptied
-        compiled, before, faults = rtsys.get_allocation_stats(), sys.getallocatedblocks(), page_faults()
-        state = turns(TICKS)
-        after, now, more = sys.getallocatedblocks(), rtsys.get_allocation_stats(), page_faults() - faults
+        for k in range(1500):
+            driver.pass_tick(session.servo.device.reading)
+            before = rtsys.get_allocation_stats().alloc
+            ticker.tick(float(k), ARM if k == 0 else NO_REQUEST)
+            taken += rtsys.get_allocation_stats().alloc - before
     finally:
-        gc.enable()
         _nrt_python.memsys_disable_stats()
-    made, freed = now.alloc - compiled.alloc, now.free - compiled.free
-    print(f"{after - before} blocks, {more} page faults; compiled: {made / TICKS:.1f} a tick, {made - freed} kept")
-    assert state is State.ACTIVE
-    assert abs(after - before) < 100  # not one in a hundred ticks
-    assert made == freed
-    assert made <= 4 * TICKS  # work arrays: a stack of forces, and three to search for the closest point
-    assert more < 100
-
-
-@pytest.mark.slow
-def test_a_tick_holds_a_few_kilobytes_at_most_while_it_runs(turns) -> None:
-    turns(500)
-    gc.disable()
-    tracemalloc.start()
-    try:
-        turns(500)
-        most = 0
-        for _ in range(500):
-            tracemalloc.reset_peak()
-            held = tracemalloc.get_traced_memory()[0]
-            turns(1)
-            most = max(most, tracemalloc.get_traced_memory()[1] - held)
-    finally:
-        tracemalloc.stop()
-        gc.enable()
-    print(f"{most} bytes at most in a tick")
-    assert most < TRANSIENT
+    assert ticker.state is State.ACTIVE
+    assert taken == 0

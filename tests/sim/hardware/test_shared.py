@@ -52,7 +52,7 @@ def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
 def test_a_writer_that_was_killed_in_a_write_is_told_of(numbers: SharedNumbers) -> None:
     into = np.zeros(64)
     assert numbers.read(into)
-    numbers._count[0] += 1
+    numbers.count[0] += 1
     assert not numbers.read(into)
 
 
@@ -90,21 +90,17 @@ def test_a_process_that_ends_without_closing_its_memory_says_nothing(numbers, ri
 def test_rows_that_are_overwritten_while_they_are_taken_are_counted_and_not_given(ring: Ring) -> None:
     for k in range(7):
         ring.append(np.array([k, 0.0]))
-    copied = ring._numbers
+    copied = ring.numbers
 
     class Overtaken:
         def __getitem__(self, index):
-            taken = copied[index]
+            taken, ring.numbers = copied[index], copied
             for k in range(7, 11):
                 ring.append(np.array([k, 0.0]))
             return taken
 
-        def __setitem__(self, index, value):
-            copied[index] = value
-
-    ring._numbers = Overtaken()
+    ring.numbers = Overtaken()
     rows, lost = ring.take()
-    ring._numbers = copied
     np.testing.assert_array_equal(rows[:, 0], [4, 5, 6])
     assert lost == 4
     rows, lost = ring.take()

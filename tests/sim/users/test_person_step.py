@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 
 from controllers.curves.trajectory import Trajectory
 from sim.devices.simulated import simulated_phantom
@@ -14,13 +15,15 @@ from sim.users.intents import Own, Trace, Wish
 from sim.users.muscles import RECOVERY
 from sim.users.participant import Participant
 from sim.users.person import Person
-from sim.users.person_state import BELIEF, CAPACITY, FELT_FORCE, REFLEX
+from sim.users.person_state import ASTRAY, BELIEF, CAPACITY, FELT_FORCE, HAND_V, REFLEX, PersonState
 from sim.users.person_step import person_step
-from sim.users.wishes import Wishes, following, resting
+from sim.users.senses import ASTRAY_TIME, VEER_TIME, go_astray
+from sim.users.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, simulated
 
-QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, force_noise=0.0, tremor=0.0, correction=0.0)
+QUIET = Person(motor_noise=0.0, seen_noise=0.0, felt_noise=0.0, direction_noise=0.0, force_noise=0.0, tremor=0.0,
+               correction=0.0)  # fmt: skip
 PERIOD, STEP = 1e-3, 2.5e-4
 
 
@@ -57,6 +60,36 @@ def test_no_reflex_and_no_belief_comes_before_its_delay() -> None:
     assert hand.state.vectors[REFLEX, 0] < -1e-3
     assert hand.state.vectors[BELIEF, 0] > 1e-4
     assert hand.state.vectors[FELT_FORCE, 0] < -0.1
+
+
+def test_a_force_is_felt_with_noise_in_proportion_to_it() -> None:
+    rows, felt = resting(2), list[np.ndarray]()
+    rows[0, ENGAGED] = 1.0
+    hand = Clamped(QUIET, Wishes(rows, OWN))
+    hand.hold(np.array([0.02, -0.03, 0.03]), 1.0)
+    for _ in range(300):
+        hand.hold(np.array([0.02, -0.03, 0.03]), 0.05)
+        felt.append(hand.state.vectors[FELT_FORCE] / hand.force)
+    np.testing.assert_allclose(np.mean(felt), 1.0, atol=0.02)
+    np.testing.assert_allclose(np.std(felt), QUIET.felt_force_noise, rtol=0.2)
+
+
+@njit
+def _led_astray(person: PersonState, ways: np.ndarray) -> None:
+    for k in range(len(ways)):
+        go_astray(person)
+        ways[k] = person.vectors[ASTRAY]
+
+
+def test_a_movement_is_felt_in_a_wrong_direction_by_what_filtered_noise_has() -> None:
+    person = Participant(Person(), Wishes(resting(2)), 1).compiled(PERIOD, STEP)
+    speed, ways = 0.2, np.empty((2_000_000, 3))
+    person.vectors[HAND_V] = 0.0, speed, 0.0
+    _led_astray(person, ways)
+    # An Ornstein-Uhlenbeck process of time τ through a filter of time T: σ² v² T² τ / (T + τ), and none along the way.
+    variance = (Person().direction_noise * speed * ASTRAY_TIME) ** 2 * VEER_TIME / (ASTRAY_TIME + VEER_TIME)
+    np.testing.assert_allclose(ways.std(axis=0), [variance**0.5, 0.0, variance**0.5], rtol=0.08, atol=1e-9)
+    assert abs(np.mean(ways[:, 0] * ways[:, 2])) < 0.1 * variance
 
 
 def test_a_relaxed_person_takes_the_place_where_she_is_put() -> None:

@@ -1,0 +1,145 @@
+r"""Whose legs and trunk carry the arms of others where clips move differently, and how much of these they bear.
+
+A kick is balanced by the arms of its own clip, and a flight is ballistic with them alone. What legs bear is found by
+the one who has to do it: the physical figure follows what the map shows while a hand wanders through the whole of its
+domain and pushes, over the legs of each clip in turn. The first that carry them well are taken, for who names a walk
+first wants to walk, or else the best. Where the figure falls with the best of them, or lacks more than it may, the
+others' arms are blended into their own by a smaller share λ, down to none: then the clip goes alone. Legs that slide,
+sink or bend beyond their ranges are taken only where the others do not stand, and what none bears is said.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.state import Array
+from experiments.files.kept import kept_array
+from experiments.setups.alike import motion_of
+from experiments.working import working
+from models.mocap.clip import Clip
+from models.mocap.ranges import beyond_ranges
+from sim.compilation.sources import kept_folder
+from sim.reference.reference import poses_along
+
+SHARES = (1.0, 0.5, 0.25, 0.0)
+BEARABLE = 0.12  # [body weights] RMS, as in `followed`
+WELL = 0.06  # [body weights] RMS: half of that, with which the first clip that was named is not passed over
+SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # [m], [m], [rad]: what legs may do at most
+_SECONDS, _FPS = 20.0, 120.0
+_PUSHED = 0.17  # of the domain: 2.5 N against 300 N/m, in 50 mm
+_EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and in which one has moved the hand
+
+
+Carrying = TypeVar("Carrying", Cylindrical, Composite)
+
+
+class Verdict(NamedTuple):
+    """How the physical figure follows a map.
+
+    Attributes
+    ----------
+    residual : float
+        RMS of the force that is lacking [body weights].
+    fell : float
+        When it fell [s]; infinite if it did not.
+    """
+
+    residual: float
+    fell: float
+
+    @property
+    def bearable(self) -> bool:
+        """Whether it stands and lacks little."""
+        return bool(np.isinf(self.fell)) and self.residual <= BEARABLE
+
+    def worse(self) -> tuple[float, float]:
+        """What is larger, the worse: an earlier fall before all."""
+        return -self.fell, self.residual
+
+
+def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
+    """Let the physical figure follow a map about a circle for 20 s, and keep how; needs compiled code."""
+
+    def find() -> Array:
+        from experiments.preparation.followed import followed  # brings signal processing with it
+
+        with working("following the blend"):
+            told = followed(toured(made, lap), _SECONDS)
+        return np.array([[told.residual, np.inf if told.fell is None else told.fell]])
+
+    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
+    return Verdict(*kept_array(kept_folder(__name__), "verdict", made_of, (1, 2), find)[0].tolist())
+
+
+def _domain(made: Cylindrical | Composite) -> Array:
+    """Intervals of r and z [m] that a hand goes through."""
+    return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
+
+
+def toured(made: Cylindrical | Composite, lap: float) -> Clip:
+    """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
+
+    It keeps its pace where it wanders. A push leaves the field's speed over the ground as it is, so that a hand that is
+    pushed from radius R to r goes round at R/r of its pace, as in FOLLOW.
+    """
+    times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
+    turn, phase = 2.0 * np.pi * times / _SECONDS, times / _EVERY % 2.0
+    ramp = np.clip(np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN, 0.0, 1.0)
+    pushed = _PUSHED * ramp**2 * (3.0 - 2.0 * ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0)
+    shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
+    low, high = _domain(made).T
+    r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
+    middle = 0.5 * (low[0] + high[0])
+    pace = middle / (middle + pushed * (high[0] - low[0]))
+    angle = 2.0 * np.pi / lap * np.concatenate([[0.0], np.cumsum(pace[:-1])]) / _FPS
+    stylus, poses = np.zeros((len(times), 7)), np.empty((len(times), made.nq))
+    stylus[:, 0], stylus[:, 1], stylus[:, 2], stylus[:, 3] = r * np.cos(angle), r * np.sin(angle), z, 1.0
+    kind, params, memory = made.compiled()
+    poses_along(kind, params, memory.copy(), stylus, poses)
+    return Clip(poses, _FPS, "blend")
+
+
+def sound(made: Cylindrical | Composite, lap: float) -> bool:
+    """Whether soles do not sink or skate, and joints stay about within their ranges; kept, and needs compiled code."""
+
+    def find() -> Array:
+        poses = toured(made, lap).poses
+        motion = motion_of(poses, _FPS, dynamics=False)
+        return np.array([[motion.lowest, motion.skate, beyond_ranges(poses).max()]])
+
+    made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
+    lowest, skate, beyond = kept_array(kept_folder(__name__), "sound", made_of, (1, 3), find)[0]
+    return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
+
+
+def carried(maps: Sequence[Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
+    """The map whose legs carry the others' arms, and what is to be said of it; needs compiled code.
+
+    Parameters
+    ----------
+    maps : sequence of Cylindrical or Composite
+        With the legs of one clip each.
+    names : sequence of str
+        Of these clips.
+    lap : float
+        [s].
+    """
+    fit = [i for i, made in enumerate(maps) if sound(made.with_share(0.0), lap)]
+    best, name, found = maps[0], names[0], Verdict(np.inf, 0.0)
+    for candidates in (fit, [i for i in range(len(maps)) if i not in fit]):
+        for share in SHARES:
+            for i in candidates:
+                made = maps[i].with_share(share)
+                verdict = verdict_on(made, lap)
+                if verdict.bearable and verdict.residual <= WELL:
+                    return made, ()
+                if verdict.worse() < found.worse():
+                    best, name, found = made, names[i], verdict
+            if found.bearable:
+                return best, ()
+    falls = np.isfinite(found.fell)
+    told = f"falls at {found.fell:.1f} s" if falls else f"lacks {100 * found.residual:.0f} % of weight"
+    return best, (f"the physical figure {told} with the legs of {name}, the best that is found at this lap",)

@@ -1,0 +1,136 @@
+"""A node by hidapi's own C functions, which its wheel exports: what passes through it takes no memory.
+
+The wheel's Python binding takes a list of 64 numbers for every report that is read, and bytes for every one written.
+"""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from controllers.state import Array, IntArray
+from sim.compilation.compiled import entry_point
+from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
+
+Bytes = npt.NDArray[np.uint8]
+_ADDRESS, _SIZE = ctypes.c_void_p, ctypes.c_size_t
+_FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
+    "hid_init": (ctypes.c_int, []),
+    "hid_open_path": (_ADDRESS, [ctypes.c_char_p]),
+    "hid_set_nonblocking": (ctypes.c_int, [_ADDRESS, ctypes.c_int]),
+    "hid_get_feature_report": (ctypes.c_int, [_ADDRESS, ctypes.c_char_p, _SIZE]),
+    "hid_send_feature_report": (ctypes.c_int, [_ADDRESS, ctypes.c_char_p, _SIZE]),
+    "hid_read_timeout": (ctypes.c_int, [_ADDRESS, _ADDRESS, _SIZE, ctypes.c_int]),
+    "hid_write": (ctypes.c_int, [_ADDRESS, _ADDRESS, _SIZE]),
+    "hid_close": (None, [_ADDRESS]),
+}  # hidapi.h
+
+
+def _calling(_: Any, function: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        values = [builder.extract_value(given[1], i) for i in range(len(arguments.types))]
+        shape = ir.FunctionType(ir.IntType(32), [value.type for value in values])
+        return builder.call(builder.inttoptr(given[0], shape.as_pointer()), values)
+
+    return types.int32(types.intp, arguments), generate
+
+
+_c_call: Any = intrinsic(_calling)
+"""The int that a C function at an address returns; arguments of the types that it takes, nothing checks them."""
+
+
+@entry_point
+def read_report(places: IntArray, incoming: Bytes, told: Array) -> None:
+    """hid_read_timeout: `places` are its address and the device's, `told` (2,) the timeout [ms] and what it returns."""
+    room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(told[0])
+    told[1] = _c_call(places[0], (places[1], room, size, timeout))
+
+
+@entry_point
+def write_report(places: IntArray, outgoing: Bytes, told: Array) -> None:
+    """hid_write: `places` are its address and the device's, `told` (1,) what it returns."""
+    told[0] = _c_call(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
+
+
+class HidapiNode:
+    """A node, as `sim.devices.hid.HidHandle` but for its reports, which compiled code takes and sends (`transfers`).
+
+    Parameters
+    ----------
+    library : ctypes.CDLL
+        That has hidapi's functions.
+    path : str
+        Of the node.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    AttributeError
+        If the library has no such functions.
+    """
+
+    def __init__(self, library: ctypes.CDLL, path: str):
+        self._library = library
+        for name, (result, arguments) in _FUNCTIONS.items():
+            function = getattr(library, name)
+            function.restype, function.argtypes = result, arguments
+        library.hid_init()
+        self._device = int(library.hid_open_path(path.encode()) or 0)
+        if not self._device:
+            raise OSError(f"hidapi cannot open {path}")
+
+    def _places(self, name: str) -> IntArray:
+        address = ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
+        return np.array([address, self._device], np.int64)
+
+    def transfers(self, incoming: Bytes, outgoing: Bytes) -> tuple[Callable[[int], int], Callable[[], int]]:
+        """What receives a report into `incoming`, in so many milliseconds, and what sends `outgoing`; kept calls."""
+        asked, answered = np.zeros(2), np.zeros(1)
+        reads = KeptCall(read_report, (self._places("hid_read_timeout"), incoming, asked))
+        writes = KeptCall(write_report, (self._places("hid_write"), outgoing, answered))
+        read, written = items(asked), items(answered)
+
+        def receive(timeout_ms: int) -> int:
+            read[0], read[1] = timeout_ms, -1.0
+            if self._device:
+                reads()
+            if read[1] < 0.0:
+                raise OSError("read error")
+            return int(read[1])
+
+        def send() -> int:
+            written[0] = -1.0
+            if self._device:
+                writes()
+            return int(written[0])
+
+        return receive, send
+
+    def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
+        """As hidapi's binding."""
+        room = ctypes.create_string_buffer(bytes([report_num]), max_length)
+        size = self._library.hid_get_feature_report(self._device, room, max_length) if self._device else -1
+        if size < 0:
+            raise OSError("read error")
+        return list(room.raw[:size])
+
+    def send_feature_report(self, buff: bytes) -> int:
+        """As hidapi's binding."""
+        return self._library.hid_send_feature_report(self._device, buff, len(buff)) if self._device else -1
+
+    def set_nonblocking(self, value: bool) -> int:
+        """As hidapi's binding."""
+        return self._library.hid_set_nonblocking(self._device, int(value))
+
+    def close(self) -> None:
+        """Give the node back; what is asked for later is an error."""
+        if self._device:
+            self._library.hid_close(self._device)
+        self._device = 0

@@ -1,0 +1,108 @@
+"""A servo against the clock whose ticks' calls of the heap are counted: run with `heap_calls.c` preloaded.
+
+With PYTHONMALLOC=malloc what Python takes comes from the same functions as what compiled code, NumPy, MuJoCo and libc
+take, so nothing is hidden in a pool.
+"""
+
+import ctypes
+import multiprocessing
+import socket
+import sys
+
+import numpy as np
+
+from controllers.safety.arming import ARM
+from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_THETA
+from sim.devices.hid import HidPhantom
+from sim.devices.hid_protocol import COUNT_UNIT
+from sim.devices.hidapi_node import HidapiNode
+from sim.hardware.emulated_process import EmulatedDriver
+from sim.hardware.gated_servo import ROW_SIZE, Ticker
+from sim.hardware.servo_process import (
+    ORDER_BEAT,
+    ORDER_NUMBER,
+    ORDER_REQUEST,
+    ORDER_SIZE,
+    ORDER_STOP,
+    Channels,
+    ServoClock,
+    ServoProcess,
+)
+from sim.hardware.shared import Ring, SharedNumbers
+from tests.devices.firmware import calibration, identity
+from tests.sim.hardware.emulation import AT_ONCE, gated_servo
+
+WARM, TICKS = 500.0, 2000.0
+
+
+def theta_at(number: float) -> float:
+    return 0.05 * np.sin(number * 1e-3)
+
+
+class Packets:
+    """An emulated device at the other end of packets."""
+
+    def __init__(self) -> None:
+        ours, self.theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.driver, self.command, self.packet = EmulatedDriver(ours), np.zeros(4), np.zeros(READING_SIZE + 1)
+
+    def pass_tick(self, number: float) -> None:
+        if self.packet[READING_SEQUENCE] > 0.0:
+            self.theirs.recv_into(self.command)
+        self.packet[READING_SEQUENCE] += 1.0
+        self.packet[READING_CLOCK], self.packet[READING_THETA] = number * 1e-3, theta_at(number)
+        self.theirs.send(self.packet)
+
+
+class Reports:
+    """The reference firmware behind hidapi's functions."""
+
+    def __init__(self, library: str):
+        self.firmware = ctypes.CDLL(library)
+        self.firmware.mock_begin(identity().tobytes(), calibration().tobytes())
+        self.unit = 2.0 * np.pi / (calibration()["counts_per_turn"] * COUNT_UNIT)
+        self.driver = HidPhantom(HidapiNode(self.firmware, "mock"), "mock")
+
+    def pass_tick(self, number: float) -> None:
+        counts = calibration()["zero"] + np.rint(np.array([theta_at(number), 0, 0, 0, 0, 0]) / self.unit)
+        self.firmware.mock_tick(counts.astype(np.int32).tobytes())
+
+
+class CountedServo(ServoProcess):
+    """Counts after tick `WARM`, but for what the device does between two turns, and orders its end `TICKS` later."""
+
+    def __init__(self, device: Packets | Reports):
+        self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
+        _, told = multiprocessing.get_context("spawn").Pipe(duplex=False)
+        self.device, self.order = device, np.zeros(ORDER_SIZE)
+        self.ticker = Ticker(gated_servo(device.driver, dead_man=False, **AT_ONCE))
+        self.order[[ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST]] = 1.0, 1.0, ARM
+        self.orders.write(self.order)
+        self.heap = ctypes.CDLL(None)
+        self.heap.heap_open.restype = self.heap.heap_close.restype = None
+        self.heap.heap_calls.restype = ctypes.c_long
+        clock = ServoClock(late=60.0, heartbeat=60.0, realtime=False)
+        super().__init__(self.ticker, Channels(self.orders, self.status, self.rows, told), clock)
+
+    def turn(self, number: float, late: float) -> bool:
+        self.heap.heap_close()
+        self.device.pass_tick(number)
+        if self._ticks == WARM + TICKS:
+            self.order[ORDER_STOP] = 1.0
+            self.orders.write(self.order)
+        elif self._ticks >= WARM:
+            self.heap.heap_open()
+        return ServoProcess.turn(self, number, late)  # `super()` would make an object
+
+
+if __name__ == "__main__":
+    servo = CountedServo(Reports(sys.argv[1]) if sys.argv[1:] else Packets())
+    servo.run()
+    counted = servo.heap.heap_calls()
+    servo.heap.heap_open()
+    [float(k) for k in range(1000)]
+    servo.heap.heap_close()
+    print(servo.ticker.state.name, counted, servo.heap.heap_calls() - counted)
+    servo.close()
+    for shared in (servo.orders, servo.status, servo.rows):
+        shared.close()
