@@ -7,6 +7,7 @@ from numba import njit
 
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.combination import combine, figure_channels, figure_size, packed_figure
+from controllers.borrowed import borrowed
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -17,7 +18,7 @@ from controllers.work_array import work_array
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
 
 
-@njit
+@njit(forceinline=True)
 def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Array, slope: Array) -> None:
     """Channels of each clip and their derivatives by the angle, from uniform cubic B-splines."""
     channels = value.shape[1]
@@ -54,7 +55,7 @@ def blend(
     blend_corrected(params, angle, weights, changes, work_array((4, 0)), chain, memory, pose, jacobian)
 
 
-@njit
+@njit(forceinline=True)
 def blend_corrected(
     params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
     pose: Array, jacobian: Array,
@@ -65,7 +66,8 @@ def blend_corrected(
     figure = params[_DRIFTS + 3 * clips :]
     channels = figure_channels(figure)
     value, slope = work_array((clips, channels)), work_array((clips, channels))
-    _interpolate(figure[figure_size(figure) :], samples, clips, angle, value, slope)
+    rows = figure[figure_size(figure) :]
+    _interpolate(borrowed(rows), samples, clips, angle, value, slope)
     combine(
         figure, value, slope, drifts, angle, weights, changes, correction, chain, memory, memory[:0],
         work_array((0, 0, 3)), 0.0, 0.0, pose, jacobian,

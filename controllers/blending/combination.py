@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from controllers.borrowed import borrowed
 from controllers.legs.floor import keep_above
 from controllers.legs.footing import go_on, keep_footing, mixed
 from controllers.legs.limbs import END, LIMB, Limb, place_limb
@@ -39,7 +40,7 @@ def figure_channels(figure: Array) -> int:
     return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])
 
 
-@njit
+@njit(forceinline=True)
 def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
     """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
     for i in range(value.shape[0]):
@@ -125,6 +126,19 @@ def combine(
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
+    _combine(
+        borrowed(figure), borrowed(value), borrowed(slope), borrowed(drifts), angle, borrowed(weights),
+        borrowed(changes), borrowed(correction), borrowed(chain), borrowed(memory), borrowed(footing), borrowed(soles),
+        ground, floor, borrowed(pose), borrowed(jacobian),
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def _combine(
+    figure: Array, value: Array, slope: Array, drifts: Array, angle: float, weights: Array, changes: Array,
+    correction: Array, chain: Array, memory: Array, footing: Array, soles: Array, ground: float,
+    floor: float, pose: Array, jacobian: Array,
+) -> None:  # fmt: skip
     clips, rotations, limbs = value.shape[0], int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
@@ -200,6 +214,9 @@ def combine(
             pose[3 + 4 * joint + j] = q[joint, j]
     if tangents:
         for j in range(jacobian.shape[1]):
+            if chain[0, j] == 0.0 and chain[1, j] == 0.0 and chain[2, j] == 0.0:
+                jacobian[:, j] = 0.0
+                continue
             for i in range(3):
                 jacobian[i, j] = root[1, i] * chain[0, j] + root[2, i] * chain[1, j] + root[3, i] * chain[2, j]
             for joint in range(rotations):

@@ -60,6 +60,16 @@ def wall_slope(angle: float, low: float, high: float, stiffness: float, margin: 
 
 
 @njit
+def _is_clear(params: Array, limits: int, margin: float, vector: Array) -> bool:
+    """Whether no wall of a ball joint can be near, by the vector part (3,) of its quaternion: |r_i| ≤ π |q_i|."""
+    for i in range(3):
+        low, high = params[limits + 2 * i], params[limits + 2 * i + 1]
+        if np.pi * abs(vector[i]) > min(high, -low) - margin:
+            return False
+    return True
+
+
+@njit
 def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
     """∇P and the damper's torque of one joint, written to `torque` (3,); its rates (3,) are ω."""
     k, m = gains.stiffness, gains.margin
@@ -67,6 +77,8 @@ def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Arr
     if params[joint + _BALL] == 0.0:
         torque[0] = wall_slope(pose[column], params[limits], params[limits + 1], k, m)
         torque[1] = torque[2] = 0.0
+    elif _is_clear(params, limits, m, pose[column + 1 : column + 4]):
+        torque[0] = torque[1] = torque[2] = 0.0
     else:
         x, y, z = logarithm(pose[column], pose[column + 1], pose[column + 2], pose[column + 3])
         a = wall_slope(x, params[limits], params[limits + 1], k, m)

@@ -51,13 +51,12 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
         changes[1] *= params[_SHARE]
         weights[1, owner] += 1.0 - params[_SHARE]
     size = int(params[_TABLE_SIZE])
-    d = work_array((4, 0))
+    table = params[_TABLE : _TABLE + size]
+    d = work_array((4, table_channels(table) if size > 0 else 0))
     if size > 0:
-        table = params[_TABLE : _TABLE + size]
-        d = work_array((4, table_channels(table)))
         i, i_slope = blend_weight(radius, params[_R_MIN], params[_R_MAX], _EDGE)
         j, j_slope = blend_weight(x[2], params[_Z_MIN], params[_Z_MAX], _EDGE)
-        correction(table, angle, i, j, d)
+        correction(table, angle, i, j, d, jacobian.shape[0] > 0)
         for k in range(d.shape[1]):
             d[2, k] *= i_slope
             d[3, k] *= j_slope

@@ -4,7 +4,6 @@ Every kind has a kernel with the same arguments, which is called by its address:
 used. Where the addresses come from is not this package's affair (see `sim.compilation.kernel_units`).
 """
 
-import numpy as np
 from numba import njit, types
 
 from controllers.errors import ControllerError
@@ -19,6 +18,7 @@ from controllers.haptic_map.river_clips import RIVER_CLIPS, river_clips_map
 from controllers.haptic_map.robot_arm import ROBOT_ARM, robot_arm_map
 from controllers.kernel_call import kernel_call
 from controllers.state import Array, IntArray
+from controllers.work_array import work_array
 
 MAP_KERNELS: dict[int, Kernel] = {
     CYLINDRICAL: cylindrical_map,
@@ -78,4 +78,4 @@ def evaluate_map(units: IntArray, kind: int, params: Array, x: Array, memory: Ar
     ControllerError
         If the address of a kernel that the map needs is 0.
     """
-    evaluate_map_jacobian(units, kind, params, x, memory, pose, np.empty((0, 6)))
+    evaluate_map_jacobian(units, kind, params, x, memory, pose, work_array((0, 6)))

@@ -39,6 +39,7 @@ from controllers.walking.walked_path import (
     path_value,
     straight_path,
 )
+from controllers.work_array import work_array
 
 LED = 7
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
@@ -68,7 +69,7 @@ def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array)
 def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slope: Array, change: Array) -> None:
     """Channels of a clip's two forms, mixed by u; `change` becomes their derivatives by u."""
     n = value.shape[0]
-    ground, ground_slope = np.empty(n), np.empty(n)
+    ground, ground_slope = work_array(n), work_array(n)
     _channels(rows, samples, lap, value, slope)
     _channels(rows[n * (samples + 3) :], samples, lap, ground, ground_slope)
     for k in range(n):
@@ -153,13 +154,15 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     stride = params[_STRIDE]
     samples, rotations, limbs = int(params[_SAMPLES]), int(params[_ROTATIONS]), int(params[_LIMBS])
     n, s, rate = 3 + 4 * rotations + END * limbs, x[0], 1.0 / stride
-    value, slope, change = np.empty(n), np.empty(n), np.zeros(n)
+    value, slope, change = work_array(n), work_array(n), work_array(n)
+    change[:] = 0.0
     rows, lap = params[_HEADER + LIMB * limbs :], s / stride + params[_PHASE]
     if params[_FORMS] > 1.0:
         _mixed(rows, samples, lap, x[1], value, slope, change)
     else:
         _channels(rows, samples, lap, value, slope)
-    q, spins, root, end = np.empty((rotations, 4)), np.empty((rotations, 3, 2)), np.empty((3, 3)), np.empty((3, 3))
+    q, spins = work_array((rotations, 4)), work_array((rotations, 3, 2))
+    root, end = work_array((3, 3)), work_array((3, 3))
     tangents = 2 if jacobian.shape[0] > 0 else 0
     lean, leaning = path_value(path, s, PATH_LEAN)
     _carried(path, s, 0.0, 1.0, lean, 0.0, value, change, 1, root, q[0], spins[0])
@@ -171,7 +174,7 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
         at = 3 + 4 * joint
         _unit(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
         _unit(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
-    part, by_lap, by_form = np.empty(7), np.empty(7), np.empty(7)
+    part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
         last, at = int(limb[2]), 3 + 4 * rotations + END * i

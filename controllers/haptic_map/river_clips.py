@@ -80,7 +80,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     blend(params[int(params[_BLEND]) :], angle, weights, changes, chain, memory, pose, jacobian)
 
 
-@njit
+@njit(forceinline=False)
 def takes_over(params: Array, memory: Array, river: float) -> bool:
     """Whether a river, by its number in the trace of the field, takes the hand from another, or from none; −1 is none.
 
@@ -89,7 +89,7 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
     return 0.0 <= river < params[_RIVERS] and (river != memory[RIVER] or memory[STILL] > 0.0)
 
 
-@njit
+@njit(forceinline=False)
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, by the memory a period later."""
     curve = int(params[_CURVES + int(memory[RIVER])])
@@ -97,7 +97,7 @@ def phase_rate(params: Array, memory: Array, later: Array, period: float) -> flo
     return (way - lap * np.round(way / lap)) / period
 
 
-@njit
+@njit(forceinline=False)
 def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
     """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays, or races it.
 
@@ -106,7 +106,8 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
     """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
-    curve, found, x, v = int(params[_CURVES + int(memory[RIVER])]), np.empty((BRANCHES, 2)), np.empty(3), np.empty(3)
+    curve = int(params[_CURVES + int(memory[RIVER])])
+    found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
     outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[_TUBE], found) == 0
     if outside or abs(rate) > _RACES:
         return True

@@ -26,6 +26,7 @@ from controllers.legs.limbs import LIMB, Limb
 from controllers.motion.inertialization import offset_left, stopping_way
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
+from controllers.work_array import work_array
 
 _LIFT = 0.2  # λ: height of a step over its length
 _TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
@@ -93,7 +94,7 @@ def _come_to_rest(values: Array, period: float, seconds: float, most: float, res
 @njit
 def _heights(limbs: Array, pose: Pose, heights: Array) -> float:
     """Heights of the lowest points of the ends of limbs [m], written; returns the least."""
-    end = np.empty(7)
+    end = work_array(7)
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, end)
         heights[n] = sole_height(limbs[n], end)
@@ -203,7 +204,7 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     if x >= 1.0:
         return
     share = smooth_step(x)
-    left, floor = np.empty(3), min(step[FLOOR], sole_height(limb, end))
+    left, floor = work_array(3), min(step[FLOOR], sole_height(limb, end))
     # What the old motion still carries it counts too: a foot in mid-swing would scrape.
     way = step[_AWAY] ** 2 + step[_AWAY + 1] ** 2
     offset_left(step[_AWAY:_TURNED].reshape(3, 3), stop, min(s, stop), left)

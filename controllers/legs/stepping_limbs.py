@@ -21,6 +21,7 @@ from controllers.legs.limbs import LIMB, place_limb
 from controllers.motion.vectors import cross, dot, product, turned_back, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
+from controllers.work_array import work_array
 
 _TOUCHES = 0.12  # [m] height from which a foot does not have to reach what it is asked for
 _EASE = 0.95  # of its length, that a limb is long at ease
@@ -69,7 +70,7 @@ def _leg(limb: Array, pose: Pose, end: Array, line: Array) -> float:
 @njit
 def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     """How much lower the root must be for a limb to reach its end at ease, `end` (7,), if that is on the floor [m]."""
-    line = np.empty(3)
+    line = work_array(3)
     longest = _EASE * _leg(limb, pose, end, line)
     way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
@@ -82,7 +83,8 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
 def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
     """Roll a sole by an angle over its edge in a direction over the floor, (2,): that stays where it is, and as low."""
     low = sole_height(limb, end)
-    point, total = np.zeros(2), 0.0
+    point, total = work_array(2), 0.0
+    point[:] = 0.0
     for k in range(LIMB, limb.shape[0], 3):
         x, y, _ = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
         weight = np.exp((x * along[0] + y * along[1]) / _EDGE)
@@ -102,7 +104,7 @@ def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
 
     It rolls over its edge first, such that a foot goes on to bear, and then it is drawn.
     """
-    line, along = np.empty(3), np.empty(2)
+    line, along = work_array(3), work_array(2)
     longest = _leg(limb, pose, end, line)
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     room = max(_GIVES * share * longest, 1e-9)
@@ -168,6 +170,6 @@ def put_limb(limb: Array, step: Array, pose: Pose, end: Array, share: float) -> 
     # Once from a limb that is straight leaves up to two centimetres.
     for again in range(2):
         rotations[last] = end[3:]
-        place_limb(limb, rotations, np.empty((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
+        place_limb(limb, rotations, work_array((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
         if again == 0:
             _turn_along(limb, step, rotations, own, end)

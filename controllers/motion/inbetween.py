@@ -42,9 +42,9 @@ def table_channels(table: Array) -> int:
     return int(table[_CHANNELS])
 
 
-@njit
-def correction(table: Array, angle: float, a: float, b: float, d: Array) -> None:
-    """Corrections D and their derivatives.
+@njit(forceinline=True)
+def correction(table: Array, angle: float, a: float, b: float, d: Array, slopes: bool = True) -> None:
+    """Corrections D, and their derivatives if asked for.
 
     Parameters
     ----------
@@ -53,7 +53,9 @@ def correction(table: Array, angle: float, a: float, b: float, d: Array) -> None
     angle, a, b : float
         θ in [0, 2π], and coordinates in [0, 1].
     d : Array, shape (4, channels)
-        Written: D [m, rad], and its derivatives by θ, a and b.
+        Written: D [m, rad], and its derivatives by θ, a and b, or zeros.
+    slopes : bool
+        Whether the derivatives are wanted.
     """
     rows, nodes, channels = int(table[_ROWS]), int(table[_NODES]), int(table[_CHANNELS])
     scale, steps = rows / (2.0 * np.pi), nodes - 1
@@ -71,9 +73,10 @@ def correction(table: Array, angle: float, a: float, b: float, d: Array) -> None
                 first = _TABLE + (((row + k) * (nodes + 2) + i + m) * (nodes + 2) + j + n) * channels
                 share = in_a[m] * in_b[n]
                 by_a, by_b = steps * in_a_slope[m] * in_b[n], steps * in_a[m] * in_b_slope[n]
+                values = table[first : first + channels]
                 for c in range(channels):
-                    value = table[first + c]
-                    d[0, c] += w * share * value
-                    d[1, c] += w_slope * share * value
-                    d[2, c] += w * by_a * value
-                    d[3, c] += w * by_b * value
+                    d[0, c] += w * share * values[c]
+                for c in range(channels if slopes else 0):
+                    d[1, c] += w_slope * share * values[c]
+                    d[2, c] += w * by_a * values[c]
+                    d[3, c] += w * by_b * values[c]

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 from sim.body.stance import factor, substitute
 
 N_EDGES = 4  # of a linearised friction cone
@@ -70,8 +71,7 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
         Newton steps taken.
     """
     n = share.size
-    H = np.empty((6, 6))
-    step = np.empty(6)
+    H, step, gradient, trial = work_array((6, 6)), work_array(6), work_array(6), work_array(6)
     slope = 0.0
     for taken in range(_STEPS):
         value = _stationarity(edges, share, wrench, residual, force, H, step)
@@ -80,15 +80,17 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
             norm += step[i] * step[i]
         if norm < _TOLERANCE**2:
             return taken
-        gradient = step.copy()
+        gradient[:] = step
         factor(H)
         substitute(H, step)
         slope = -np.dot(gradient, step)
         length = 1.0
-        trial = residual - step
+        for i in range(6):
+            trial[i] = residual[i] - step[i]
         while _dual(edges, share, wrench, trial) > value + 1e-4 * length * slope + 1e-15 and length > 1e-6:
             length *= 0.5
-            trial[:] = residual - length * step
+            for i in range(6):
+                trial[i] = residual[i] - length * step[i]
         residual[:] = trial
     for j in range(n):
         force[j] = share[j] * max(0.0, np.dot(edges[j], residual))

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import typeof
+from numba import njit, typeof, types
 from numba.extending import overload
 
 from controllers.fields.instructions import VECTOR
-from controllers.kernel_call import call_as_given
+from controllers.kernel_call import call_as_given, lend
 from controllers.state import Array, IntArray
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
@@ -29,7 +29,7 @@ _DRIVES: dict[type, Callable[..., Any]] = {FigureState: figure_torque, RobotStat
 
 def drive_unit(body: FigureState | RobotState) -> Unit:
     """The unit that sets a body's torques for the reference of a control tick: pose, velocity, acceleration."""
-    return Unit.of(_DRIVES[type(body)], typeof(body), VECTOR, VECTOR, VECTOR)
+    return Unit.of(_DRIVES[type(body)], types.CPointer(types.Tuple((typeof(body), VECTOR, VECTOR, VECTOR))))
 
 
 def follow_units(body: BodyState, reference: CompiledReference) -> tuple[Unit, ...]:
@@ -48,28 +48,35 @@ def follow_addresses(body: BodyState, reference: CompiledReference) -> IntArray:
     return addresses
 
 
-def follow(units: IntArray, body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> None:
-    """Update the reference at the map's argument (7,) and the field's trace, and what of a body follows it.
+@njit(inline="always")
+def lend_followed(body: BodyState, reference: CompiledReference, argument: Array, trace: Array) -> tuple[Any, Any]:
+    """What `follow` takes, for as long as the caller runs: of the map's argument (7,) and the field's trace."""
+    asked = lend((reference, argument, trace))
+    return asked, lend((body, reference.pose, reference.velocity, reference.acceleration))
 
-    `units` are `follow_addresses`. For compiled code only.
+
+def follow(units: IntArray, body: BodyState, followed: tuple[Any, Any]) -> None:
+    """Update the reference, and what of a body follows it.
+
+    `units` are `follow_addresses`, `followed` is of `lend_followed`. For compiled code only.
     """
     raise NotImplementedError("compiled code only")
 
 
-def _follow_in_physics(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+def _follow_in_physics(units: IntArray, body: Any, followed: Any) -> None:
     if units[0] == 0 or units[1] == 0:
         raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (reference, argument, trace))
-    call_as_given(units[1], (body, reference.pose, reference.velocity, reference.acceleration))
+    call_as_given(units[0], (followed[0],))
+    call_as_given(units[1], (followed[1],))
 
 
-def _show(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+def _show(units: IntArray, body: Any, followed: Any) -> None:
     if units[0] == 0:
         raise SimError("what updates the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (reference, argument, trace))
+    call_as_given(units[0], (followed[0],))
 
 
-def _stay_away(units: IntArray, body: Any, reference: Any, argument: Array, trace: Array) -> None:
+def _stay_away(units: IntArray, body: Any, followed: Any) -> None:
     pass
 
 
@@ -80,5 +87,5 @@ _FOLLOWS: dict[type, Any] = {
 
 # Inlined, as a call would hand over all the arrays of body and reference, number by number.
 @overload(follow, strict=False, inline="always")
-def _follow(units: Any, body: Any, reference: Any, argument: Any, trace: Any) -> Any:
+def _follow(units: Any, body: Any, followed: Any) -> Any:
     return _FOLLOWS[body.instance_class]

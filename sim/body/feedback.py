@@ -43,7 +43,7 @@ def shorten(vector: Array, longest: float) -> bool:
     return length > longest
 
 
-@njit
+@njit(forceinline=True)
 def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     """a* = a_r + 2ω (v_r − v) + ω² (q_r ⊖ q) into `s.acceleration`; a rotating joint's a_r and v_r turn with its error.
 

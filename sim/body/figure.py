@@ -19,10 +19,12 @@ leg cannot give is residual too. No spring holds the root. A figure that falls l
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import mujoco
 import numpy as np
 
+from controllers.kernel_call import call_as_given, lend
 from models.humanoid.skeleton import (
     BODIES,
     CONTACT_RADIUS,
@@ -35,10 +37,12 @@ from models.humanoid.skeleton import (
     SEGMENTS,
 )
 from sim.body.contact_forces import N_EDGES
+from sim.body.drive import drive_unit
 from sim.body.falls import fall_state
 from sim.body.figure_state import REPORT_SIZE, Array, FigureGains, FigureState
+from sim.body.mass_matrix import mass_matrix
 from sim.body.whole_body import figure_torque
-from sim.compilation.units import unit_function
+from sim.compilation.compiled import entry_point
 from sim.errors import SimError
 
 __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
@@ -48,7 +52,9 @@ _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
 
 
-_update = unit_function(figure_torque.__module__, figure_torque.__qualname__)  # the same unit as in the servo's loop
+@entry_point
+def _update(drive: int, s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+    call_as_given(drive, (lend((s, q_r, v_r, a_r)),))
 
 
 @dataclass(frozen=True)
@@ -98,7 +104,11 @@ class Figure:
         q_r, v_r, a_r : Array
             Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
         """
-        _update(self.state, q_r, v_r, a_r)
+        _update(self._kernel, self.state, q_r, v_r, a_r)
+
+    @cached_property
+    def _kernel(self) -> int:
+        return drive_unit(self.state).address()  # of the same unit as in the servo's loop
 
     def _state(self) -> FigureState:
         m, d, twin = self.model, self.data, self.twin
@@ -112,7 +122,6 @@ class Figure:
         n, qpos, dof = len(CONTACTS), int(root.qposadr[0]), int(root.dofadr[0])
         bodies, dofs = slice(body, body + len(BODIES)), slice(dof, dof + N_TANGENT)
         motors = slice(motor, motor + _N_MOTORS)
-        world_M = np.zeros((m.nv, m.nv))
         radius = float(m.geom_size[spheres[0], 0])
         stature = DEFAULT_STATURE * radius / CONTACT_RADIUS
         legs = [[BODIES.index(f"{side}_{name}") for name in ("thigh", "shank", "foot")] for side in ("left", "right")]
@@ -125,7 +134,7 @@ class Figure:
             contact_body=np.array([int(m.geom_bodyid[sphere]) - body for sphere in spheres]),
             twin_qpos=self.twin_data.qpos, twin_contact_pos=self.twin_data.geom_xpos,
             twin_contact=np.array([int(twin.geom(name).id) for name in CONTACTS]),
-            world_M=world_M, M=world_M[dofs, dofs], parent=np.array([segment.parent for segment in SEGMENTS]),
+            mass=mass_matrix(m, d, dofs), parent=np.array([segment.parent for segment in SEGMENTS]),
             legs=np.array(legs), torque_limit=m.actuator_ctrlrange[motors, 1].copy(),
             weight=float(m.body_subtreemass[body]) * float(np.linalg.norm(m.opt.gravity)),
             stature=stature, radius=radius,

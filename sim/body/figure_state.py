@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from controllers.state import Array
 from sim.body.falls import FallState
+from sim.body.mass_matrix import MassMatrix
 
 IntArray = npt.NDArray[np.int64]
 
@@ -87,8 +88,8 @@ class FigureState(NamedTuple):
         Positions of the world's geoms, the contact spheres among them (10,), and their bodies among the figure's.
     twin_qpos, twin_contact_pos, twin_contact : Array
         The same in the figure alone.
-    world_M, M : Array
-        Dense mass matrix of the world, and the figure's block of it, shape (57, 57).
+    mass : MassMatrix
+        Of its degrees of freedom.
     parent, legs : IntArray
         Parent of each body, and thigh, shank and foot of each leg, shape (2, 3).
     torque_limit : Array
@@ -132,8 +133,7 @@ class FigureState(NamedTuple):
     twin_qpos: Array
     twin_contact_pos: Array
     twin_contact: IntArray
-    world_M: Array
-    M: Array
+    mass: MassMatrix
     parent: IntArray
     legs: IntArray
     torque_limit: Array

@@ -6,11 +6,12 @@ cut at the motors' limits. c holds Coriolis, centrifugal and gravity torques. Th
 as long as no motor saturates (Craig, Introduction to Robotics, chapter 10).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from controllers.kernel_call import lent
 from controllers.state import Array
 from models.robot_arm.spec import ARM_JOINTS
 from models.scene import ROBOT
@@ -63,8 +64,14 @@ class RobotState(NamedTuple):
 
 
 @njit
-def robot_torque(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    """Set the motors' torques for reference angles [rad], rates and accelerations, shape (7,) each."""
+def robot_torque(place: Any) -> None:
+    """Set the motors' torques for what is lent: state, reference angles [rad], rates, accelerations, (7,) each."""
+    s, q_r, v_r, a_r = lent(place)
+    _act(s, q_r, v_r, a_r)
+
+
+@njit
+def _act(s: RobotState, q_r: Array, v_r: Array, a_r: Array) -> None:
     mj_full_m(s.model, s.data, s.world_M.ctypes)
     n = s.qpos.shape[0]
     saturated = 0

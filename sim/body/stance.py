@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 
 IntArray = npt.NDArray[np.int64]
 
@@ -30,6 +31,13 @@ def _cross_add(a: Array, b: Array, out: Array) -> None:
     out[0] += a[1] * b[2] - a[2] * b[1]
     out[1] += a[2] * b[0] - a[0] * b[2]
     out[2] += a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def _difference(a: Array, b: Array, out: Array) -> None:
+    """Out = a − b."""
+    for i in range(3):
+        out[i] = a[i] - b[i]
 
 
 @njit
@@ -59,11 +67,15 @@ def stance_response(
     loaded = share.max()
     if loaded <= 0.0:
         return
-    normal = np.eye(N_LEG)
-    J, J_root, wanted = np.empty((3, N_LEG)), np.empty((3, 6)), np.empty(3)
-    omega, axis, relative, arm, spin = np.zeros((4, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    normal = work_array((N_LEG, N_LEG))
+    for k in range(N_LEG):
+        normal[k] = 0.0
+        normal[k, k] = 1.0
+    J, J_root, wanted = work_array((3, N_LEG)), work_array((3, 6)), work_array(3)
+    axis, relative, arm, spin = work_array(3), work_array(3), work_array(3), work_array(3)
     # angular velocities of root, thigh, shank, foot; acceleration of the foot's origin under velocities alone
-    drift, turning = np.zeros((4, 3)), np.zeros((4, 3))
+    omega, drift, turning = work_array((4, 3)), work_array((4, 3)), work_array((4, 3))
+    omega[:], drift[:], turning[:] = 0.0, 0.0, 0.0
     for level in range(4):
         body = 0 if level == 0 else bodies[level - 1]
         for i in range(3):
@@ -75,27 +87,30 @@ def stance_response(
             omega[level] = omega[level - 1]
             turning[level] = turning[level - 1]
             _cross_add(omega[level - 1], relative, turning[level])
-            arm[:] = xpos[body] - xpos[above]
+            _difference(xpos[body], xpos[above], arm)
             drift[level] = drift[level - 1]
             _cross_add(turning[level - 1], arm, drift[level])
             spin[:] = 0.0
             _cross_add(omega[level - 1], arm, spin)
             _cross_add(omega[level - 1], spin, drift[level])
-        omega[level] += relative
+        for i in range(3):
+            omega[level, i] += relative[i]
     for p in range(share.shape[0]):
         if near[p] <= 0.0:
             continue
-        arm[:] = points[p] - xpos[bodies[2]]
+        _difference(points[p], xpos[bodies[2]], arm)
         spin[:] = 0.0
         _cross_add(omega[3], arm, spin)
-        wanted[:] = -drift[3]
+        for i in range(3):
+            wanted[i] = -drift[3, i]
         relative[:] = 0.0
         _cross_add(turning[3], arm, relative)
         _cross_add(omega[3], spin, relative)
-        wanted -= relative
+        for i in range(3):
+            wanted[i] -= relative[i]
         for level in range(4):
             body = 0 if level == 0 else bodies[level - 1]
-            arm[:] = points[p] - xpos[body]
+            _difference(points[p], xpos[body], arm)
             for k in range(3):
                 for i in range(3):
                     axis[i] = xmat[body, 3 * i + k]

@@ -1,8 +1,12 @@
 """The control of the physical figure, compiled: see `sim.body.figure` for its equations."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
+from controllers.kernel_call import lent
+from controllers.work_array import work_array
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
 from sim.body.feedback import shorten, wanted_acceleration
@@ -15,8 +19,9 @@ from sim.body.figure_state import (
     Array,
     FigureState,
 )
+from sim.body.mass_matrix import inertia, inertial_force
 from sim.body.stance import N_LEG, factor, stance_response, substitute
-from sim.compilation.native import mj_full_m, mj_integrate_pos, mj_kinematics
+from sim.compilation.native import mj_integrate_pos, mj_kinematics
 
 _LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a residual force
 _FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
@@ -26,16 +31,22 @@ _N_FOOT = 4  # contact points of a foot
 
 
 @njit
-def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
+def figure_torque(place: Any) -> None:
     """Set the motors' torques and the root's residual wrench for the reference of this control tick.
 
     Parameters
     ----------
-    s : FigureState
-        Reads the state, and the dynamics of the last physics step; writes `ctrl`, `applied` and `report`.
-    q_r, v_r, a_r : Array
-        Reference pose (75), velocity (57) and acceleration (57), in the conventions of qpos and qvel.
+    place
+        Where is lent (`controllers.kernel_call.lend`): the `FigureState`, whose state is read, and the dynamics of the
+        last physics step, and whose `ctrl`, `applied` and `report` are written; reference pose (75), velocity (57) and
+        acceleration (57), in the conventions of qpos and qvel.
     """
+    s, q_r, v_r, a_r = lent(place)
+    _act(s, q_r, v_r, a_r)
+
+
+@njit(forceinline=True)
+def _act(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
@@ -50,11 +61,21 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
         _set_back(s, q_r)
     s.applied[:] = s.wrench
     s.report[REPORT_SUPPORT] = support
-    s.report[REPORT_SATURATED] = np.sum(np.abs(s.ctrl) >= 0.999 * s.torque_limit)
+    s.report[REPORT_SATURATED] = _saturated(s.ctrl, s.torque_limit)
     s.report[REPORT_RESIDUAL : REPORT_RESIDUAL + 6] = s.wrench
 
 
 @njit
+def _saturated(torques: Array, limits: Array) -> int:
+    """How many motors are at their limits."""
+    count = 0
+    for k in range(torques.shape[0]):
+        if abs(torques[k]) >= 0.999 * limits[k]:
+            count += 1
+    return count
+
+
+@njit(forceinline=True)
 def _set_back(s: FigureState, q_r: Array) -> None:
     """Torques and a wrench at the root, without bounds, that carry a figure from where it lay to the reference."""
     follow_back(s.twin_model, s.fall, q_r)
@@ -64,21 +85,17 @@ def _set_back(s: FigureState, q_r: Array) -> None:
     rate = s.gains.root_rate
     for i in range(3):  # without the bound on the root's pull: the animation may have gone far
         s.acceleration[i] = 2.0 * rate * (s.fall.velocity[i] - s.qvel[i]) + rate**2 * (s.fall.target[i] - s.qpos[i])
-    mj_full_m(s.model, s.data, s.world_M.ctypes)
     s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
     for plan in range(_PLANS):
         if not _plan_torques(s) or plan == _PLANS - 1 or not _give_way(s):
             break
     for i in range(6):
-        s.wrench[i] = s.bias[i] - s.passive[i]
-        for k in range(s.acceleration.shape[0]):
-            s.wrench[i] += s.M[i, k] * s.acceleration[k]
+        s.wrench[i] = inertial_force(s.mass, i, s.acceleration, s.bias[i] - s.passive[i])
 
 
-@njit
+@njit(forceinline=True)
 def _stand(s: FigureState, support: float) -> None:
     """Torques and residual wrench of a figure that is up (see `sim.body.figure`)."""
-    mj_full_m(s.model, s.data, s.world_M.ctypes)
     for leg in range(2):
         foot = slice(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT)
         stance_response(
@@ -104,7 +121,7 @@ def _nearness(height: float, reach: float) -> float:
     return (1.0 - x) ** 2 * (1.0 + 2.0 * x)
 
 
-@njit
+@njit(forceinline=True)
 def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     """Share of each contact point: it touches, and the reference has it near the floor now and a moment ahead.
 
@@ -143,13 +160,13 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     return support
 
 
-@njit
+@njit(forceinline=True)
 def _plan_contacts(s: FigureState, support: float) -> bool:
     """Contact forces and residual that meet the root's demand (M a* + c)_r, and the generalised forces they make.
 
     Returns whether they meet it: not if the residual was beyond its bounds.
     """
-    R, w, y = s.xmat[0], s.wrench, s.residual
+    R, w, y, arm = s.xmat[0], s.wrench, s.residual, work_array(3)
     w[:] = 0.0
     s.force[:] = 0.0
     s.given[:] = 0.0
@@ -157,16 +174,16 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
         y[:] = 0.0
         return False
     for i in range(6):
-        s.demand[i] = s.bias[i] - s.passive[i]
-        for k in range(s.acceleration.shape[0]):
-            s.demand[i] += s.M[i, k] * s.acceleration[k]
+        s.demand[i] = inertial_force(s.mass, i, s.acceleration, s.bias[i] - s.passive[i])
     for i in range(3):  # moments in world axes, so that the cones need no turning
         s.scaled[i] = s.demand[i] / s.weight
         moment = R[3 * i] * s.demand[3] + R[3 * i + 1] * s.demand[4] + R[3 * i + 2] * s.demand[5]
         s.scaled[3 + i] = moment / (s.weight * _LEVER)
     for c in range(s.share.shape[0]):
         edges = s.edges[N_EDGES * c : N_EDGES * c + N_EDGES]
-        cone_edges(s.points[c] - s.xpos[0], s.friction, edges)
+        for i in range(3):
+            arm[i] = s.points[c, i] - s.xpos[0, i]
+        cone_edges(arm, s.friction, edges)
         edges[:, 3:] /= _LEVER
         s.edge_share[N_EDGES * c : N_EDGES * c + N_EDGES] = _FULL_SHARE * s.share[c]
     shared_forces(s.edges, s.edge_share, s.scaled, y, s.edge_force)
@@ -182,7 +199,7 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
     return not _bound_residual(s, support)
 
 
-@njit
+@njit(forceinline=True)
 def _bound_residual(s: FigureState, support: float) -> bool:
     """Shorten the residual to its bounds, which shrink with the support; returns whether it was beyond them."""
     force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
@@ -190,7 +207,7 @@ def _bound_residual(s: FigureState, support: float) -> bool:
     return force or moment
 
 
-@njit
+@njit(forceinline=True)
 def _add_contact(s: FigureState, c: int) -> None:
     """Add Jᵀ f of one contact point: the root's force, and moments about it and about every joint on the way there."""
     f = s.force[c]
@@ -205,7 +222,7 @@ def _add_contact(s: FigureState, c: int) -> None:
         body = s.parent[body]
 
 
-@njit
+@njit(forceinline=True)
 def _let_root_fall(s: FigureState, support: float) -> None:
     """Without support the root's acceleration is what the forces make it: M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
 
@@ -215,26 +232,25 @@ def _let_root_fall(s: FigureState, support: float) -> None:
     if support >= 1.0:
         return
     a, falling, block = s.acceleration, s.demand, s.block[:6, :6]
-    block[:] = s.M[:6, :6]
     for i in range(6):
         falling[i] = s.given[i] + s.wrench[i] - s.bias[i] + s.passive[i]
+        for k in range(6):
+            block[i, k] = inertia(s.mass, i, k)
         for k in range(6, a.shape[0]):
-            falling[i] -= s.M[i, k] * a[k]
+            falling[i] -= inertia(s.mass, i, k) * a[k]
     factor(block)
     substitute(block, falling)
     for i in range(6):
         a[i] = support * s.wanted_root[i] + (1.0 - support) * falling[i]
 
 
-@njit
+@njit(forceinline=True)
 def _plan_torques(s: FigureState) -> bool:
     """Torques of the planned motion, within the motors' limits; returns whether any needed more."""
     a, saturated = s.acceleration, False
     for motor in range(s.ctrl.shape[0]):
         i = motor + 6
-        torque = s.bias[i] - s.passive[i] - s.given[i]
-        for k in range(a.shape[0]):
-            torque += s.M[i, k] * a[k]
+        torque = inertial_force(s.mass, i, a, s.bias[i] - s.passive[i] - s.given[i])
         limit = s.torque_limit[motor]
         s.ctrl[motor] = min(max(torque, -limit), limit)
         s.lost[motor] = torque - s.ctrl[motor]
@@ -243,7 +259,7 @@ def _plan_torques(s: FigureState) -> bool:
     return saturated
 
 
-@njit
+@njit(forceinline=True)
 def _give_way(s: FigureState) -> bool:
     """Give saturated joints the acceleration that their limits allow, M_ss Δa = −lost; not those of standing legs."""
     for motor in range(s.lost.shape[0]):
@@ -261,7 +277,7 @@ def _give_way(s: FigureState) -> bool:
         m = 0
         for k in range(i + 1):
             if s.yielding[k] == 1:
-                s.block[n, m] = s.M[6 + i, 6 + k]
+                s.block[n, m] = inertia(s.mass, 6 + i, 6 + k)
                 m += 1
         n += 1
     if n == 0:
@@ -276,7 +292,7 @@ def _give_way(s: FigureState) -> bool:
     return True
 
 
-@njit
+@njit(forceinline=True)
 def _make_up_for_legs(s: FigureState, support: float) -> None:
     """What standing legs cannot give within their limits is residual, by virtual work: Kᵀ lost."""
     for leg in range(2):

@@ -239,7 +239,7 @@ def _value(value: Any, name: str, others: _Others) -> object:
         return "library", type(value).__qualname__, str(getattr(value, "__module__", "")), _name_of(value)
     if isinstance(value, python_types.FunctionType):
         others.append((value, {}))
-        others.extend((template._overload_func, {}) for template in _overloads(value))
+        others.extend((template._overload_func, template._jit_options) for template in _overloads(value))
         return "function"
     return _literal(value, name)
 
@@ -306,6 +306,8 @@ def describe_type(kind: Any) -> object:
         return kind.instance_class.__module__, kind.instance_class.__qualname__, kind.fields, inner
     if isinstance(kind, types.BaseTuple):
         return "tuple", [describe_type(item) for item in kind.types]
+    if isinstance(kind, types.CPointer):
+        return "pointer", describe_type(kind.dtype)
     if isinstance(kind, _PLAIN_TYPES):
         return type(kind).__name__, str(kind)
     raise UnknownIngredient(f"the type {kind} is a {type(kind).__qualname__}; expected numbers, arrays and tuples")

@@ -49,18 +49,21 @@ def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: 
     _ADVANCE[type(device)](device, plant, t, replay, applied)
 
 
-# A function around the kernels would take all the arrays of a device once more, number by number.
-@overload(sense, strict=False)
+_INLINED = {"forceinline": True}
+
+
+# A call would hand over all the arrays of a device once more, number by number.
+@overload(sense, strict=False, jit_options=_INLINED)
 def _sense(device: Any, t: Any) -> Any:
     return _SENSE[device.instance_class].py_func
 
 
-@overload(actuate, strict=False)
+@overload(actuate, strict=False, jit_options=_INLINED)
 def _actuate(device: Any, force: Any) -> Any:
     return _ACTUATE[device.instance_class].py_func
 
 
-@overload(advance, strict=False)
+@overload(advance, strict=False, jit_options=_INLINED)
 def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
     return _ADVANCE[device.instance_class].py_func
 

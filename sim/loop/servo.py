@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from controllers.borrowed import borrowed
 from controllers.fields.instructions import TRACE_SIZE
 from controllers.fields.law import Program
 from controllers.fields.map_feed import feed_maps, feed_rows
@@ -30,7 +31,7 @@ from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array
-from sim.body.drive import BodyState, follow, follow_addresses
+from sim.body.drive import BodyState, follow, follow_addresses, lend_followed
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, map_units
 from sim.devices.device import DeviceState, actuate, advance, link_device, sense
@@ -185,22 +186,11 @@ def field_force(servo: Servo) -> None:
     actuate(device, field.force)
 
 
-@entry_point
-def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
-    """Run n ticks from tick number `first`, or replay them.
-
-    Parameters
-    ----------
-    servo : Servo
-        Everything in it is updated.
-    first, n : int
-        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
-    replay : bool
-        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
-    ticks, frames : TickLog, FrameLog
-        Written (or read, see `replay`) row by row.
-    """
+@njit(forceinline=True)
+def _run(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """`run_block`, over arrays that it borrows."""
     plant, device, every = servo.plant, servo.device, servo.figure_ticks
+    followed = lend_followed(servo.figure, servo.reference, servo.argument, servo.field.memory[:TRACE_SIZE])
     for k in range(n):
         t = (first + k) * plant.period
         update_figure = (first + k) % every == 0
@@ -212,8 +202,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             sense(device, t)
             field_force(servo)
             if update_figure:
-                trace = servo.field.memory[:TRACE_SIZE]
-                follow(servo.units, servo.figure, servo.reference, servo.argument, trace)
+                follow(servo.units, servo.figure, followed)
             ticks.hand[k] = device.hand
             ticks.field[k] = servo.field.wrench
             ticks.force[k] = servo.field.force
@@ -236,6 +225,24 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
             frames.ground[row] = plant.ground
         advance(device, plant, t, replay, ticks.applied[k])
         ticks.user[k] = device.force
+
+
+@entry_point
+def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, frames: FrameLog) -> None:
+    """Run n ticks from tick number `first`, or replay them.
+
+    Parameters
+    ----------
+    servo : Servo
+        Everything in it is updated.
+    first, n : int
+        Number of the first tick, a multiple of the figure's ticks, and how many to run; any tick alone may be run.
+    replay : bool
+        Take `ctrl`, `applied` and `residual` from `ticks` instead of computing them.
+    ticks, frames : TickLog, FrameLog
+        Written (or read, see `replay`) row by row.
+    """
+    _run(borrowed(servo), first, n, replay, borrowed(ticks), borrowed(frames))
 
 
 def rearm_servo(servo: Servo) -> None:

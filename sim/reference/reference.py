@@ -4,6 +4,7 @@ Where rivers play clips of their own, a change of river is a change of motion: t
 """
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,7 +16,7 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
 from controllers.haptic_map.river_clips import RIVER_CLIPS, lets_go, phase_rate, takes_over
-from controllers.kernel_call import call_as_given
+from controllers.kernel_call import call_as_given, lend, lent
 from controllers.legs.limbs import LIMB
 from controllers.state import Array
 from sim.compilation.compiled import entry_point
@@ -36,7 +37,7 @@ _MATRIX = types.Array(types.float64, 2, "C")
 _ROUNDS = 8  # in which what comes before a motion is found: each gains three digits at the least
 
 
-@njit
+@njit(forceinline=True)
 def _settle(reference: CompiledReference) -> None:
     """Let the three poses down to the floor, by the share of a hand that is slow."""
     s, period, transition = reference.settled, reference.period, reference.transition
@@ -46,7 +47,7 @@ def _settle(reference: CompiledReference) -> None:
 
 
 @njit
-def update_reference(reference: CompiledReference, stylus: Array, trace: Array) -> None:
+def update_reference(place: Any) -> None:
     r"""Advance the reference by one period.
 
     With p(s) = p + s ṗ + ½ s² p̈ and R(s) = R exp(s ω + ½ s² α) the smoothed motion x of the stylus, velocity and
@@ -55,13 +56,17 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
 
     Parameters
     ----------
-    reference : CompiledReference
-        Updated: the stylus's motion, memory, pose (75), velocity (57), acceleration (57).
-    stylus : Array
-        Measured position in H and orientation wxyz, shape (7,).
-    trace : Array
-        Of the field (see `controllers.fields.instructions`): which river has the hand, and where on it the hand is.
+    place
+        Where is lent (`controllers.kernel_call.lend`): the reference, updated (the stylus's motion, memory, pose (75),
+        velocity (57), acceleration (57)); the stylus's measured position in H and orientation wxyz, shape (7,); and the
+        trace of the field (see `controllers.fields.instructions`), which river has the hand, and where on it that is.
     """
+    reference, stylus, trace = lent(place)
+    _advance(reference, stylus, trace)
+
+
+@njit(forceinline=True)
+def _advance(reference: CompiledReference, stylus: Array, trace: Array) -> None:
     hand, period = reference.hand, reference.period
     if reference.started[0] == 0.0:
         reference.started[0] = 1.0
@@ -126,13 +131,13 @@ def poses_unit() -> Unit:
 
 def update_unit(reference: CompiledReference) -> Unit:
     """The unit of `update_reference`, which is called by its address."""
-    return Unit.of(update_reference, typeof(reference), VECTOR, VECTOR)
+    return Unit.of(update_reference, types.CPointer(types.Tuple((typeof(reference), VECTOR, VECTOR))))
 
 
 @entry_point
 def _reference_along(update: int, reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
     for i in range(points.shape[0]):
-        call_as_given(update, (reference, points[i], traces[i]))
+        call_as_given(update, (lend((reference, points[i], traces[i])),))
         poses[i] = reference.pose
 
 

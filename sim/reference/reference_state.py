@@ -77,7 +77,7 @@ class CompiledReference(NamedTuple):
     to_after: Array
 
 
-@njit
+@njit(forceinline=True)
 def look_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, a period before and a period after; the memory is now's."""
     period, x = reference.period, reference.scratch_x
@@ -91,7 +91,7 @@ def look_around(reference: CompiledReference, hand: Array) -> None:
         evaluate_map(reference.units, reference.kind, reference.params, x, reference.scratch_memory, pose)
 
 
-@njit
+@njit(forceinline=True)
 def follow_trail(reference: CompiledReference) -> None:
     """Rates of the smoothed hand by its own last positions: the filter's come after, where a hand is thrown."""
     now, trail, going, period = reference.hand[0], reference.trail, reference.going, reference.period
@@ -104,6 +104,8 @@ def follow_trail(reference: CompiledReference) -> None:
 @njit
 def carry(reference: CompiledReference) -> None:
     """Move the three poses to what a transition shows."""
+    if reference.transition.since[0] >= reference.transition.lasts[0]:
+        return
     carry_on(reference.transition, 0.0, reference.pose)
     carry_on(reference.transition, -reference.period, reference.before)
     carry_on(reference.transition, reference.period, reference.after)

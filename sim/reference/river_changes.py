@@ -94,7 +94,7 @@ def _go_over(reference: CompiledReference, params: Array) -> None:
     transition.since[0] = 0.0
 
 
-@njit
+@njit(forceinline=False)
 def may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
     """Whether the figure stands, and another river's clip does not leap before it is shown; or has waited for that."""
     transition, memory = reference.transition, reference.scratch_memory
@@ -114,7 +114,7 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     return True
 
 
-@njit
+@njit(forceinline=False)
 def change_river(reference: CompiledReference, params: Array, river: float, phase: float) -> None:
     """Let another river's clip go on from what is shown."""
     _show_on(reference)
@@ -122,7 +122,7 @@ def change_river(reference: CompiledReference, params: Array, river: float, phas
     _go_over(reference, params)
 
 
-@njit
+@njit(forceinline=False)
 def stop(reference: CompiledReference, params: Array) -> None:
     """Let the clip that plays come to rest: at the phase of rest nearest to where it would."""
     memory, period = reference.memory, reference.period

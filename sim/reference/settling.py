@@ -38,7 +38,7 @@ def _smooth(x: float) -> float:
     return x * x * (3.0 - 2.0 * x)
 
 
-@njit
+@njit(forceinline=False)
 def slowness(p: Array, v: Array, seconds: float) -> float:
     """Goal of the share s, for a stylus at p [m] with velocity v [m/s] in H and clips of so many seconds."""
     square = p[0] * p[0] + p[1] * p[1]
@@ -78,7 +78,7 @@ def clearance(limbs: Array, ends: Array, pose: Array) -> float:
     return least - _SOFTNESS * math.log(total)
 
 
-@njit
+@njit(forceinline=False)
 def let_down(limbs: Array, ends: Array, share: float, pose: Array) -> None:
     """Lower a pose (75,) by a share of the clearance of its feet, over limbs of `packed_steppers`."""
     if share <= 0.0 or limbs.shape[0] == 0:

@@ -84,7 +84,7 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
     )  # fmt: skip
 
 
-@njit
+@njit(forceinline=False)
 def dwells(transition: Transition, river: float, period: float) -> bool:
     """Whether a river that would take over, −1 for none, has had the hand for long enough; called every period."""
     rival = transition.rival
@@ -112,7 +112,7 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
         transition.lasts[0] = max(transition.seconds, up, over)
 
 
-@njit
+@njit(forceinline=False)
 def carry_on(transition: Transition, s: float, pose: Array) -> None:
     """Move a pose of the new motion, s seconds from now, to what is shown: the offset that is left, and the steps."""
     since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends

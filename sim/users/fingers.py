@@ -2,11 +2,11 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from controllers.rotations import angular_velocity, exponential, logarithm, multiply
 from controllers.state import Array
+from controllers.work_array import work_array
 
 
 @njit
@@ -49,7 +49,7 @@ def turning_moment(
     moment : Array
         Set [N m], in H, shape (3,).
     """
-    r, rate = np.empty(3), np.empty(3)
+    r, rate = work_array(3), work_array(3)
     wanted_turn(turns, t, r, rate)
     a, b, c, d = exponential(r[0], r[1], r[2])
     error = logarithm(*multiply(a, b, c, d, q[0], -q[1], -q[2], -q[3]))

@@ -2,10 +2,10 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 from sim.users.chance import normal
 from sim.users.person_state import (
     BEGUN,
@@ -51,7 +51,7 @@ def may_decide(person: PersonState, waits: bool) -> bool:
         return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], WATCHED * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
     if m[LASTS] == 0.0 or elapsed >= m[LASTS]:
         return True
-    believed = np.empty((3, 3))
+    believed = work_array((3, 3))
     submovement(person.plans[1], m[LASTS], elapsed, believed)
     off = 0.0
     for k in range(3):
@@ -93,8 +93,8 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     grows with it (Harris & Wolpert 1998).
     """
     n, m, V = person.numbers, person.memory, person.vectors
-    start, end = np.empty((3, 3)), goal.copy()
-    way, length = np.empty(3), 0.0
+    start, end, way, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
+    end[:] = goal
     for k in range(3):
         way[k] = goal[0, k] - V[BELIEF, k]
         length += way[k] * way[k]
@@ -120,7 +120,7 @@ def drive(person: PersonState) -> None:
     n, m, V = person.numbers, person.memory, person.vectors
     if m[LASTS] == 0.0:
         return
-    state = np.empty((3, 3))
+    state = work_array((3, 3))
     elapsed = m[TICKS] * n[PERIOD] - m[BEGUN]
     submovement(person.plans[1], m[LASTS], elapsed, state)
     for k in range(3):

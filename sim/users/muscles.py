@@ -8,10 +8,10 @@ the force f that she exerts, over her strength, the share F f of what is able ti
 
 import math
 
-import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 from sim.users.person_state import (
     CAPACITY,
     DRIVEN_A,
@@ -46,7 +46,7 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
     engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
     spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
     damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
-    muscle, size, held = np.empty(3), 0.0, 0.0
+    muscle, size, held = work_array(3), 0.0, 0.0
     for k in range(3):
         pull = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
         for j in range(3):

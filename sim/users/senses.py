@@ -6,10 +6,10 @@ Her belief is what she feels, corrected by what she sees when that arrives, and 
 
 import math
 
-import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 from sim.users.chance import normal
 from sim.users.eye import seen_place
 from sim.users.person_state import (
@@ -133,8 +133,10 @@ def _look(person: PersonState, p: Array) -> None:
     if eye.pose.shape[0] == 0:
         V[SHOWN] = p
     elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
-        felt, away = V[HAND_P] + V[DRIFT] + V[ASTRAY], 0.0
-        seen_place(eye, felt, np.empty(eye.inverses.shape[2]), V[SHOWN])
+        felt, away = work_array(3), 0.0
+        for k in range(3):
+            felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k]
+        seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
         for k in range(3):
             away += (V[SHOWN, k] - felt[k]) ** 2
         if away > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # she takes it for another pose

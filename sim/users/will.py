@@ -2,10 +2,10 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from controllers.state import Array
+from controllers.work_array import work_array
 from sim.users.body import REFERENCE_GRIP
 from sim.users.motor_plan import aim, drive, may_decide, submove
 from sim.users.own_intent import call_intent
@@ -48,7 +48,8 @@ BEND = 0.1  # [s] before and after which she looks at a way to see how it bends:
 def want(person: PersonState, switch: Array) -> None:
     """Read what is wanted now, decide on a submovement if it is time to, and follow the one that is under way."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
-    wanted, goal = np.zeros((3, 3)), np.zeros((3, 3))
+    wanted, goal = work_array((3, 3)), work_array((3, 3))
+    wanted[:], goal[:] = 0.0, 0.0
     aims, owns = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
     if owns:
         if person.units[1] != 0:
@@ -92,10 +93,12 @@ def want(person: PersonState, switch: Array) -> None:
 @njit
 def _foresee(rows: Array, period: float, t: float, goal: Array) -> None:
     """Set the motion that will be wanted at a time [s]; no corner of it asks for more than `BEND` allows."""
-    before = np.zeros((3, 3))
+    before, bend = work_array((3, 3)), work_array(3)
+    before[:] = 0.0
     wanted_motion(rows, period, t - BEND, before)
     wanted_motion(rows, period, t + BEND, goal)
-    bend = (goal[1] - before[1]) / (2.0 * BEND)
+    for k in range(3):
+        bend[k] = (goal[1, k] - before[1, k]) / (2.0 * BEND)
     wanted_motion(rows, period, t, goal)
     goal[2] = bend
 

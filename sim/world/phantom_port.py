@@ -117,7 +117,7 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
     )  # fmt: skip
 
 
-@njit
+@njit(forceinline=True)
 def sense(port: PhantomPort, t: float, switch: float) -> None:
     """Fill `port.hand` with what the encoders tell at time t (see `take_reading`)."""
     q, a, g = port.qpos, port.arm_q, port.gimbal_q
@@ -153,7 +153,7 @@ def has_sensed(port: PhantomPort) -> bool:
     return port.memory[12] != 0.0
 
 
-@njit
+@njit(forceinline=True)
 def actuate(port: PhantomPort, force: Array) -> None:
     """Turn a force on the hand into motor torques (see `motor_torques`).
 
@@ -176,7 +176,7 @@ def let_go(port: PhantomPort) -> None:
         port.torque[i] = port.ctrl[port.motor[i]] = 0.0
 
 
-@njit
+@njit(forceinline=True)
 def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> None:
     """Where the stylus really is and how it moves, in H: what the hand feels, unquantised.
 
@@ -203,7 +203,7 @@ def true_motion(port: PhantomPort, p: Array, v: Array, jacobian_H: Array) -> Non
         v[k] = jacobian_H[k, 0] * rate[0] + jacobian_H[k, 1] * rate[1] + jacobian_H[k, 2] * rate[2]
 
 
-@njit
+@njit(forceinline=True)
 def true_turn(port: PhantomPort, orientation: Array, spin: Array, axes: Array) -> None:
     """How the stylus is really turned and turning, in H: what the fingers feel, unquantised.
 

@@ -89,7 +89,7 @@ def hand_torques(hand: Hand) -> int:
     return 6 if len(hand.arm.turns) > 0 else 3
 
 
-@njit
+@njit(forceinline=True)
 def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
     """Step the physics from time t for one servo period.
 

@@ -56,3 +56,10 @@ def test_it_is_zero_where_its_values_are():
     for angle in np.linspace(0.0, 6.28, 60):
         correction(packed_table(values), angle, 0.0, 0.0, d)
         np.testing.assert_allclose(d[:2], 0.0, atol=1e-12)
+
+
+def test_values_alone_are_the_same_numbers():
+    alone = np.empty((4, 6))
+    correction(TABLE, 2.0, 0.3, 0.7, alone, False)
+    np.testing.assert_array_equal(alone[0], at(2.0, 0.3, 0.7)[0])
+    assert not alone[1:].any()

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from controllers.errors import ParameterError
 from controllers.fields.map_feed import feed_maps, feed_rows
 from controllers.fields.program import evaluate
-from controllers.fields.soft_wall import SoftWall
+from controllers.fields.soft_wall import SoftWall, _is_clear, wall_slope  # pyright: ignore[reportPrivateUsage]
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import HandState
 from experiments.setups.robot_arm import robot_arm_map
@@ -192,3 +192,16 @@ def test_numbers_out_of_their_interval_are_refused(changes, said):
             "damping": DAMPING, "speed": SPEED}  # fmt: skip
     with pytest.raises(ParameterError, match=said):
         SoftWall(**good | changes)
+
+
+def test_what_is_clear_of_walls_by_its_quaternion_is_clear_of_them_by_its_rotation_vector():
+    random, clear = np.random.default_rng(8), 0
+    for _ in range(2000):
+        low, high, margin = -random.uniform(0.3, 3.0, 3), random.uniform(0.3, 3.0, 3), random.uniform(0.0, 0.3)
+        turn = Rotation.from_rotvec(random.normal(size=3) * random.uniform(0.0, 1.0))
+        quaternion, limits = turn.as_quat(scalar_first=True), np.stack([low, high], axis=1).ravel()
+        if _is_clear.py_func(limits, 0, margin, quaternion[1:]):
+            clear += 1
+            angles = zip(turn.as_rotvec(), low, high, strict=True)
+            assert not any(wall_slope.py_func(r, a, b, 10.0, margin) for r, a, b in angles)
+    assert 200 < clear < 1800
