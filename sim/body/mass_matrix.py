@@ -34,14 +34,14 @@ class MassMatrix(NamedTuple):
 def inertia(mass: MassMatrix, i: int, k: int) -> float:
     """M_ik."""
     place = mass.where[i, k]
-    return mass.values[place] if place >= 0 else 0.0
+    return float(mass.values[place]) if place >= 0 else 0.0
 
 
 @njit
 def inertial_force(mass: MassMatrix, i: int, acceleration: Array, force: float) -> float:
     """F + (M a)_i, summed from left to right."""
     for n in range(mass.rows[i], mass.rows[i + 1]):
-        force += mass.values[mass.places[n]] * acceleration[mass.columns[n]]
+        force += float(mass.values[mass.places[n]] * acceleration[mass.columns[n]])
     return force
 
 

@@ -49,7 +49,7 @@ def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: 
     _ADVANCE[type(device)](device, plant, t, replay, applied)
 
 
-_INLINED = {"forceinline": True}
+_INLINED: Any = {"forceinline": True}
 
 
 # A call would hand over all the arrays of a device once more, number by number.
