@@ -8,7 +8,8 @@ others' arms are blended into their own by a smaller share λ, down to none: the
 sink or bend beyond their ranges are taken only where the others do not stand, and what none bears is said.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -115,24 +116,25 @@ def sound(made: Cylindrical | Composite, lap: float) -> bool:
     return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
 
 
-def carried(maps: Sequence[Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
+def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
     """The map whose legs carry the others' arms, and what is to be said of it; needs compiled code.
 
     Parameters
     ----------
-    maps : sequence of Cylindrical or Composite
-        With the legs of one clip each.
+    make : callable
+        Makes the map, a Cylindrical or Composite, that has the legs of the clip of a number.
     names : sequence of str
-        Of these clips.
+        Of the clips whose legs it may have.
     lap : float
         [s].
     """
-    fit = [i for i, made in enumerate(maps) if sound(made.with_share(0.0), lap)]
-    best, name, found = maps[0], names[0], Verdict(np.inf, 0.0)
-    for candidates in (fit, [i for i in range(len(maps)) if i not in fit]):
+    owned = cache(make)  # made when they are asked for: most often the first carries well
+    fit = cache(lambda i: sound(owned(i).with_share(0.0), lap))
+    best, name, found = owned(0), names[0], Verdict(np.inf, 0.0)
+    for wanted in (True, False):
         for share in SHARES:
-            for i in candidates:
-                made = maps[i].with_share(share)
+            for i in (i for i in range(len(names)) if fit(i) is wanted):
+                made = owned(i).with_share(share)
                 verdict = verdict_on(made, lap)
                 if verdict.bearable and verdict.residual <= WELL:
                     return made, ()

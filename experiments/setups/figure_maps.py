@@ -85,7 +85,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
 
     def carrying() -> tuple[CylindricalMap, tuple[str, ...]]:
-        return carried([with_legs_of(owner) for owner in range(len(clips))], [clip.name for clip in clips], lap)
+        return carried(with_legs_of, [clip.name for clip in clips], lap)
 
     if _out_of_step(clips, len(motions), lap):
         return replace(_about_circle(place, with_legs_of(grounded(clips)), clips), refined=carrying)
@@ -115,7 +115,7 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
         if carries_alike(made, lap):
             return made, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
-        return carried([only], [clips[0].name], lap)
+        return carried(lambda _: only, [clips[0].name], lap)
 
     return replace(_about_circle(place, made, clips), refined=refined)
 

@@ -41,7 +41,7 @@ def test_legs_are_the_first_that_carry_the_others_well(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, STANDS), (3, 1.0): Verdict(0.01, STANDS)}
     asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, told = carried(maps, NAMES, LAP)
+    best, told = carried(maps.__getitem__, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (1, 1.0, ())
     assert asked == [(0, 1.0), (1, 1.0)]
 
@@ -51,7 +51,7 @@ def test_where_none_carry_them_well_legs_are_those_with_which_least_is_lacking(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, STANDS), (3, 1.0): Verdict(0.08, STANDS)}
     asked = judged(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, told = carried(maps, NAMES, LAP)
+    best, told = carried(maps.__getitem__, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (3, 1.0, ())
     assert asked == [(owner, 1.0) for owner in range(4)]
 
@@ -60,7 +60,7 @@ def test_arms_that_no_legs_bear_are_blended_in_by_less(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged(monkeypatch, {(1, 1.0): Verdict(0.2, STANDS), (2, 0.25): Verdict(0.08, STANDS)}, {0, 1, 2, 3})
-    best, told = carried(maps, NAMES, LAP)
+    best, told = carried(maps.__getitem__, NAMES, LAP)
     assert (best.legs_of, best.share, told) == (2, 0.25, ())
 
 
@@ -69,18 +69,20 @@ def test_legs_that_slide_are_taken_only_where_no_others_stand(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, STANDS), (1, 0.0): Verdict(0.06, STANDS)}
     judged(monkeypatch, verdicts, {1, 2, 3})
-    assert carried(maps, NAMES, LAP)[0].legs_of == 1
+    assert carried(maps.__getitem__, NAMES, LAP)[0].legs_of == 1
     judged(monkeypatch, {(0, 1.0): Verdict(0.01, STANDS)}, {1, 2, 3})
-    assert carried(maps, NAMES, LAP)[0].legs_of == 0
+    assert carried(maps.__getitem__, NAMES, LAP)[0].legs_of == 0
 
 
 def test_what_no_legs_bear_is_said_with_the_least_bad(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     judged(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
-    best, told = carried(maps, NAMES, LAP)
+    best, told = carried(maps.__getitem__, NAMES, LAP)
     assert (best.legs_of, best.share) == (2, 0.5)
     assert told == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
     judged(monkeypatch, {(1, 0.0): Verdict(0.14, STANDS)}, set())
-    assert carried(maps, NAMES, LAP)[1][0].startswith("the physical figure lacks 14 % of weight with the legs of walk")
+    assert carried(maps.__getitem__, NAMES, LAP)[1][0].startswith(
+        "the physical figure lacks 14 % of weight with the legs of walk"
+    )
 
 
 def test_the_hand_that_tries_a_map_sees_all_of_it(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
