@@ -130,6 +130,9 @@ class Clock:
     physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 
+NOBODY_LED = "the mode lead with the figure none: nobody to lead; expected another figure"
+
+
 @part
 class RunConfig:
     """A run: all that decides what happens.

@@ -16,7 +16,7 @@ import tyro
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile
 from experiments.config.modes import MODES, JointWalls, OrientationMoment, SpeedGovernor
-from experiments.config.run_config import PERSONAL, Clock, Figure, Phantom, RunConfig, User, load_config
+from experiments.config.run_config import NOBODY_LED, PERSONAL, Clock, Figure, Phantom, RunConfig, User, load_config
 from sim.users.population import PERSONAS, persona
 
 ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
@@ -119,6 +119,8 @@ def run_config(
             raise ParameterError(
                 f"in the mode lead the map is the led figure's and the hand leads; leave out {', '.join(wrong)}"
             )
+        if figure == "none":
+            raise ParameterError(NOBODY_LED)
         map_cls, user = Led, "lead"
     elif map.endswith(MAP_SUFFIX):
         map_cls = MapFile

@@ -24,7 +24,7 @@ def write_report_of(folder: Path) -> None:
         if (folder / CURVE_FILE).exists():
             figures.insert(0, folder / FIGURES / "stretch.png")
             draw_stretch(recording, folder, figures[0])
-        if recording.texts["hand_does"] == "leads" and "reference" in recording.groups["frames"]:
+        if recording.texts["hand_does"] == "leads":
             figures.insert(0, folder / FIGURES / "lead.png")
             draw_lead(recording, figures[0])
         title, said = recording.texts["title"], lines_of(recording, folder)

@@ -220,8 +220,6 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
-        if config.figure.kind == "none":
-            return summary
         lead = lead_summary(
             of.recording, field, of.memory, config.scene, None if summary.figure is None else summary.figure.fell_at
         )

@@ -10,7 +10,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import NOBODY_LED, RunConfig
 from experiments.files.device_files import linkage_of
 from experiments.setups.defaults import resolved
 from experiments.setups.eyes import POSES, with_eyes
@@ -91,6 +91,8 @@ def wire(
     if config.seconds < 2.0 * config.clock.servo_period * config.figure.figure_ticks:
         least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
+    if device is None and config.mode.kind == "lead" and config.figure.kind == "none":
+        raise ParameterError(NOBODY_LED)  # on a device the walker alone is led
     check_rates(config)
     world = World(config.scene, config.figure.kind)
     if config.device.device_file:

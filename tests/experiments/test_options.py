@@ -3,7 +3,6 @@
 import json
 from dataclasses import fields, is_dataclass, replace
 from math import inf, nan
-from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
@@ -26,6 +25,8 @@ from experiments.config.modes import (
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole
 from experiments.config.run_config import ArmConfig, Clock, Figure, Phantom, RunConfig, User, load_config
 from experiments.config.words import ADDED, VOCABULARY, RunOptions, changed, config_of_options, run_config, words_of
+from experiments.hardware.parts import served, session_of
+from experiments.setups.wiring import wire
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
@@ -322,7 +323,10 @@ def test_a_hand_leads_in_the_mode_lead_only(mode: str, map: str, does: str) -> N
         from_json(RunConfig, text, "f.json")
 
 
-def test_a_hand_leads_a_walker_without_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "--mode", "lead", "--figure", "none", "--seconds", "1", "--out", str(tmp_path / "run")]) == 0
-    assert "from the curve" in capsys.readouterr().out
-    assert (tmp_path / "run/report.html").exists()
+def test_a_figure_that_is_not_there_is_not_led_in_a_run_and_its_walker_is_on_a_device() -> None:
+    with pytest.raises(ParameterError, match=r"^the mode lead with the figure none: nobody to lead"):
+        run_config(mode="lead", figure="none")
+    led = run_config(mode="lead")
+    with pytest.raises(ParameterError, match="nobody to lead"):
+        wire(replace(led, figure=replace(led.figure, kind="none")))
+    assert session_of(served(led)).servo.argument.shape == (7,)
