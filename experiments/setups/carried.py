@@ -129,7 +129,11 @@ def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -
         [s].
     """
     owned = cache(make)  # made when they are asked for: most often the first carries well
-    fit = cache(lambda i: sound(owned(i).with_share(0.0), lap))
+
+    @cache
+    def fit(i: int) -> bool:
+        return sound(owned(i).with_share(0.0), lap)
+
     best, name, found = owned(0), names[0], Verdict(np.inf, 0.0)
     for wanted in (True, False):
         for share in SHARES:
