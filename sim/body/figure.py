@@ -5,7 +5,8 @@ acceleration (q_r, v_r, a_r) the wanted acceleration of all 57 degrees of freedo
 
 .. math:: a^* = a_r + 2\omega\,(v_r - v) + \omega^2\,(q_r \ominus q) ,
 
-amended in the legs so that loaded feet rest (`sim.body.stance`). Nothing but the ground may push the root, so its six
+amended in the legs so that loaded feet rest (`sim.body.stance`) and feet in flight land where the reference's do
+(`sim.body.foot_placement`). Nothing but the ground may push the root, so its six
 rows of M a + c = S^T τ + J^T f + w are a demand on the contact forces,
 
 .. math:: (M a^* + c)_r = J_r^T f + w ,
@@ -50,6 +51,7 @@ __all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
 _RELIED_ON = 0.9  # share of the coefficient of friction that is planned with
 _N_MOTORS = N_TANGENT - 6
+_MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")
 
 
 @entry_point
@@ -77,7 +79,7 @@ class Figure:
     Raises
     ------
     SimError
-        If the world holds no such figure, or a gain is not a positive finite number (a bound may be 0).
+        If the world holds no such figure, or a gain is no positive finite number; some may be 0.
     """
 
     model: mujoco.MjModel
@@ -91,8 +93,9 @@ class Figure:
 
     def __post_init__(self) -> None:
         for name, value in self.gains._asdict().items():
-            if not (np.isfinite(value) and value >= 0.0) or (value == 0.0 and not name.endswith("bound")):
-                raise SimError(f"FigureGains.{name} is {value}; expected a finite number > 0 (a bound may be 0)")
+            if not (np.isfinite(value) and value >= 0.0) or (value == 0.0 and name not in _MAY_BE_ZERO):
+                may = ", may be 0" if name in _MAY_BE_ZERO else " > 0"
+                raise SimError(f"FigureGains.{name} is {value}; expected a finite number{may}")
         object.__setattr__(self, "twin_data", mujoco.MjData(self.twin))
         object.__setattr__(self, "state", self._state())
 

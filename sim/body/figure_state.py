@@ -10,7 +10,7 @@ from sim.body.falls import FallState
 from sim.body.mass_matrix import MassMatrix
 
 IntArray = npt.NDArray[np.int64]
-
+N_FOOT = 4  # contact points of a foot
 
 REPORT_SUPPORT, REPORT_SATURATED, REPORT_RESIDUAL, REPORT_FLIES, REPORT_DOWN, REPORT_SIZE = 0, 1, 2, 8, 9, 10
 """Places in a figure's report: support (0 while the reference flies or nothing touches), number of saturated motors,
@@ -49,6 +49,10 @@ class FigureGains(NamedTuple):
         The reference flies, and no residual is applied, while all its contact points are higher than this [m].
     lift_time : float
         How far ahead the reference is looked at for contact points about to be lifted [s].
+    placement_reach : float
+        Largest distance by which a foot in flight is put beside its place under the root, onto the one in the world
+        (`sim.body.foot_placement`) [m]. With none deepmimic/jump lacks 20 % of weight over 20 s and falls, with 2, 4
+        and 10 cm 4.0, 4.1 and 4.2 %.
     """
 
     joint_rate: float = 40.0
@@ -67,6 +71,7 @@ class FigureGains(NamedTuple):
     swing_speed: float = 1.0
     flight_height: float = 0.02
     lift_time: float = 0.02
+    placement_reach: float = 0.04
 
 
 CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)

@@ -26,7 +26,7 @@ N_LEG = 9
 
 
 @njit
-def _cross_add(a: Array, b: Array, out: Array) -> None:
+def cross_add(a: Array, b: Array, out: Array) -> None:
     """Out += a × b."""
     out[0] += a[1] * b[2] - a[2] * b[1]
     out[1] += a[2] * b[0] - a[0] * b[2]
@@ -86,13 +86,13 @@ def stance_response(
             above = 0 if level == 1 else bodies[level - 2]
             omega[level] = omega[level - 1]
             turning[level] = turning[level - 1]
-            _cross_add(omega[level - 1], relative, turning[level])
+            cross_add(omega[level - 1], relative, turning[level])
             _difference(xpos[body], xpos[above], arm)
             drift[level] = drift[level - 1]
-            _cross_add(turning[level - 1], arm, drift[level])
+            cross_add(turning[level - 1], arm, drift[level])
             spin[:] = 0.0
-            _cross_add(omega[level - 1], arm, spin)
-            _cross_add(omega[level - 1], spin, drift[level])
+            cross_add(omega[level - 1], arm, spin)
+            cross_add(omega[level - 1], spin, drift[level])
         for i in range(3):
             omega[level, i] += relative[i]
     for p in range(share.shape[0]):
@@ -100,12 +100,12 @@ def stance_response(
             continue
         _difference(points[p], xpos[bodies[2]], arm)
         spin[:] = 0.0
-        _cross_add(omega[3], arm, spin)
+        cross_add(omega[3], arm, spin)
         for i in range(3):
             wanted[i] = -drift[3, i]
         relative[:] = 0.0
-        _cross_add(turning[3], arm, relative)
-        _cross_add(omega[3], spin, relative)
+        cross_add(turning[3], arm, relative)
+        cross_add(omega[3], spin, relative)
         for i in range(3):
             wanted[i] -= relative[i]
         for level in range(4):
@@ -115,7 +115,7 @@ def stance_response(
                 for i in range(3):
                     axis[i] = xmat[body, 3 * i + k]
                 spin[:] = 0.0
-                _cross_add(axis, arm, spin)
+                cross_add(axis, arm, spin)
                 if level == 0:
                     J_root[:, 3 + k] = spin
                 else:

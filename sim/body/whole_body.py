@@ -11,6 +11,7 @@ from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
 from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
 from sim.body.feedback import shorten, wanted_acceleration
 from sim.body.figure_state import (
+    N_FOOT,
     REPORT_DOWN,
     REPORT_FLIES,
     REPORT_RESIDUAL,
@@ -19,6 +20,7 @@ from sim.body.figure_state import (
     Array,
     FigureState,
 )
+from sim.body.foot_placement import place_feet
 from sim.body.mass_matrix import inertia, inertial_force
 from sim.body.stance import N_LEG, factor, stance_response, substitute
 from sim.compilation.native import mj_integrate_pos, mj_kinematics
@@ -27,7 +29,6 @@ _LEVER = 0.5  # m of lever arm at which a residual moment weighs as much as a re
 _FULL_SHARE = 3e3  # share of a point on the floor; 1/share is the relative error that spreading the load may cost
 _PLANS = 4  # plans at most in a tick, each with the joints that saturated in the one before giving way
 _SET_BACK_SPEED = 20.0  # [m/s], [rad/s] at most, of what a figure follows that is set back
-_N_FOOT = 4  # contact points of a foot
 
 
 @njit
@@ -50,6 +51,8 @@ def _act(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
+    if support < 1.0:
+        place_feet(s, q_r, v_r, 1.0 - support)
     mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
     s.report[REPORT_DOWN] = mode
     if mode == UP:
@@ -97,7 +100,7 @@ def _set_back(s: FigureState, q_r: Array) -> None:
 def _stand(s: FigureState, support: float) -> None:
     """Torques and residual wrench of a figure that is up (see `sim.body.figure`)."""
     for leg in range(2):
-        foot = slice(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT)
+        foot = slice(N_FOOT * leg, N_FOOT * leg + N_FOOT)
         stance_response(
             s.legs[leg], s.points[foot], s.share[foot], s.near[foot], s.xpos, s.xmat, s.qvel, s.acceleration,
             s.offset, s.response[leg],
@@ -139,7 +142,7 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
     support, lowest = 0.0, np.inf
     for leg in range(2):
         s.loaded[leg] = 0.0
-        for c in range(_N_FOOT * leg, _N_FOOT * leg + _N_FOOT):
+        for c in range(N_FOOT * leg, N_FOOT * leg + N_FOOT):
             height = s.contact_pos[s.contact[c], 2] - s.radius
             s.loaded[leg] = max(s.loaded[leg], _nearness(height, s.gains.contact_reach))
     for c in range(s.share.shape[0]):
@@ -150,8 +153,8 @@ def _find_support(s: FigureState, q_r: Array, v_r: Array) -> float:
         s.points[c] = s.contact_pos[s.contact[c]]
         s.points[c, 2] -= s.radius
         touch = _nearness(s.points[c, 2], s.gains.contact_reach)
-        if c < 2 * _N_FOOT:
-            touch = max(touch, s.loaded[c // _N_FOOT] * _nearness(s.points[c, 2], s.gains.settling_reach))
+        if c < 2 * N_FOOT:
+            touch = max(touch, s.loaded[c // N_FOOT] * _nearness(s.points[c, 2], s.gains.settling_reach))
         rests = _nearness(way, s.gains.lift_time * s.gains.swing_speed)
         s.near[c] = rests * _nearness(height, s.gains.stance_height)
         s.share[c] = touch * rests * _nearness(height, s.gains.reference_reach)
@@ -266,7 +269,7 @@ def _give_way(s: FigureState) -> bool:
         if s.lost[motor] != 0.0:
             s.yielding[motor] = 1
     for leg in range(2):
-        if s.share[_N_FOOT * leg : _N_FOOT * leg + _N_FOOT].max() > 0.0:
+        if s.share[N_FOOT * leg : N_FOOT * leg + N_FOOT].max() > 0.0:
             for k in range(N_LEG):
                 s.yielding[3 * s.legs[leg, k // 3] + k % 3 - 3] = 0
     n = 0
