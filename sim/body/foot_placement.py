@@ -1,14 +1,15 @@
-r"""Where feet go in a flight whose root is not where the reference has it: to their places in the world all the same.
+r"""Where feet go in a flight whose root is not where the reference has it: over their places on the floor all the same.
 
 With the joints of the reference a foot is off by what the root is. It would land there and stay, while the root is
 brought back over it; the legs would push off from the wrong place, and the next flight would miss by more. So in
 flight the joints of each leg are displaced by
 
-.. math:: \min_\delta \tfrac12 \|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p\, \delta - \sigma (p_r - T p_r)\|^2 ,
+.. math:: \min_\delta \tfrac12 \|\delta\|^2 + \tfrac\kappa2 \sum_p \|H (J_p\, \delta - \sigma (p_r - T p_r))\|^2 ,
 
-where p_r are the contact points of the foot in the reference, T takes the reference's root to the figure's, and σ ≤ 1
-shortens what is longer than a reach: legs that turn far turn the root the other way. The wanted acceleration of the leg
-has ω² δ + 2ω δ' more, δ' of the rate at which the root's error grows.
+where p_r are the contact points of the foot in the reference, T takes the reference's root to the figure's, H takes the
+horizontal part (a leg that were to reach up or down would bend or stretch far), and σ ≤ 1 shortens what is longer than
+a reach: legs that turn far turn the root the other way. The wanted acceleration of the leg has ω² δ + 2ω δ' more, δ' of
+the rate at which the root's error grows.
 """
 
 import numpy as np
@@ -62,7 +63,7 @@ def _displacements(s: FigureState, q_r: Array, v_r: Array, leg: int, away: Array
             arm[i] = R[3 * i] * own[0] + R[3 * i + 1] * own[1] + R[3 * i + 2] * own[2]
             away[p, i] = there[i] - s.qpos[i] - arm[i]
             drift[p, i] = v_r[i] - s.qvel[i]
-            size += away[p, i] ** 2
+            size += away[p, i] ** 2 if i < 2 else 0.0
         cross_add(turn, arm, drift[p])
         share = min(1.0, s.gains.placement_reach / max(np.sqrt(size), 1e-12))
         for i in range(3):
@@ -89,7 +90,7 @@ def _leg_for(
                 arm[i] = points[p, i] - xpos[body, i]
             cross_add(axis, arm, J[:, k])
         for k in range(N_LEG):
-            for i in range(3):
+            for i in range(2):  # horizontally
                 offset[k] += _CLOSENESS * J[i, k] * away[p, i]
                 rate[k] += _CLOSENESS * J[i, k] * drift[p, i]
                 for m in range(k + 1):
