@@ -26,9 +26,6 @@ from experiments.welcome import WELCOME, next_step
 from models.errors import ModelError
 from sim.errors import SimError
 
-COMMANDS: dict[str, Any] = {name: import_module(f"experiments.commands.{name}").Command for name in commands.NAMES}
-"""Classes by the names of the commands: ``hvf run`` is `experiments.commands.run`."""
-_PARSED = reduce(or_, (Annotated[command, tyro.conf.subcommand(name)] for name, command in COMMANDS.items()))
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
 
 
@@ -70,11 +67,21 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _kept(command: Any) -> str:
     """What is left of a command that was stopped, and how to go on."""
-    if isinstance(command, COMMANDS["run"] | COMMANDS["demo"]) and (command.out / RECORDING).exists():
+    if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
-    if isinstance(command, COMMANDS["trials"] | COMMANDS["tune"]) and command.out.exists():
+    if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"trials that had ended are kept in {command.out}; the same command goes on from there"
     return "nothing is left half done"
+
+
+def command_class(name: str) -> Any:
+    """Class of a command by its name: ``hvf run`` is `experiments.commands.run`."""
+    return import_module(f"experiments.commands.{name}").Command
+
+
+def choice_of(names: Sequence[str]) -> Any:
+    """What tyro reads one of these commands as."""
+    return reduce(or_, (Annotated[command_class(name), tyro.conf.subcommand(name)] for name in names))
 
 
 def parsed(words: Sequence[str]) -> Any:
@@ -87,9 +94,14 @@ def parsed(words: Sequence[str]) -> Any:
     """
     _refuse_empty(words)
     said = io.StringIO()
+    named = words[0] if words and words[0] in commands.NAMES else None
+    # The other commands' options are not even imported.
+    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if named is None else (
+        f"hvf {named}", words[1:], command_class(named)
+    )  # fmt: skip
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(_PARSED, prog="hvf", args=words, description=__doc__, config=_STYLE)  # pyright: ignore[reportArgumentType, reportCallIssue]
+            return tyro.cli(choice, prog=prog, args=rest, description=None if named else __doc__, config=_STYLE)
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
@@ -123,7 +135,7 @@ def _one_line(said: str, words: Sequence[str]) -> str:
             choices = sorted(set(re.findall(r"'([^']*)'", first.split("Expected")[-1])) - {"None"})
             first = f"{option} is {value!r}; expected {expected or ', '.join(choices)}"
             break
-    named = words[0] if words and words[0] in COMMANDS else "COMMAND"
+    named = words[0] if words and words[0] in commands.NAMES else "COMMAND"
     return f"{first[0].lower()}{first[1:]}; hvf {named} --help lists what there is"
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
-from experiments.cli import COMMANDS, parsed
+from experiments.cli import parsed
+from experiments.commands import NAMES
 from experiments.config.words import config_of_options
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -84,7 +85,7 @@ def test_every_command_of_a_page_is_one_that_there_is(page: Path) -> None:
 def _parses(arguments: list[str], line: str) -> None:
     if {"--help", "--version", "COMMAND"} & set(arguments) or arguments[0].startswith("--"):
         return
-    if len(arguments) == 1 and arguments[0] in COMMANDS:
+    if len(arguments) == 1 and arguments[0] in NAMES:
         return  # the command's name, without what it needs
     command = parsed(arguments)
     assert callable(command), line
@@ -95,7 +96,7 @@ def _parses(arguments: list[str], line: str) -> None:
 
 def test_the_reference_lists_every_command() -> None:
     listed = re.findall(r"^\| `hvf (\w+)`", (DOCS / "reference" / "command-line.md").read_text(encoding="utf-8"), re.M)
-    assert sorted(listed) == sorted(COMMANDS)
+    assert sorted(listed) == sorted(NAMES)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import COMMANDS
+from experiments import commands as hvf_commands
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
 FALLS = ["--clips walk run jump angry", "--clips backflip --governor"]  # pages say so beside them
@@ -26,7 +26,7 @@ GIVEN = {
     "hidden.json": "examples/hidden.json",
 }
 TYPED = [page for page in PAGES if page == ROOT / "README.md" or page.parent.name in ("tutorials", "how-to")]
-NAMES = [[command] for command in COMMANDS if command != "clips"] + [["COMMAND", "--help"]]
+NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [["COMMAND", "--help"]]
 SHOWN = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
 RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")

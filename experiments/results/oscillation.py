@@ -1,4 +1,15 @@
-"""Whether a run's loop was stable: where it shook, how fast that grew, and what moved at high frequency."""
+r"""Whether a run's loop was stable: where it shook, how fast that grew, and what moved at high frequency.
+
+The detector of real devices finds a force that shakes. So does a stable loop whose damping makes rounded encoders felt:
+there the stylus does not move, its reading does. Which it was is told by the size of that fast motion x beside what
+rounding alone makes of a stylus at rest,
+
+.. math:: r^2 = \max(\overline{x_\perp^2} / 2,\ \overline{x^2} / 3) / \sigma^2, \quad
+   \sigma^2 = \mathrm{tr}(J\,\mathrm{diag}(\delta^2)\,J^\top) / 36
+
+x⊥ is the part across the curve, δ the encoders' steps, δ²/12 the variance of what is rounded to them. The reading has
+r = 1 of rounding alone and more than √2 where the stylus itself moves more than that.
+"""
 
 import math
 from dataclasses import dataclass
@@ -8,12 +19,18 @@ import numpy.typing as npt
 
 from controllers.safety.oscillation import OscillationDetector, shaken
 from controllers.state import Array
+from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
 _ROWS = 16_000  # of the recording, read at a time
 # At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; beyond the critical one it goes on.
 _SHAKEN = 0.25  # [s] of shaking without a break that is told
 _WINDOW = 0.02  # [s] of the envelope from which the growth is taken
+_CORNER = 40.0  # [Hz] above what a hand does, tremor (8 to 12 Hz) at a tenth
+_LASTING = 50  # windows of shaking in whose median a push, or a change of river, is not seen
+# The 1.5 in its middle, where J is diagonal; no place that a curve is at has 1.25 times as much.
+_ROUNDING = math.hypot(*np.multiply(PREMIUM_1_5.encoder_step, (PREMIUM_1_5.l1, PREMIUM_1_5.l1, PREMIUM_1_5.l2))) / 6.0
+_OWN = math.sqrt(2.0)  # r of a stylus that moves as much as its reading is rounded
 
 
 @dataclass(frozen=True)
@@ -31,7 +48,11 @@ class OscillationSummary:
     force_rms, force_max : float
         Force at the hand above the detector's corner, 15 Hz [N].
     motion_rms_mm : float
-        Motion across the curve above 15 Hz.
+        Motion across the curve above 40 Hz.
+    motion_over_rounding : float or None
+        r, in the second of shaking in which it is largest; None if it did not shake.
+    oscillates : bool
+        Whether the stylus shook, and not its rounded reading only.
     growth : float or None
         Fastest growth of that motion, over 60 ms up to the first second of shaking [1/s]; None if it did not shake.
     """
@@ -42,18 +63,25 @@ class OscillationSummary:
     force_rms: float
     force_max: float
     motion_rms_mm: float
+    motion_over_rounding: float | None
+    oscillates: bool
     growth: float | None
 
     def lines(self) -> list[str]:
         """What is to be said, if anything."""
         if self.since is None:
             return []
-        grew = "" if self.growth is None else f", growing at up to {self.growth:.0f}/s"
         at = "" if self.frequency is None else f" at {self.frequency:.0f} Hz"
+        told = f"from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, by up to {self.force_max:.1f} N"
+        if not self.oscillates:
+            return [
+                f"Rounded encoders are felt {told}: the stylus does not shake; damping makes a force of the steps "
+                "in its reading, less of it is quieter."
+            ]
+        grew = "" if self.growth is None else f", growing at up to {self.growth:.0f}/s"
         return [
-            f"It oscillates: the loop shakes from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, "
-            f"with up to {self.force_max:.1f} N and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
-            "hvf certify says which gains are stable; with those it is rounded encoders, which much damping makes felt."
+            f"It oscillates: the loop shakes {told} and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
+            "hvf certify says which gains are stable."
         ]
 
 
@@ -67,7 +95,8 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
         rows = slice(first, first + _ROWS)
         force = np.nan_to_num(ticks["force"][rows])
         found = shaken(detector, force, memory)
-        measure.add(force, np.nan_to_num(ticks["p"][rows] - ticks["nearest"][rows]), found)
+        p, nearest = ticks["p"][rows], ticks["nearest"][rows]
+        measure.add(force, np.nan_to_num(p), np.nan_to_num(p - nearest), found)
         count += int(found.sum())
         # How long it has shaken at each tick, what came before this block included.
         at = np.arange(len(found))
@@ -78,9 +107,11 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
             first_told = int(np.argmax(going * period >= _SHAKEN))
             since = float(ticks["t"][rows][first_told]) - (int(going[first_told]) - 1) * period
     told = not math.isnan(since)
+    own = measure.over_rounding() if told else None
+    oscillates = own is not None and own > _OWN
     return OscillationSummary(
         since if told else None, count / max(n, 1), measure.frequency() if told else None, measure.force.root,
-        measure.force.largest, 1e3 * measure.motion.root, measure.growth(since) if told else None,
+        measure.force.largest, 1e3 * measure.motion.root, own, oscillates, measure.growth(since) if told else None,
     )  # fmt: skip
 
 
@@ -101,47 +132,56 @@ class _Size:
 
 
 class _Fast:
-    """Force and motion above the detector's corner, in blocks."""
+    """Force above the detector's corner, and motion above the hand's, in blocks."""
 
     def __init__(self, period: float) -> None:
         from scipy.signal import butter  # a run begins without it
 
         self._period = period
-        corner = OscillationDetector(period).corner
-        self._sections: Array = np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos"))
-        self._states = [np.zeros((len(self._sections), 2, 3)) for _ in range(2)]
+        corners = (OscillationDetector(period).corner, _CORNER, _CORNER)
+        self._sections: list[Array] = [
+            np.asarray(butter(2, corner, "highpass", fs=1.0 / period, output="sos")) for corner in corners
+        ]
+        self._states: list[Array] = []
         self.force, self.motion = _Size(), _Size()
         self._turns, self._shaken, self._last = 0, 0, np.zeros(3)
-        self._envelope: list[float] = []
+        self._moved: list[Array] = []
 
-    def add(self, force: Array, away: Array, found: npt.NDArray[np.bool_]) -> None:
+    def add(self, force: Array, place: Array, away: Array, found: npt.NDArray[np.bool_]) -> None:
         from scipy.signal import sosfilt
 
-        if not self._envelope:
+        given = (force, place, away)
+        if not self._states:
             # A run begins with a force and a place, not with a step to them.
-            for state, values in zip(self._states, (force, away), strict=True):
-                state[:] = _settled(self._sections, values[0])
-        fast = [np.zeros((0, 3))] * 2
-        for i, values in enumerate((force, away)):
-            fast[i], self._states[i] = sosfilt(self._sections, values, axis=0, zi=self._states[i])
+            self._states = [_settled(*pair) for pair in zip(self._sections, (v[0] for v in given), strict=True)]
+        fast = list(given)
+        for i, values in enumerate(given):
+            fast[i], self._states[i] = sosfilt(self._sections[i], values, axis=0, zi=self._states[i])
         self.force.add(fast[0])
-        self.motion.add(fast[1])
+        self.motion.add(fast[2])
         # Zeros of the component that moves most.
         axis = int(np.argmax(np.sum(fast[0] ** 2, axis=0)))
         changes = np.diff(np.signbit(fast[0][:, axis]), prepend=np.signbit(self._last[axis]))
         self._turns, self._shaken = self._turns + int(np.sum(changes & found)), self._shaken + int(found.sum())
         self._last = fast[0][-1]
         width = max(1, round(_WINDOW / self._period))
-        whole = len(fast[1]) // width * width
-        blocks = np.sum(fast[1][:whole] ** 2, axis=1).reshape(-1, width)
-        self._envelope += np.sqrt(blocks.mean(axis=1)).tolist()
+        whole = len(found) // width * width
+        total, across = (np.sum(moved[:whole] ** 2, axis=1) for moved in fast[1:])
+        self._moved.append(np.stack((total, across, found[:whole]), axis=1).reshape(-1, width, 3).mean(axis=1))
+
+    def over_rounding(self) -> float:
+        """Largest r: the largest median over `_LASTING` windows of shaking that follow on each other."""
+        total, across, found = np.concatenate(self._moved).T
+        ratio = np.sqrt(np.maximum(across / 2.0, total / 3.0))[found > 0.5] / _ROUNDING
+        lasting = np.lib.stride_tricks.sliding_window_view(ratio, min(_LASTING, len(ratio)))
+        return float(np.median(lasting, axis=1).max())
 
     def frequency(self) -> float | None:
         return self._turns / (2.0 * self._shaken * self._period) if self._shaken else None
 
     def growth(self, since: float) -> float | None:
         """Largest slope of the logarithm of the envelope over three windows, up to a second after `since` [s]."""
-        envelope = np.array(self._envelope[: int((since + 1.0) / _WINDOW) + 1])
+        envelope = np.sqrt(np.concatenate(self._moved)[: int((since + 1.0) / _WINDOW) + 1, 1])
         if len(envelope) < 4:
             return None
         slopes = np.log(np.maximum(envelope[3:], 1e-9) / np.maximum(envelope[:-3], 1e-9)) / (3.0 * _WINDOW)

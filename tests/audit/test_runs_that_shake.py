@@ -48,12 +48,36 @@ def test_tremor_pushes_and_noise_are_no_oscillation(force):
     assert found.lines() == []
 
 
+def test_a_force_made_of_rounded_readings_is_felt_and_no_oscillation():
+    """A stylus at rest whose reading flickers by one step: a damper makes a force of it, nothing moves."""
+    step = 1.2e-4 * 0.2  # [m] of an encoder's count at the tip
+    reading = step * (np.random.default_rng(5).uniform(size=(len(T), 3)) - 0.5)
+    force = 0.6 * np.random.default_rng(6).choice([-1.0, 1.0], size=len(T))
+    told = {}
+    for name, amplitude in (("rounded", 0.0), ("moving", 2.0 * step)):
+        moved = amplitude * np.outer(np.sin(2.0 * np.pi * 120.0 * T), AXIS)
+        told[name] = oscillation_summary(recording(np.outer(force, AXIS), reading + moved))
+    assert told["rounded"].since == told["moving"].since < 0.2
+    assert [told[name].oscillates for name in told] == [False, True]
+    assert told["rounded"].motion_over_rounding == pytest.approx(1.0, abs=0.15)
+    assert "Rounded encoders are felt" in told["rounded"].lines()[0]
+    assert "oscillates" not in told["rounded"].lines()[0]
+
+
 @pytest.mark.slow
-def test_a_run_beyond_its_critical_gain_says_that_it_oscillates(tmp_path):
-    told = []
-    for k in ("12000", "300"):
-        run = ["run", "--stiffness", k, "--figure", "none", "--seconds", "2", "--out", str(tmp_path / k)]
-        assert main(run) == 0
-        told.append(json.loads((tmp_path / k / "summary.json").read_text()))
-    assert "It oscillates" in told[0]["lines"][0]
-    assert told[1]["oscillation"]["since"] is None
+@pytest.mark.parametrize(
+    ("gains", "said"),  # 8217 N/m and 61 N s/m are critical
+    [
+        (("--stiffness", "12000"), "It oscillates"),
+        (("--stiffness", "12000", "--user", "push"), "It oscillates"),
+        (("--stiffness", "6000", "--user", "push"), None),
+        (("--damping", "120"), "It oscillates"),
+        (("--damping", "30", "--user", "push"), "Rounded encoders are felt"),
+        (("--mode", "rivers", "--map", "rivers", "--user", "push"), None),
+    ],
+)
+def test_a_run_beyond_its_critical_gain_says_that_it_oscillates_pushed_or_not(gains, said, tmp_path):
+    assert main(["run", *gains, "--figure", "none", "--seconds", "6", "--out", str(tmp_path / "run")]) == 0
+    lines = " ".join(json.loads((tmp_path / "run" / "summary.json").read_text())["lines"])
+    told = [words for words in ("It oscillates", "Rounded encoders are felt") if words in lines]
+    assert told == ([] if said is None else [said])

@@ -50,6 +50,12 @@ def test_what_a_run_does_not_need_is_not_imported_before_it() -> None:
     assert not _process(_IMPORTS).stdout.split()
 
 
+def test_a_command_that_is_named_is_the_only_one_imported() -> None:
+    code = "import sys; from experiments.cli import parsed; parsed(['track', 'walk']); print(*sys.modules)"
+    found = {name for name in _process(code).stdout.split() if name.startswith("experiments.commands.")}
+    assert found == {"experiments.commands.track"}
+
+
 def test_what_a_process_compiles_is_told() -> None:
     assert "compiles smooth_step" in _compiled(_process(_TELLS + _COMPILES))
 
