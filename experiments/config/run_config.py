@@ -9,7 +9,7 @@ from experiments.config.modes import MOST_DAMPED, STIFFEST, Follow, Mode
 from experiments.config.part import above, at_least, from_json, part, whole
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.scene import SceneConfig
-from sim.body.figure_state import RUN_GAINS
+from sim.body.figure_state import FigureGains
 from sim.errors import SimError
 from sim.users.intent import Grab, Push, Turn
 from sim.users.person import Person
@@ -93,8 +93,8 @@ class Figure:
     smoothing: float = above(0.0, default=6.0, unit="Hz")
     figure_ticks: int = whole(1, default=2)
     blend: float = at_least(0.0, default=0.4, unit="s")
-    residual_force: float = at_least(0.0, default=RUN_GAINS.force_bound)
-    residual_moment: float = at_least(0.0, default=RUN_GAINS.moment_bound)
+    residual_force: float = at_least(0.0, default=FigureGains().force_bound)
+    residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
 
 
 @part

@@ -77,9 +77,6 @@ class FigureGains(NamedTuple):
 CLIP_GAINS = FigureGains(force_bound=0.1, moment_bound=0.02)
 """Of a clip at its own pace: the least help on which the embedded ones stand (docs/validation/residual-bounds.md)."""
 
-RUN_GAINS = FigureGains(force_bound=0.5, moment_bound=0.1)
-"""Of a run, whose animation is blended, pushed and at other paces: README's stand on it (the same page)."""
-
 
 class FigureState(NamedTuple):
     """Views of the world's MjData, restricted to the figure, and scratch memory.
