@@ -31,7 +31,7 @@ from controllers.work_array import work_array
 
 RIVER_CLIPS = 5
 # The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
-RIVER, PHASE, STILL, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3
+RIVER, PHASE, STILL = MEMORY, MEMORY + 1, MEMORY + 2
 # Parameters: a header, offsets of the packed curves and of the phases of rest, both, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip

@@ -297,9 +297,10 @@ def _course(engine: Engine) -> Array:
 def _built(session: Session, engine: Engine) -> Built:
     static = session.static()
     kept = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
-    curve = session.curve
     assert configuration_size(session.servo) <= SHOWN["qpos"]
     return Built(
-        engine.config, {name: static[name] for name in kept if name in static}, (curve.start, curve.end),
-        engine.tubes is not None, session.remarks,
-    )  # fmt: skip
+        engine.config,
+        {name: static[name] for name in kept if name in static},
+        engine.tubes is not None,
+        session.remarks,
+    )
