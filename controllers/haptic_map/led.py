@@ -22,7 +22,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
 from controllers.legs.grounded import Mask, grounded, hastened, runs
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses
-from controllers.legs.limbs import END, LIMB, Limb, place_limb
+from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
@@ -177,7 +177,7 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
-        last, at = int(limb[2]), 3 + 4 * rotations + END * i
+        last, at = int(limb[LAST]), 3 + 4 * rotations + END * i
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
         there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
