@@ -1,4 +1,4 @@
-r"""The led figure: a clip that walks straight on walks on a path instead, and its feet stand where they were put.
+r"""The led figure: a clip of straight walking follows a curved path, and its feet do not skate.
 
 .. math:: X_{root}(s) = A(s)\,\rho(s/\ell), \qquad X_{foot}(s) = A(s + \ell\,\lambda(s/\ell))\,\rho_{foot}(s/\ell)
 
@@ -8,7 +8,7 @@ a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓ
 walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s), and
 the root is lower by twice as much as that raises the outer hip.
 
-A clip that flies has a second form without flights (`grounded`), for paces at which nobody flies that long. Channels
+A clip that flies has a second form without flights (`grounded`), for paces too slow to fly that long. Channels
 are (1 − u) ρ + u ρ_grounded; u, how far the figure stays on the ground, is the walker's second number.
 """
 
@@ -287,7 +287,7 @@ class Led(HapticMap):
                 low = grounded(rows, signs, self.stride, limbs, stands, sway)
                 forms, self.grounds = ([rows], False) if low is None else ([rows, low], True)
             else:
-                # Nobody leaps who steps.
+                # A flight of the capture becomes a step, which is shorter.
                 steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
                 held = (channels, drift[0], limbs, stands, capture.radius, self.duration)
                 forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]

@@ -1,4 +1,4 @@
-r"""Steps in a transition: feet do not slide to where the new motion has them, one after the other they step there.
+r"""Foot placement in a transition: feet step to where the new motion has them, one after the other, and do not slide.
 
 With E_n(s) where the end of a limb is in the new motion, and E_o(s) where it was, coming to rest within half of the
 blend time, the end goes

@@ -1,4 +1,4 @@
-r"""Limbs whose ends stay where they are put: feet of a blend stand where the feet of its clips stand on average.
+r"""Inverse kinematics of a limb in closed form: feet of a blend stand where those of its clips do on average.
 
 A mean of joint angles leaves the feet anywhere. So the pose of the end of a limb (a foot) is blended too, as root
 and joints are, and the limb's three joints are corrected in closed form so that its end is exactly there:

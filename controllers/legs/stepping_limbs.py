@@ -1,4 +1,4 @@
-r"""A limb that steps: its joints go where its foot is, and where they would leap the foot gives way.
+r"""Inverse kinematics of a limb that steps: near its singularities the foot gives way, so that no joint leaps.
 
 A limb leaps where it snaps straight, where it folds up under its first joint, and where its last joint flips. With d
 the distance of the last joint from the first, of a limb of length ℓ, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot
@@ -74,7 +74,7 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     longest = _EASE * _leg(limb, pose, end, line)
     way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
-    # Whom the figure has left behind it does not stoop for.
+    # For a foot that is left far behind the figure does not stoop.
     short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
     return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES)
 

@@ -1,4 +1,4 @@
-"""Clips by name or from anybody's files: `load_clip` for any format, `embedded` for those of the package."""
+"""Clips by name or from files: `load_clip` for any format, `embedded` for those of the package."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

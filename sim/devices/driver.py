@@ -5,7 +5,7 @@ servo is
 
     driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(command)
 
-Whatever cannot be a reading raises `DriverFault`; who drives latches it, lets go, and says why.
+Whatever cannot be a reading raises `DriverFault`; the servo latches it, lets go, and reports why.
 """
 
 import math

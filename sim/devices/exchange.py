@@ -1,6 +1,6 @@
 """A device behind two arrays: a driver writes readings into one and takes commands from the other.
 
-This is the seam for hardware: the loop knows the arrays, not who is behind them. The driver, in Python or C, writes
+This is the seam for hardware: the loop knows the arrays, not what is behind them. The driver, in Python or C, writes
 `reading` before each tick, raises its sequence number last, and applies the torques of `command` for as long as
 `valid_torque` allows. Angles and torques are the Phantom's joints': kinematics, velocity filter, weight and peak torque
 are the simulated device's own.

@@ -105,7 +105,7 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
         up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
-        # No longer: what flies would fly on, and who runs would leave both feet behind.
+        # Not longer: a figure in flight would fly on, and one that runs would leave both feet behind.
         then, next_ = transition.shown[1], transition.shown[2]
         pace = 0.5 * np.hypot(next_[0] - then[0], next_[1] - then[1]) / period
         over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds, _STRIDES / max(pace, 1e-9))

@@ -177,7 +177,7 @@ def _own_trunk(has_arms: bool) -> Array:
 def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
     """R of the head: level on the average of the frames in which the body is upright, looking where the chest does.
 
-    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). Somebody who never is upright looks ahead.
+    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). A body that is never upright looks ahead.
     """
     upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
     if upright.sum() < 1e-6:
