@@ -1,13 +1,17 @@
-"""Kernels that tests call from Python are kept on disk between processes, as a run's units are.
+"""What all tests share: one thread of BLAS a process, and kernels on disk.
 
-A run compiles its kernels as parts of a few units; a test that calls one by itself would compile it anew in each
-process.
+Tests run side by side, a process a core; further threads of BLAS only spin, and lifting four clips took five times the
+processor time. A run compiles its kernels as parts of a few units; a test that calls one by itself would compile it
+anew in each process: such kernels are kept on disk between processes, as units are.
 """
 
 import warnings
 from pathlib import Path
 from typing import Any
 
+from experiments import started  # noqa: F401 - before NumPy is imported
+
+# isort: split
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 

@@ -26,7 +26,7 @@ _SWING = 0.3  # [rad] by which a joint swings on at most
 
 
 class Transition(NamedTuple):
-    """State of the inertialisation (see `inertialization` and `footsteps` in `controllers.haptic_map`).
+    """State of the inertialisation (see `controllers.motion.inertialization`, `controllers.legs.footsteps`).
 
     Attributes
     ----------
