@@ -26,6 +26,11 @@ HAND_ANGULAR_VELOCITY = 11
 HAND_SWITCH = 14
 HAND_SIZE = 15
 
+# The same for slicing the vector outside compiled code; a haptic map's argument is the stylus pose.
+POSITION = slice(HAND_POSITION, HAND_QUATERNION)
+STYLUS_POSE = slice(HAND_POSITION, HAND_VELOCITY)
+VELOCITY = slice(HAND_VELOCITY, HAND_ANGULAR_VELOCITY)
+
 
 class HandState(NamedTuple):
     """What the device measures of the hand at one tick.

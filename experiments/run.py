@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from controllers.curves.trajectory import Trajectory
+from controllers.state import HAND_TIME, POSITION
 from experiments.compiling import compile_once
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
@@ -149,8 +150,8 @@ def _simulate(
         hand = ticks.hand[n - 1]
         page.show(
             Shown(
-                hand[0], shown_configuration(servo), servo.reference.pose if simulated else hand[:0], hand[1:4],
-                ticks.force[n - 1], ticks.user[n - 1], np.full(3, np.nan),
+                hand[HAND_TIME], shown_configuration(servo), servo.reference.pose if simulated else hand[:0],
+                hand[POSITION], ticks.force[n - 1], ticks.user[n - 1], np.full(3, np.nan),
             )
         )  # fmt: skip
 

@@ -1,1 +1,1 @@
-"""Things: the Phantom, the figure, motion capture, and the world they share. No control, no loop."""
+"""Models: the Phantom, the figure, motion capture, and the world they share. No control, no loop."""

@@ -1,4 +1,4 @@
-"""The one world: the Phantom on its table and the figure on the floor, compiled into one model and stepped together."""
+"""The MuJoCo world: the Phantom on its table and the figure on the floor, one model, stepped together."""
 
 from dataclasses import dataclass
 

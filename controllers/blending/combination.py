@@ -15,7 +15,7 @@ from numba import njit
 from controllers.borrowed import borrowed
 from controllers.legs.floor import keep_above
 from controllers.legs.footing import go_on, keep_footing, mixed
-from controllers.legs.limbs import END, LIMB, Limb, place_limb
+from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.support import lowering
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
@@ -182,7 +182,7 @@ def _combine(
         lowering(value[:, clearance], slope[:, clearance], weights[0], changes[0], lower)
     for n in range(limbs):
         limb = packed[LIMB * n : LIMB * (n + 1)]
-        last, column = int(limb[2]), 3 + 4 * rotations + END * n
+        last, column = int(limb[LAST]), 3 + 4 * rotations + END * n
         _mean_position(value, slope, column, weights[0], changes[0], end)
         for k in range(4):
             end[k, 2] -= lower[k]

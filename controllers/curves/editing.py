@@ -1,11 +1,10 @@
-"""A curve that is bent from Python: the record of `controllers.curves.deformation` made, used, and read back."""
+"""The record of `controllers.curves.deformation`, made of a curve, and read back as one.
 
-from typing import cast
+The kernels there take hold, carry, commit, undo and redo.
+"""
 
 import numpy as np
-import numpy.typing as npt
 
-from controllers.curves import deformation
 from controllers.curves.deformation import DEPTH, EDIT, HALF, RECORD_HEADER, STEP, TABLE, work_curve
 from controllers.curves.trajectory import BREAKS, CHANNELS, COEFFICIENTS, PIECE, PIECES, Trajectory
 from controllers.errors import CurveError
@@ -109,81 +108,3 @@ def curve_of(record: Array, at: int, like: Trajectory) -> Trajectory:
     pieces, breaks, rows = (int(blob[i]) for i in (PIECES, BREAKS, COEFFICIENTS))
     coefficients = blob[rows : rows + PIECE * pieces].reshape(pieces, 4, CHANNELS)
     return _of_pieces(blob[breaks : breaks + pieces + 1].copy(), coefficients.copy(), like)
-
-
-class EditableCurve:
-    """Curve to be bent: take hold, carry, let go; undo and redo.
-
-    Parameters
-    ----------
-    curve : Trajectory
-        φ, before all edits.
-    width : float
-        h, half the width of a bump [s]; see `record_of`.
-    depth : int
-        How many edits can be undone; older ones stay.
-
-    Raises
-    ------
-    CurveError
-        If the width or the depth is out of its interval.
-    """
-
-    def __init__(self, curve: Trajectory, width: float, depth: int = 64):
-        self._like = curve
-        self.record = record_of(curve, width, depth)
-        self._held = False
-        deformation.let_go(self.record, 0)
-
-    @property
-    def curve(self) -> Trajectory:
-        """φ′ as it is now, a pending edit included."""
-        return curve_of(self.record, 0, self._like)
-
-    def take_hold(self, phase: float) -> None:
-        """Begin an edit at a phase [s].
-
-        Raises
-        ------
-        CurveError
-            If an open end is too near, which stays put.
-        """
-        self.let_go()
-        if not deformation.take_hold(self.record, 0, phase):
-            least = 0.5 * float(self.record[STEP] * self.record[HALF])
-            raise CurveError(f"phase {phase:g} s is too near an open end, which stays put; keep {least:.3g} s off")
-        self._held = True
-
-    def carry_to(self, p: npt.ArrayLike) -> None:
-        """Bend the curve such that the held point is at p_H [m], shape (3,).
-
-        Raises
-        ------
-        CurveError
-            If nothing is held or p is not three finite numbers.
-        """
-        point = np.asarray(p, dtype=float)
-        if not self._held or point.shape != (3,) or not np.isfinite(point).all():
-            raise CurveError(f"a held point is carried to three finite numbers [m], got {p!r}, held: {self._held}")
-        deformation.carry_to(self.record, 0, *cast("list[float]", point.tolist()))
-
-    def commit(self) -> None:
-        """Make the pending edit one of the curve, and let go."""
-        if self._held:
-            deformation.commit(self.record, 0)
-        self._held = False
-
-    def let_go(self) -> None:
-        """Forget the pending edit."""
-        deformation.let_go(self.record, 0)
-        self._held = False
-
-    def undo(self) -> bool:
-        """Take the last edit back; False if there is none."""
-        self.let_go()
-        return bool(deformation.undo(self.record, 0))
-
-    def redo(self) -> bool:
-        """Make the edit again that was undone last; False if there is none."""
-        self.let_go()
-        return bool(deformation.redo(self.record, 0))

@@ -1,4 +1,4 @@
-"""A bundle of rivers: named, summed as a flow and as a force, and as plain arrays that can be kept."""
+"""A bundle of rivers: named, summed as a flow and as a force, saved as plain arrays."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

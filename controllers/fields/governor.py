@@ -1,4 +1,4 @@
-"""The governor: a hand that plays a motion slower or faster than it can be done meets a force."""
+"""The governor: a force against playing a motion slower or faster than is physically feasible."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -118,7 +118,7 @@ class Leading(Law):
     u_n the part of the stylus's distance from the path that lies beyond what bending it can reach: nothing on the path
     that is laid, so backwards the hand is guided along it.
 
-    Nobody flies slowly: a gait with flights begins on the ground, and at each stance decides by its pace whether it
+    A gait with flight phases needs speed: it begins on the ground, and at each stance decides by its pace whether it
     flies the next one (`controllers.walking.gait`).
 
     The figure follows with bounded acceleration and speed. In front the path is laid towards the stylus, bent by at

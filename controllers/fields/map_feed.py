@@ -1,4 +1,4 @@
-"""What laws are told of a haptic map: its pose and derivative at the stylus, written before they are evaluated.
+"""What laws read of a haptic map: its pose and derivative at the stylus, written before they are evaluated.
 
 Only where a map is at hand can this be done, so the laws of force do not depend on the maps: the servo calls
 `feed_maps` before `evaluate`.

@@ -1,4 +1,4 @@
-"""A field on the other half of SE(3): a spring and damper that turn the stylus as the curve is turned."""
+"""Orientation field: a rotational spring and damper that align the stylus with the curve's orientation."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,4 +1,4 @@
-r"""Soft walls: what the target of a haptic map must not do is felt by the hand, pulled back through the map.
+r"""Soft walls: joint limits of a haptic map's target, felt by the hand through the map's transposed Jacobian.
 
 With q = h(x), its rates q̇ = h_* ẋ and for every joint angle or component of a rotation vector r_i an interval,
 

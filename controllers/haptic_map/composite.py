@@ -1,4 +1,4 @@
-"""The red-blue composite map: one clip walks, two others fight over its arms (Donald & Henle 2000, Figs. 5 to 7)."""
+"""The red-blue composite map: the legs of one clip, arms blended of two others (Donald & Henle 2000, Figs. 5 to 7)."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy

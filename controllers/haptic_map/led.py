@@ -1,4 +1,4 @@
-r"""The led figure: a clip that walks straight on walks on a path instead, and its feet stand where they were put.
+r"""The led figure: a clip of straight walking follows a curved path, and its feet do not skate.
 
 .. math:: X_{root}(s) = A(s)\,\rho(s/\ell), \qquad X_{foot}(s) = A(s + \ell\,\lambda(s/\ell))\,\rho_{foot}(s/\ell)
 
@@ -8,7 +8,7 @@ a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓ
 walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s), and
 the root is lower by twice as much as that raises the outer hip.
 
-A clip that flies has a second form without flights (`grounded`), for paces at which nobody flies that long. Channels
+A clip that flies has a second form without flights (`grounded`), for paces too slow to fly that long. Channels
 are (1 − u) ρ + u ρ_grounded; u, how far the figure stays on the ground, is the walker's second number.
 """
 
@@ -22,7 +22,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, CompiledMap, HapticMap
 from controllers.legs.grounded import Mask, grounded, hastened, runs
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses
-from controllers.legs.limbs import END, LIMB, Limb, place_limb
+from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
 from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import reached
 from controllers.motion.captures import Capture, lap_signs, low_passed
@@ -177,7 +177,7 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
-        last, at = int(limb[2]), 3 + 4 * rotations + END * i
+        last, at = int(limb[LAST]), 3 + 4 * rotations + END * i
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
         there, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
@@ -287,7 +287,7 @@ class Led(HapticMap):
                 low = grounded(rows, signs, self.stride, limbs, stands, sway)
                 forms, self.grounds = ([rows], False) if low is None else ([rows, low], True)
             else:
-                # Nobody leaps who steps.
+                # A flight of the capture becomes a step, which is shorter.
                 steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
                 held = (channels, drift[0], limbs, stands, capture.radius, self.duration)
                 forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]

@@ -1,4 +1,4 @@
-"""The lifted map: every clip is a curve of its own, and the stylus is where it is among them (section 8.1)."""
+"""The lifted map: every clip has a curve of its own, and the stylus blends clips of near curves (section 8.1)."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Every river plays a clip of its own: which one has the hand is the motion, where on it the hand is the frame."""
+"""Every river plays a clip of its own: the river that has the hand gives the clip, the hand's phase on it the frame."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ from controllers.work_array import work_array
 
 RIVER_CLIPS = 5
 # The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
-RIVER, PHASE, STILL, RIVER_MEMORY = MEMORY, MEMORY + 1, MEMORY + 2, MEMORY + 3
+RIVER, PHASE, STILL = MEMORY, MEMORY + 1, MEMORY + 2
 # Parameters: a header, offsets of the packed curves and of the phases of rest, both, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip
@@ -179,11 +179,11 @@ class RiverClips(AnimationMap):
 
     i is the river that has the hand, a number that the field leaves in its trace; t*_i the phase of its curve nearest
     to the stylus (of the branch that goes on, where the curve passes twice); a lap of the river is a lap of its clip.
-    A hand that no river has, outside the tube of the last or too fast in it, has no frame: who shows h stops, at a
+    A hand that no river has, outside the tube of the last or too fast in it, has no frame: the reference stops, at a
     phase at which the clip can stand (`stop_clip`).
     Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
     as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
-    jumps: who shows it goes on from where the figure stands (`place_clip`), with the offset decaying
+    jumps: the reference goes on from where the figure stands (`place_clip`), with the offset decaying
     (`inertialization`). h does not depend on the stylus's orientation.
 
     Parameters

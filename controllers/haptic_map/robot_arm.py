@@ -1,4 +1,4 @@
-r"""A map that is not of a human: the stylus leads the tool of a robot arm of seven joints.
+r"""The map to a robot arm: the stylus leads the tool of an arm of seven joints.
 
 The tool's pose is the stylus's, moved, scaled and kept within a domain (`saturation`):
 

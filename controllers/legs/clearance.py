@@ -1,4 +1,4 @@
-r"""Feet that are clear of the ground where they move, also between the mixtures at which footfalls were found.
+r"""Clearance of a blend's feet in swing, also between the mixtures at which footfalls were found.
 
 Which foot steps, and when, may change from one mixture of the clips to the next. Half way between two such nodes a
 table has a foot move as the one says, and lifted as the other: it would be dragged over the floor. So the

@@ -1,4 +1,4 @@
-r"""Feet of a blend that step one at a time, and move only while they are lifted.
+r"""Stance and swing of a blend: its feet step one at a time, and move only while they are lifted.
 
 A mean of clips that step at different times moves both feet at once, hardly lifted. So at every mixture of the clips
 the path of each foot over the lap is made again from what the mean asks for:

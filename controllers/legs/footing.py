@@ -1,4 +1,4 @@
-r"""Ends of limbs that stand keep their footing, whatever the hand does to the blend.
+r"""Feet in stance keep their place on the floor, whatever the hand does to the blend: no foot skate.
 
 Corrections that belong to a mixture (`pair_corrections`) hold a foot as long as the mixture stays as it is. Where it
 changes on the hand's path, and with it where the mean wants the foot, or between mixtures that were looked at, the foot

@@ -1,4 +1,4 @@
-r"""Steps in a transition: feet do not slide to where the new motion has them, one after the other they step there.
+r"""Foot placement in a transition: feet step to where the new motion has them, one after the other, and do not slide.
 
 With E_n(s) where the end of a limb is in the new motion, and E_o(s) where it was, coming to rest within half of the
 blend time, the end goes
@@ -22,8 +22,9 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.legs.footing import packed_soles
-from controllers.legs.limbs import LIMB, Limb
+from controllers.legs.limbs import CENTRE, FIRST, LIMB, OFFSETS, Limb
 from controllers.motion.inertialization import offset_left, stopping_way
+from controllers.motion.vectors import Vector
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
@@ -53,12 +54,17 @@ def packed_steppers(limbs: Sequence[Limb]) -> Array:
 
 
 @njit
+def lever(limb: Array, at: int, segment: Array) -> Vector:
+    """Vector ``limb[at:at + 3]`` in the world [m]; it is given in the frame of a segment at `segment` (7 or more,)."""
+    return rotate(segment[3], segment[4], segment[5], segment[6], limb[at], limb[at + 1], limb[at + 2])
+
+
+@njit
 def sole_height(limb: Array, end: Array) -> float:
     """Height of the lowest point of a limb's end [m], which is at `end` (7,)."""
     least = np.inf
     for k in range(LIMB, limb.shape[0], 3):
-        _, _, z = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
-        least = min(least, z)
+        least = min(least, lever(limb, k, end)[2])
     return end[2] + least
 
 
@@ -67,13 +73,13 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
     """Position of the centre of a limb's end in the world [m] and its orientation (wxyz), written to `end` (7,)."""
     end[:] = pose[:7]
     for i in range(3):
-        at = 3 + 4 * int(limb[i])
-        x, y, z = rotate(end[3], end[4], end[5], end[6], limb[3 + 3 * i], limb[4 + 3 * i], limb[5 + 3 * i])
+        at = 3 + 4 * int(limb[FIRST + i])
+        x, y, z = lever(limb, OFFSETS + 3 * i, end)
         end[0], end[1], end[2] = end[0] + x, end[1] + y, end[2] + z
         end[3], end[4], end[5], end[6] = multiply(
             end[3], end[4], end[5], end[6], pose[at], pose[at + 1], pose[at + 2], pose[at + 3]
         )
-    x, y, z = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
+    x, y, z = lever(limb, CENTRE, end)
     end[0], end[1], end[2] = end[0] + x, end[1] + y, end[2] + z
 
 

@@ -1,4 +1,4 @@
-r"""A gait that flies, kept on the ground: what a body does that goes too slowly to fly.
+r"""A gait without its flight phases, for paces that are too slow for them.
 
 A flight lasts as long as gravity lets it, whatever the pace; so a gait with flights cannot be played slowly as it is.
 Here each flight is shared out between the foot that pushed off and the one that lands: the first stands longer, the
@@ -25,7 +25,7 @@ from controllers.state import Array
 Mask = npt.NDArray[np.bool_]
 
 _AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
-_LOWEST = 0.3  # by which the root may be lowered [m]: who leaps farther than that cannot step
+_LOWEST = 0.3  # by which the root may be lowered [m]: a leap that takes more cannot become a step
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:

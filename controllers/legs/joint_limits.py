@@ -1,4 +1,4 @@
-r"""Joints of a limb that is led to where its end should be stay within limits while that is in the air, smoothly.
+r"""Joint limits in a limb's inverse kinematics: held smoothly, while the limb's end is in the air.
 
 With v the rotation vector of a joint, and c(v) its components clamped to an interval each (`saturation`), the joint
 becomes

@@ -1,4 +1,4 @@
-r"""Clips in which a limb is given by its end: where it is, how it is turned, and how high above the ground.
+r"""Clips with limbs by their end effectors: where the end is, how it is turned, and how high above the ground.
 
 A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
 drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while

@@ -1,4 +1,4 @@
-r"""Limbs whose ends stay where they are put: feet of a blend stand where the feet of its clips stand on average.
+r"""Inverse kinematics of a limb in closed form: feet of a blend stand where those of its clips do on average.
 
 A mean of joint angles leaves the feet anywhere. So the pose of the end of a limb (a foot) is blended too, as root
 and joints are, and the limb's three joints are corrected in closed form so that its end is exactly there:
@@ -25,7 +25,10 @@ from controllers.legs.joint_limits import hold_joint
 from controllers.motion.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
 from controllers.state import Array, Vec3
 
-LIMB = 36  # numbers of a packed limb
+# A packed limb (`Limb.packed`): places of its three joints, their offsets (3, 3), flexion axis, centre of the end,
+# limits (3, 3, 2); a limb that steps has the points of its sole behind that (`footsteps`).
+FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB = 0, 1, 2, 3, 12, 15, 18, 36
+THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # the offsets of the middle and the last joint: the limb's two segments
 END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
 
 _STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
@@ -138,8 +141,8 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
     tangents : int
         k, or 0 to leave the rates alone.
     """
-    first, second, last = int(limb[0]), int(limb[1]), int(limb[2])
-    a, b, axis, point = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12), vector_at(limb, 15)
+    first, second, last = int(limb[FIRST]), int(limb[MIDDLE]), int(limb[LAST])
+    a, b, axis, point = vector_at(limb, THIGH), vector_at(limb, SHANK), vector_at(limb, AXIS), vector_at(limb, CENTRE)
     q_root = rotations[0, 0], rotations[0, 1], rotations[0, 2], rotations[0, 3]
     q_first = rotations[first, 0], rotations[first, 1], rotations[first, 2], rotations[first, 3]
     q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
@@ -147,7 +150,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
 
     # The last joint as the root sees it, from its own origin and from the first joint's.
     from_root = turned_back(q_root, minus(minus(vector_at(end[0], 0), turned(q_end, point)), vector_at(root[0], 0)))
-    line = minus(from_root, vector_at(limb, 3))
+    line = minus(from_root, vector_at(limb, OFFSETS))
     m, normal = turned_back(q_second, a), cross(axis, b)
     b_axis, m_axis = dot(b, axis), dot(m, axis)
     k_cos, k_sin = 2.0 * (dot(m, b) - m_axis * b_axis), 2.0 * dot(m, normal)
@@ -203,7 +206,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
             rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
     for i in range(4):
         rotations[first, i], rotations[second, i], rotations[last, i] = n_first[i], n_second[i], n_last[i]
-    limits = limb[18:36].reshape(3, 3, 2)
+    limits = limb[_LIMITS:LIMB].reshape(3, 3, 2)
     for n in range(3):
         joint = int(limb[n])
         hold_joint(limits[n], end[:, 2], rotations[joint], rates[joint], tangents)

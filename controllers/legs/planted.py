@@ -1,4 +1,4 @@
-r"""Feet of a clip that stand where they stand: in each stance a sole keeps one place on the floor, or rolls on it.
+r"""Feet of a clip without foot skate: in each stance a sole keeps one place on the floor, or rolls on it.
 
 Captured feet slide, hover over the floor and sink into it by centimetres. What they do of that in their stances is
 taken from the path of each foot, smoothly, and little else. With h, which is 1 while a foot stands and 0 while it
@@ -81,7 +81,7 @@ def planted_ends(
     """
     n, stays, free = len(channels), window(stands, _STANDS), window(~stands, _SWINGS)
     if stands.all() or not stands.any():
-        # Who never steps, or never stands, has a clock that is always even.
+        # Without steps, or without stances, the clock is even.
         free = np.ones(n)
     lag = (np.cumsum(free) - 0.5 * free) / free.sum() - (np.arange(n) + 0.5) / n
     lag -= lag.mean()

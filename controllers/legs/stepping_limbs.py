@@ -1,4 +1,4 @@
-r"""A limb that steps: its joints go where its foot is, and where they would leap the foot gives way.
+r"""Inverse kinematics of a limb that steps: near its singularities the foot gives way, so that no joint leaps.
 
 A limb leaps where it snaps straight, where it folds up under its first joint, and where its last joint flips. With d
 the distance of the last joint from the first, of a limb of length ℓ, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot
@@ -16,10 +16,10 @@ import numpy as np
 from numba import njit
 
 from controllers.easing import smooth_step
-from controllers.legs.footsteps import FLOOR, sole_height
-from controllers.legs.limbs import LIMB, place_limb
+from controllers.legs.footsteps import FLOOR, lever, sole_height
+from controllers.legs.limbs import AXIS, CENTRE, FIRST, LAST, LIMB, MIDDLE, OFFSETS, SHANK, THIGH, place_limb
 from controllers.motion.vectors import cross, dot, product, turned_back, vector_at
-from controllers.rotations import exponential, logarithm, multiply, relative, rotate
+from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
@@ -41,8 +41,8 @@ def _bend_forwards(limb: Array, rotations: Array) -> None:
 
     An angle α < 0 becomes α / (1 + (α/a)²), which leaves α = 0 with two derivatives alike.
     """
-    q = rotations[int(limb[1])]
-    a, b, axis = vector_at(limb, 6), vector_at(limb, 9), vector_at(limb, 12)
+    q = rotations[int(limb[MIDDLE])]
+    a, b, axis = vector_at(limb, THIGH), vector_at(limb, SHANK), vector_at(limb, AXIS)
     m = turned_back((q[0], q[1], q[2], q[3]), a)
     angle = np.arctan2(dot(m, cross(b, axis)), dot(m, b) - dot(m, axis) * dot(b, axis))
     if angle < 0.0:
@@ -58,12 +58,12 @@ def _bend_forwards(limb: Array, rotations: Array) -> None:
 @njit
 def _leg(limb: Array, pose: Pose, end: Array, line: Array) -> float:
     """Write the way from a limb's first joint to its last, were its end at `end` (7,); returns its length, straight."""
-    hip, longest = rotate(pose[3], pose[4], pose[5], pose[6], limb[3], limb[4], limb[5]), 0.0
-    sole = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
+    hip, longest = lever(limb, OFFSETS, pose), 0.0
+    sole = lever(limb, CENTRE, end)
     for i in range(3):
         line[i] = end[i] - sole[i] - pose[i] - hip[i]
-    for first in (6, 9):
-        longest += np.sqrt(limb[first] ** 2 + limb[first + 1] ** 2 + limb[first + 2] ** 2)
+    for segment in (THIGH, SHANK):
+        longest += np.sqrt(limb[segment] ** 2 + limb[segment + 1] ** 2 + limb[segment + 2] ** 2)
     return longest
 
 
@@ -74,7 +74,7 @@ def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     longest = _EASE * _leg(limb, pose, end, line)
     way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
-    # Whom the figure has left behind it does not stoop for.
+    # For a foot that is left far behind the figure does not stoop.
     short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
     return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES)
 
@@ -86,7 +86,7 @@ def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
     point, total = work_array(2), 0.0
     point[:] = 0.0
     for k in range(LIMB, limb.shape[0], 3):
-        x, y, _ = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
+        x, y, _ = lever(limb, k, end)
         weight = np.exp((x * along[0] + y * along[1]) / _EDGE)
         total += weight
         point[0], point[1] = point[0] + weight * x, point[1] + weight * y
@@ -141,7 +141,7 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
     """
     swings = smooth_step((sole_height(limb, end) - step[FLOOR]) / _SWUNG)
     w, a, b, c = rotations[0]
-    for joint in (limb[0], limb[1]):
+    for joint in (limb[FIRST], limb[MIDDLE]):
         r = rotations[int(joint)]
         w, a, b, c = multiply(w, a, b, c, r[0], r[1], r[2], r[3])
     w, a, b, c = multiply(w, a, b, c, own[0], own[1], own[2], own[3])
@@ -153,9 +153,9 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
     u = (angle - _TWIST) / wide
     kept = (1.0 - u) ** 2 * ((1.0 + 2.0 * u) * _TWIST + u * wide) + u * u * (1.0 - u) * wide
     share = 1.0 + swings * (kept / angle - 1.0)
-    before = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
+    before = lever(limb, CENTRE, end)
     end[3:] = multiply(w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2]))
-    after = rotate(end[3], end[4], end[5], end[6], limb[15], limb[16], limb[17])
+    after = lever(limb, CENTRE, end)
     for i in range(3):
         end[i] += after[i] - before[i]
 
@@ -163,7 +163,7 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
 @njit
 def put_limb(limb: Array, step: Array, pose: Pose, end: Array, share: float) -> None:
     """Correct the joints of a limb such that its end, in a step, is where `end` (7,) says; `share` of `_hold_back`."""
-    rotations, last = pose[3:].reshape(-1, 4), int(limb[2])
+    rotations, last = pose[3:].reshape(-1, 4), int(limb[LAST])
     _bend_forwards(limb, rotations)
     _hold_back(limb, pose, end, share)
     own = rotations[last].copy()

@@ -1,4 +1,4 @@
-r"""Captures that are led: what is above the frequencies of a gait is noise, and who leaps far steps instead.
+r"""Captures that are led: noise above the frequencies of a gait is filtered out, and far leaps become steps.
 
 A millimetre of noise is 1 m/s² at 5 Hz, and 25 m/s² at 25 Hz: more than the floor can give. So the channels of a lap
 go through a Butterworth filter of second order, forwards and backwards, as is the custom for captured gaits (Winter

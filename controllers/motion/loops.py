@@ -171,7 +171,7 @@ def drift_of(poses: Array) -> Array:
     if abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
     if abs(net) < 1.0:
-        turns = 0  # a twist of whole turns cannot move on: who turns as he goes does so in the remainder
+        turns = 0  # a twist of whole turns cannot move on: a turn while travelling is in the remainder
     angle = net + 2.0 * np.pi * turns
     columns, _ = plane_exponential(np.array([[1.0, 0.0, angle], [0.0, 1.0, angle]]))
     return np.append(np.linalg.solve(columns.T, step), angle)

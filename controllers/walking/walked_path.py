@@ -4,7 +4,7 @@ r"""A path that grows at its front while it is walked, and is remembered: unifor
 
 s is the arc length [m], (x, y) the place on the floor [m] and θ the heading [rad]. A is C², its arc length is s to
 second order in κΔ, and its heading turns where neighbouring rows differ and nowhere else: between rows j and j + 1
-that is for s from (j − 1) Δ to (j + 2) Δ. φ [rad] is how far one who goes there leans to the left. A row also keeps
+that is for s from (j − 1) Δ to (j + 2) Δ. φ [rad] is how far the figure leans to the left there. A row also keeps
 how far the path was meant to bend before it, |κ| [1/m], and the acceleration to the left that this takes [m/s²].
 
 The ring holds the last `ROWS` rows, 61 m: an endless walk needs no more memory, and what lies farther back is

@@ -83,7 +83,7 @@ def walker_at(numbers: Array, at: int) -> Walker:
 
 
 def fresh_walker(gait: Gait, ahead: float, path: Array) -> Array:
-    """Numbers of a walker who has not been led yet: s = 0, on a packed path laid `ahead` [m] of him."""
+    """Numbers of a walker at rest: s = 0, on a packed path that is laid `ahead` [m] of it."""
     numbers = np.zeros(_PATH + PACKED_PATH)
     walker = walker_at.py_func(numbers, 0)
     walker.argument[1], walker.argument[3] = float(gait.flies), 1.0

@@ -9,11 +9,11 @@ from controllers.certificates.switching.switching_search import Course, Push
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.instructions import TRACE_RIVER
 from controllers.fields.program import evaluate
-from controllers.state import Array
+from controllers.state import POSITION, Array
 from experiments.certify.trial_simulation import CLOSURE, trial_model
 from models.phantom.kinematics import jacobian, vector_to_hand_frame
 from models.scene import PHANTOM
-from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense
+from sim.world.phantom_port import ARM_JOINTS, actuate, phantom_port, sense, sensed_before
 from sim.world.world import phantom_angles
 
 SUBSTEPS = 8
@@ -37,7 +37,7 @@ def simulated_course(
         joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
     mujoco.mj_forward(model, data)
     # The filter knows the velocity from before.
-    port.memory[:3], port.memory[6:9], port.memory[12], port.hand[4] = theta, rate, 1.0, 1.0
+    sensed_before(port, theta, rate)
     program = field.program()
     memory, wrench = program.fresh_memory(), np.zeros(6)
     n = round(seconds / sampling.period)
@@ -46,7 +46,7 @@ def simulated_course(
         t = k * sampling.period
         sense(port, t, 0.0)
         evaluate(*program.compiled(), memory, port.hand, wrench)
-        p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
+        p[k], river[k] = port.hand[POSITION], memory[TRACE_RIVER]
         force = wrench[:3].copy()
         if push is not None and push.start <= t < push.start + push.duration:
             force += push.force

@@ -22,14 +22,14 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
-from controllers.state import Array
+from controllers.state import HAND_POSITION, Array
 from experiments.certify.certified_device import phantom_device
 from models.phantom.spec import phantom_spec
 from models.scene import PHANTOM, R_WP
 from sim.compilation.compiled import entry_point
 from sim.errors import SimError
 from sim.users.arm import Arm
-from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense
+from sim.world.phantom_port import ARM_JOINTS, PhantomPort, actuate, phantom_port, sense, sensed_before
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
 
@@ -89,7 +89,7 @@ def run_late(
                 slot = k % late.shape[0]
                 port.ctrl[port.motor[i]] = late[slot, i]
                 late[slot, i] = port.torque[i]
-            path[k, i] = port.hand[1 + i]
+            path[k, i] = port.hand[HAND_POSITION + i]
         if np.sum((path[k] - path[0]) ** 2) > 0.05**2:
             break
         advance(plant, port, hand, t, False, applied)
@@ -264,8 +264,7 @@ def hand_path(
     else:
         still = np.array(phantom_angles(centre))
         theta, rate = still + state[:3], state[3:6]
-        port.memory[:3], port.memory[6:9], port.memory[12] = still + state[6:9], state[9:12], 1.0
-        port.hand[4] = 1.0
+        sensed_before(port, still + state[6:9], state[9:12])
         late += state[12:].reshape(-1, 3)[::-1]
     late += np.array(phantom_device().gravity(theta if state is None else theta - state[:3]))
     names = [PHANTOM + name for name in (*ARM_JOINTS, "elbow", "twin")]

@@ -26,14 +26,13 @@ class Command:
 
     def __call__(self) -> int:
         """Convert, and say what the file was taken for."""
-        if self.target.suffix.lower() == ".glb":
-            from experiments.export.gltf import convert_to_gltf as convert
-        else:
-            from models.mocap.library import convert
+        from experiments.export.gltf import write_gltf
+        from models.mocap.library import convert
+        from models.mocap.readers.own_bvh import write_bvh
         from models.mocap.retargeting.retarget import Hints
 
-        hints = Hints(self.up, self.rest_frame)
-        report = convert(self.source, self.target, overwrite=self.overwrite, hints=hints).report
+        hints, writers = Hints(self.up, self.rest_frame), {".bvh": write_bvh, ".glb": write_gltf}
+        report = convert(self.source, self.target, self.overwrite, hints, writers).report
         own = "the figure's own skeleton: nothing to retarget"
         say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))
         return 0

@@ -15,8 +15,6 @@ from controllers.state import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.clip import Clip
-from models.mocap.library import Loaded, load
-from models.mocap.retargeting.retarget import Hints
 from sim.viewer.shapes import body_shapes, coarser
 
 _TO_FILE = [1, 2, 0]
@@ -170,21 +168,3 @@ def _add_motion(library: Any, document: Any, buffer: _Buffer, clip: Clip) -> Non
     for index in range(len(SEGMENTS)):
         animate(index, "rotation", _rotations(clip.poses, index), "VEC4")
     document.animations.append(library.Animation(name=clip.name, samplers=samplers, channels=channels))
-
-
-def convert_to_gltf(source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None) -> Loaded:
-    """Read any motion file and write it as glTF on the figure.
-
-    Raises
-    ------
-    ModelError
-        If the source cannot be read, the target cannot be written, or it exists and is not to be overwritten.
-    """
-    if target.exists() and not overwrite:
-        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
-    loaded = load(source, hints)
-    try:
-        write_gltf(loaded.clip, target)
-    except OSError as error:
-        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
-    return loaded

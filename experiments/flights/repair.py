@@ -13,12 +13,11 @@ from controllers.certificates.flight.tolerance import GRAVITY, JUDGING, Judging
 from controllers.state import Array
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved import with_constant_momentum
-from models.errors import ModelError
 from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
-from models.mocap.library import load_clip
+from models.mocap.library import check_target, load_clip, writing
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 
@@ -77,15 +76,10 @@ def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired
     ModelError
         If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
     """
-    if target.suffix.lower() != ".bvh":
-        raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
-    if target.exists() and not overwrite:
-        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    check_target(target, overwrite)
     repaired = repair_clip(load_clip(source))
-    try:
+    with writing(target):
         write_bvh(repaired.clip, target)
-    except OSError as error:
-        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
     return repaired
 
 

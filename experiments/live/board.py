@@ -16,7 +16,7 @@ _PATIENCE = 1.0  # [s] no writing lasts longer
 class Board:
     """Named rows of numbers in shared memory, with one writer.
 
-    A sequence number is odd while they are written; who reads tries again where it was, or has changed meanwhile
+    A sequence number is odd while they are written; a reader tries again where it was, or has changed meanwhile
     (Lamport 1977, "Concurrent reading and writing").
 
     Parameters

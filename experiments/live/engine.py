@@ -10,7 +10,7 @@ import numpy as np
 from controllers.errors import ParameterError
 from controllers.fields.law import Program
 from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
-from controllers.state import HAND_SWITCH, Array
+from controllers.state import HAND_SWITCH, POSITION, Array
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
 from experiments.setups.setups import parts_of
@@ -88,7 +88,7 @@ class Engine:
     @property
     def stylus(self) -> Array:
         """Measured position of the stylus in H [m], shape (3,)."""
-        return self._device.hand[1:4]
+        return self._device.hand[POSITION]
 
     @property
     def memory(self) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from controllers.errors import ControllerError
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE
-from controllers.state import Array
+from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
 from experiments.live.board import Board
 from experiments.live.engine import Drag, Engine
 from experiments.live.messages import (
@@ -243,7 +243,7 @@ class _Runner:
         shown: dict[str, Any] = {
             "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
             "recording": 0.0 if self._take is None else self._take.seconds(engine), "qpos": shown_configuration(servo),
-            "reference": servo.reference.pose, "p": hand[1:4], "v": hand[8:11], "switch": hand[14],
+            "reference": servo.reference.pose, "p": hand[POSITION], "v": hand[VELOCITY], "switch": hand[HAND_SWITCH],
             "force": servo.field.force, "user": servo.device.force, "distance": trace[TRACE_DISTANCE],
             "phase": trace[TRACE_PHASE], "residual": float(np.linalg.norm(servo.figure.applied[:3])),
             "target": np.full(3, np.nan) if engine.drag is None else engine.drag.target,
@@ -273,10 +273,10 @@ class _Runner:
     def _slice(self, engine: Engine) -> Array:
         """Points and forces of the field on the horizontal plane through the stylus, shape (n, 6)."""
         hand = engine.session.servo.device.hand.copy()
-        points = slice_points(float(hand[3]))
+        points = slice_points(float(hand[HAND_POSITION + 2]))
         forces = np.zeros_like(points)
         if not engine.session.parts.maps.plays_rivers:
-            hand[8:11] = 0.0
+            hand[VELOCITY] = 0.0
         field_slice(engine.field, hand, points, self._scratch, forces)
         return np.hstack([points, forces])
 
@@ -297,9 +297,10 @@ def _course(engine: Engine) -> Array:
 def _built(session: Session, engine: Engine) -> Built:
     static = session.static()
     kept = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
-    curve = session.curve
     assert configuration_size(session.servo) <= SHOWN["qpos"]
     return Built(
-        engine.config, {name: static[name] for name in kept if name in static}, (curve.start, curve.end),
-        engine.tubes is not None, session.remarks,
-    )  # fmt: skip
+        engine.config,
+        {name: static[name] for name in kept if name in static},
+        engine.tubes is not None,
+        session.remarks,
+    )

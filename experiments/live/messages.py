@@ -96,8 +96,6 @@ class Built:
         With all that was left to defaults.
     drawn : dict
         What a recording keeps of curves and tubes (`Session.static`).
-    curve_span : (float, float)
-        Start and end of the curve's phase [s].
     bends : bool
         Whether its curve can be bent.
     remarks : tuple of str
@@ -106,7 +104,6 @@ class Built:
 
     config: RunConfig
     drawn: dict[str, Any]
-    curve_span: tuple[float, float]
     bends: bool
     remarks: tuple[str, ...]
 

@@ -10,7 +10,7 @@ from experiments.files.html_page import html_page, image
 from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
 from experiments.preparation.followed import Followed, followed
-from models.errors import ModelError
+from models.mocap.library import check_target, writing
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 from models.mocap.readers.own_bvh import write_bvh
@@ -67,21 +67,14 @@ def prepare_file(
     ModelError
         If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
     """
-    if target.suffix.lower() != ".bvh":
-        raise ModelError(f"cannot write {target}: only BVH is written; expected a name that ends in .bvh")
-    if target.exists() and not overwrite:
-        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    check_target(target, overwrite)
     made = prepared(source, loop, mirror, hints)
     outcome = PreparedFile(made, well_formed(made.clip), followed(made.clip))
-    try:
+    with writing(target):
         write_bvh(made.clip, target)
         if report is not None:
             report.mkdir(parents=True, exist_ok=True)
             (report / f"prepare-{source.stem}.html").write_text(page(outcome), encoding="utf-8")
-    except OSError as error:
-        raise ModelError(
-            f"cannot write {error.filename}: {error.strerror}; expected a place that can be written"
-        ) from None
     return outcome
 
 

@@ -1,4 +1,4 @@
-"""What clips cannot be blended with others, or changed over to half way, and why: who flies or turns over."""
+"""What clips cannot be blended with others, or changed over to half way, and why: flights and somersaults."""
 
 from collections.abc import Sequence
 

@@ -1,7 +1,7 @@
 r"""Whose legs and trunk carry the arms of others where clips move differently, and how much of these they bear.
 
 A kick is balanced by the arms of its own clip, and a flight is ballistic with them alone. What legs bear is found by
-the one who has to do it: the physical figure follows what the map shows while a hand wanders through the whole of its
+simulation: the physical figure follows what the map shows while a hand wanders through the whole of its
 domain and pushes, over the legs of each clip in turn. The first that carry them well are taken, for who names a walk
 first wants to walk, or else the best. Where the figure falls with the best of them, or lacks more than it may, the
 others' arms are blended into their own by a smaller share λ, down to none: then the clip goes alone. Legs that slide,

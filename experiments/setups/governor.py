@@ -47,8 +47,8 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
     """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
 
     What is judged is the animation h∘φ that the map makes of the curve: the clip itself where the curve is in a place
-    of one clip only, and the blend, in the map's own time alignment, where it is between several. A blend in which
-    nobody leaves the floor has no flight, whatever its clips do.
+    of one clip only, and the blend, in the map's own time alignment, where it is between several. A blend that
+    never leaves the floor has no flight, whatever its clips do.
 
     Parameters
     ----------

@@ -42,9 +42,9 @@ _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
 _UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
 _BLINK, _SWING = 0.05, 0.15  # [s] a flight from foot to foot lasts longer, and a foot swings for longer, or hops
-# Largest lateral acceleration of a gait that flies [m/s²]: who misses a landing by a little and leans more, falls.
+# Largest lateral acceleration of a gait that flies [m/s²]: leaning more, a landing missed by a little is a fall.
 _FLYING_LATERAL = 1.2
-# And its largest pace: who is faster than its clip lands late, for he falls no faster. So is that of a run that steps:
+# And its largest pace: faster than its clip it lands late, for it falls no faster. So is that of a run that steps:
 # its limbs swing as fast as they do in the run, and if they swing faster, motors of the leg that stands give in.
 _RUNNING_FORWARD = 1.0
 

@@ -12,7 +12,8 @@ from sim.reference.reference import poses_along
 # A foot that bears what it is not held to turns about itself: the plan gives it load, and lifts it. So on a led figure,
 # which may stop anywhere, a point bears nothing from half the height on at which it is let go.
 _WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005)
-# Who flies changes feet within a hundredth of a second, and then would stand on none; who flew takes a little longer.
+# A gait that flies changes feet within a hundredth of a second, and would then stand on none; one kept on the ground
+# takes a little longer.
 _FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace(reference_reach=0.01)
 
 _ROWS = 192  # of a lap
@@ -40,12 +41,12 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
         poses_along(compiled.kind, compiled.params, compiled.memory, walker, poses[0])
         laps = measured_laps(poses, seconds / _ROWS, figure)
         outside = laps.load[..., None] * (nearest_supported(laps.zmp, laps.contacts, _SHARE) - laps.zmp)
-        # Where the root of who flies is on average is the clip's affair: the way back to it would throw the figure.
+        # In flight the mean place of the root is the clip's own: a way back to it would throw the figure.
         mean = outside[0].mean(axis=0) if gait.flies else 0.0
         sway += sway_of(outside[0] - mean, laps.height, seconds)
         swaying = led.with_sway(sway)
         if not swaying.sways:
-            # Who would have to stoop too far for it sways less.
+            # A sway that would take too low a root is not taken.
             break
         result = swaying
     return result

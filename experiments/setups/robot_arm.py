@@ -11,7 +11,7 @@ from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.robot_arm import ROBOT_ARM, RobotArm
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
+from controllers.state import STYLUS_POSE, Array
 from experiments.config.run_config import ArmConfig
 from experiments.setups.budget import fastest, tank_for
 from experiments.setups.hands import lap_pushes
@@ -95,7 +95,7 @@ def wire_arm(
         reference=unlinked_reference(world.arm, nothing, arm_period, config.smoothing),
         figure=robot_state(world, RATE),
         figure_ticks=config.arm_ticks,
-        argument=device.hand[1:8],
+        argument=device.hand[STYLUS_POSE],
     )  # fmt: skip
     # The map looks at its domain with compiled code, when everything else has been checked.
     ready(run_units(servo, program))

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import CompiledMap, HapticMap
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
+from controllers.state import STYLUS_POSE, Array
 from experiments.config.run_config import NOBODY_LED, RunConfig
 from experiments.files.device_files import linkage_of
 from experiments.setups.defaults import resolved
@@ -178,7 +178,8 @@ def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
     body, reference = _BODIES[world.kind](parts, world, compiled)
     return Servo(
         plant=make_plant(world), device=device, field=field, reference=reference, figure=body,
-        figure_ticks=config.figure.figure_ticks, argument=device.hand[1:8] if walker is None else walker.argument,
+        figure_ticks=config.figure.figure_ticks,
+        argument=device.hand[STYLUS_POSE] if walker is None else walker.argument,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from controllers.fields.law import Program
 from controllers.fields.program import Compiled, evaluate
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import Array
+from controllers.state import HAND_POSITION, HAND_QUATERNION, Array
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
@@ -79,7 +79,7 @@ def _pass(
         evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
         limit_force(limits, limiter, wrench, force[k])
         actuate(port, force[k])
-        p[k], river[k] = port.hand[1:4], memory[TRACE_RIVER]
+        p[k], river[k] = port.hand[HAND_POSITION:HAND_QUATERNION], memory[TRACE_RIVER]
         advance(plant, port, hand, t, False, applied)
 
 

@@ -19,7 +19,7 @@ from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_R
 from controllers.fields.law import Program
 from controllers.fields.river import River
 from controllers.haptic_map.animation import ClipMap
-from controllers.state import Array
+from controllers.state import VELOCITY, Array
 from experiments.config.words import run_config
 from experiments.results.figures import STYLE
 from experiments.setups.governor import speeds_along
@@ -134,7 +134,7 @@ class Bench:
             hand, trace = ticks.hand[:n], ticks.trace[:n]
             along = self.curve.velocity(trace[:, TRACE_PHASE])
             along /= np.linalg.norm(along, axis=1, keepdims=True)
-            speed, force = (np.sum(a * along, axis=1) for a in (hand[:, 8:11], ticks.force[:n]))
+            speed, force = (np.sum(a * along, axis=1) for a in (hand[:, VELOCITY], ticks.force[:n]))
             columns = (hand[:, 0], trace[:, TRACE_PHASE], trace[:, TRACE_DISTANCE], speed, force, trace[:, TRACE_RIVER])
             blocks.append(tuple(column.copy() for column in columns))
 

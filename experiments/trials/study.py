@@ -25,7 +25,7 @@ from experiments.trials.run_trial import SHELF, Row
 from experiments.trials.study_config import StudyConfig, read_toml, study_from
 from experiments.trials.where import Where
 
-DATABASE, SUMMARY, REPORT, CONTRASTS = "study.sqlite", "summary.json", "report.html", "contrasts.csv"
+DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
 
 @dataclass(frozen=True)

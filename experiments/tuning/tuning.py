@@ -158,7 +158,7 @@ def _told(
     comparisons = compared(config, judged)
     importances = importances_of(config, found)
     sentences = _sentences(config, best, found, tuned, comparisons)
-    others = {c.name: _gains(config, c) for c in judged[1:]}
+    others = {c.name: _gains(c) for c in judged[1:]}
     plots = [objectives_figure(config, found, best), gains_figure(config, found, best, others)]
     verdicts = {name: verdict.reason for name, verdict in certificate.verdicts.items()}
     page = tuning_page(config, text, sentences, judged, comparisons, importances, plots, verdicts)
@@ -168,7 +168,7 @@ def _told(
     return result
 
 
-def _gains(config: TuneConfig, contender: Contender) -> dict[str, float]:
+def _gains(contender: Contender) -> dict[str, float]:
     mode = cast(Any, contender.config.mode)
     return {name: float(getattr(mode, name, np.nan) or np.nan) for name in ("stiffness", "damping")}
 

@@ -1,8 +1,10 @@
-"""Clips by name or from anybody's files: `load_clip` for any format, `embedded` for those of the package."""
+"""Clips by name or from files: `load_clip` for any format, `embedded` for those of the package."""
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from models.errors import ModelError
 from models.mocap.clip import Clip
@@ -17,6 +19,8 @@ from models.mocap.retargeting.skeleton_roles import roles_of
 
 _FORMATS = "BVH, AMC (with its ASF beside it) or DeepMimic JSON"
 _BY_CONTENT = ("", ".txt", ".json")  # suffixes that do not tell the format
+_WRITTEN = {".bvh": "BVH", ".glb": "glTF"}
+Writer: TypeAlias = Callable[[Clip, Path], None]
 _CLIPS = files("models.mocap") / "clips"
 
 
@@ -112,25 +116,70 @@ def read_motion(path: Path) -> SourceMotion:
     raise MotionFileError(path, 1, "not a motion file", _FORMATS)
 
 
-def convert(source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None) -> Loaded:
-    """Read any motion file and write it as BVH on the figure's 57 channels: calibrated and on the floor, no more.
+def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",)) -> None:
+    """Refuse to write a motion to a file.
+
+    Raises
+    ------
+    ModelError
+        If its name has none of the `ends`, or it exists and is not to be overwritten.
+    """
+    if target.suffix.lower() not in ends:
+        formats = " and ".join(_WRITTEN[end] for end in ends)
+        raise ModelError(
+            f"cannot write {target}: only {formats} can be written; expected a name that ends in {', '.join(ends)}"
+        )
+    if target.exists() and not overwrite:
+        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+
+
+@contextmanager
+def writing(target: Path) -> Iterator[None]:
+    """Say of a file that cannot be written which one, and why.
+
+    Raises
+    ------
+    ModelError
+        In place of an OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ModelError(
+            f"cannot write {error.filename or target}: {error.strerror}; expected a place that can be written"
+        ) from None
+
+
+def convert(
+    source: Path,
+    target: Path,
+    overwrite: bool = False,
+    hints: Hints | None = None,
+    writers: Mapping[str, Writer] | None = None,
+) -> Loaded:
+    """Read any motion file and write it on the figure's 57 channels: calibrated and on the floor, no more.
+
+    Parameters
+    ----------
+    source, target : Path
+        Files.
+    overwrite : bool
+        Replace the target if it exists.
+    hints : Hints, optional
+        What a person knows of the source.
+    writers : mapping, optional
+        What writes a file by the end of its name; by default BVH.
 
     Raises
     ------
     MotionFileError
         If the source cannot be read.
     ModelError
-        If the target is not a .bvh, cannot be written, or exists and is not to be overwritten.
+        If nothing writes the target, it cannot be written, or exists and is not to be overwritten.
     """
-    if target.suffix.lower() != ".bvh":
-        raise ModelError(
-            f"cannot write {target}: only BVH and glTF are written; expected a name that ends in .bvh, .glb"
-        )
-    if target.exists() and not overwrite:
-        raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    writers = writers or {".bvh": write_bvh}
+    check_target(target, overwrite, tuple(writers))
     loaded = load(source, hints)
-    try:
-        write_bvh(loaded.clip, target)
-    except OSError as error:
-        raise ModelError(f"cannot write {target}: {error.strerror}; expected a place that can be written") from None
+    with writing(target):
+        writers[target.suffix.lower()](loaded.clip, target)
     return loaded

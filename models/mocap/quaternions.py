@@ -63,18 +63,6 @@ def sign_continuous(q: Array) -> Array:
     return q * np.cumprod(signs, axis=0)[..., None]
 
 
-def shortest_arc(u: Array, v: Array) -> Array:
-    """The smallest rotation that turns direction u into direction v, shape (4,)."""
-    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
-    cosine = float(u @ v)
-    if cosine < -1.0 + 1e-12:
-        other = np.array([0.0, 0.0, 1.0]) if abs(u[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
-        axis = np.cross(u, other)
-        return np.append(0.0, axis / np.linalg.norm(axis))
-    q = np.append(1.0 + cosine, np.cross(u, v))
-    return q / np.linalg.norm(q)
-
-
 def slerped(q: Array, r: Array, share: float | Array) -> Array:
     """Rotations a share of the way from q to r along the shortest turn, shape (..., 4)."""
     half = share / 2 * logarithm(product(conjugate(q), r))

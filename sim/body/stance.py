@@ -1,7 +1,7 @@
 r"""How the legs move while their feet stand: the floor, not the reference, says where a loaded foot is.
 
 A foot that landed a centimetre from where the reference has it would be torn along the floor by the feedback, and the
-friction that this meets is a force nobody planned. So the wanted accelerations of a leg's nine degrees of freedom are
+friction that this meets was not planned for. So the wanted accelerations of a leg's nine degrees of freedom are
 amended, by as little as possible, towards contact points at rest on the floor:
 
 .. math:: \min_\delta \tfrac12\|\delta\|^2 + \tfrac\kappa2 \sum_p \|J_p (a^* + \delta) + \dot J_p v + \eta\,\dot p

@@ -38,6 +38,6 @@ def gather(addresses: IntArray, into: Array) -> None:
 
 
 def addresses_of(arrays: list[Array]) -> IntArray:
-    """Where the numbers of arrays lie, one array after the other; who uses it keeps them alive."""
+    """Where the numbers of arrays lie, one array after the other; the caller keeps them alive."""
     found = [array.ctypes.data + array.strides[0] * np.arange(len(array)) for array in arrays]
     return np.concatenate(found).astype(np.int64)

@@ -38,17 +38,8 @@ mj_step = types.ExternalFunction("mj_step", _void(_address, _address))
 mj_forward = types.ExternalFunction("mj_forward", _void(_address, _address))
 """mj_forward(m, d): everything but the integration."""
 
-mj_fwd_position = types.ExternalFunction("mj_fwdPosition", _void(_address, _address))
-"""mj_fwdPosition(m, d): all that depends on positions."""
-
-mj_fwd_velocity = types.ExternalFunction("mj_fwdVelocity", _void(_address, _address))
-"""mj_fwdVelocity(m, d): all that depends on velocities, after `mj_fwd_position`."""
-
 mj_kinematics = types.ExternalFunction("mj_kinematics", _void(_address, _address))
 """mj_kinematics(m, d): positions of bodies, geoms and sites."""
-
-mj_com_pos = types.ExternalFunction("mj_comPos", _void(_address, _address))
-"""mj_comPos(m, d): centres of mass and motion axes, after `mj_kinematics`."""
 
 mj_full_m = types.ExternalFunction("mj_fullM", _void(_address, _address, _double))
 """mj_fullM(m, d, M): dense mass matrix, shape (nv, nv)."""
@@ -66,6 +57,3 @@ mj_differentiate_pos = types.ExternalFunction(
 
 mj_integrate_pos = types.ExternalFunction("mj_integratePos", _void(_address, _double, _double, types.float64))
 """mj_integratePos(m, q, v, dt): move q along v for dt, in place."""
-
-mj_apply_ft = types.ExternalFunction("mj_applyFT", _void(_address, _address, _double, _double, _double, _int, _double))
-"""mj_applyFT(m, d, force, torque, point, body, qfrc): add a wrench at a point to generalised forces."""

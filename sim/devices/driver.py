@@ -5,7 +5,7 @@ servo is
 
     driver.read(reading, timeout)  ->  the compiled tick  ->  driver.write(command)
 
-Whatever cannot be a reading raises `DriverFault`; who drives latches it, lets go, and says why.
+Whatever cannot be a reading raises `DriverFault`; the servo latches it, lets go, and reports why.
 """
 
 import math
@@ -86,7 +86,12 @@ def fresh_telemetry() -> Array:
 
 @njit
 def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
-    """`Arrivals.note`; `clocks` (3,) are the last difference of the clocks, the least, and when the last one came."""
+    """A reading came at `now` that was made at `made` [s], each by its own clock: jitter and staleness are written.
+
+    The two clocks began at different times and drift: only how their difference changes means something, and the
+    quickest reading is forgotten at the rate of `DRIFT`. `clocks` (3,) are the last difference of the clocks, the
+    least, and when the last reading came; its first is NaN before the first reading of a clock.
+    """
     delay = now - made
     if math.isnan(clocks[0]):
         clocks[1], told[JITTER] = delay, 0.0
@@ -95,30 +100,6 @@ def note_arrival(told: Array, clocks: Array, now: float, made: float) -> None:
         clocks[1] = min(delay, clocks[1] + DRIFT * (now - clocks[2]))
     clocks[0], clocks[2] = delay, now
     told[STALENESS] = delay - clocks[1]
-
-
-class Arrivals:
-    """Jitter and staleness of readings from when they came and when the device says that it made them.
-
-    The two clocks began at different times and drift: only how the difference changes means something, and the quickest
-    reading is forgotten at the rate of `DRIFT`.
-
-    Parameters
-    ----------
-    telemetry : Array
-        See `TEMPERATURE`; its jitter and staleness are written.
-    """
-
-    def __init__(self, telemetry: Array):
-        self._told, self._clocks = telemetry, np.full(3, np.nan)
-
-    def again(self) -> None:
-        """A device that began again has another clock."""
-        self._clocks[0] = math.nan
-
-    def note(self, now: float, made: float) -> None:
-        """A reading came at `now` that was made at `made`, each by its own clock [s]."""
-        note_arrival(self._told, self._clocks, now, made)
 
 
 class Driver(Protocol):

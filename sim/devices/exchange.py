@@ -1,6 +1,6 @@
 """A device behind two arrays: a driver writes readings into one and takes commands from the other.
 
-This is the seam for hardware: the loop knows the arrays, not who is behind them. The driver, in Python or C, writes
+This is the seam for hardware: the loop knows the arrays, not what is behind them. The driver, in Python or C, writes
 `reading` before each tick, raises its sequence number last, and applies the torques of `command` for as long as
 `valid_torque` allows. Angles and torques are the Phantom's joints': kinematics, velocity filter, weight and peak torque
 are the simulated device's own.
@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE, Array
+from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
 from sim.errors import SimError
 from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
@@ -104,7 +104,7 @@ def sense_exchange(device: Exchange, t: float) -> None:
         device.faults, theta, gimbal, device.memory, t, r[READING_CLOCK], r[READING_SEQUENCE], False
     )
     if verdict == HELD:
-        device.hand[0] = t
+        device.hand[HAND_TIME] = t
     else:
         for i in range(3):
             device.gimbal[i] = gimbal[i]
@@ -116,7 +116,7 @@ def sense_exchange(device: Exchange, t: float) -> None:
 def actuate_exchange(device: Exchange, force: Array) -> None:
     """Leave the command for the driver, its number last."""
     c, r = device.command, device.reading
-    motor_torques(device.faults, device.memory, device.hand[0], force, device.torque)
+    motor_torques(device.faults, device.memory, device.hand[HAND_TIME], force, device.torque)
     for i in range(3):
         c[COMMAND_TORQUE + i] = device.torque[i]
         c[COMMAND_FORCE + i] = force[i]

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.faults import READING_NOT_FINITE, READINGS_ENDED, first_not_finite, latch
-from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_TIME, HAND_VELOCITY, Array
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.world.encoders import plausibility
@@ -102,7 +102,7 @@ def sense_replayed(device: ReplayedHand, t: float) -> None:
         latch(device.faults, READING_NOT_FINITE, t, first_not_finite(device.rows[tick]))
     else:
         hand[:] = device.rows[tick]
-    hand[0] = t
+    hand[HAND_TIME] = t
 
 
 @njit

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from controllers.state import Array
+from controllers.state import HAND_TIME, Array
 from sim.compilation.units import Unit
 from sim.users.arm import Arm
 from sim.users.person_state import PersonState
@@ -63,7 +63,7 @@ def simulated_phantom(port: PhantomPort, user: Arm | PersonState) -> SimulatedPh
 @njit(forceinline=True)
 def sense_simulated(device: SimulatedPhantom, t: float) -> None:
     """Read encoders and switch at time t, unless Python has done so for this tick."""
-    if device.hand[0] != t or not has_sensed(device.port):
+    if device.hand[HAND_TIME] != t or not has_sensed(device.port):
         sense(device.port, t, device.user.arm.switch[0])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
-from controllers.state import Array
+from controllers.state import HAND_TIME, Array
 from sim.compilation.kept_call import KeptCall
 from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
@@ -139,7 +139,7 @@ class Ticker:
 
     def fail(self, fault: Fault, value: float) -> None:
         """Latch a fault, from the next tick on."""
-        latch(self._device.faults, int(fault), float(self._device.hand[0]), value)
+        latch(self._device.faults, int(fault), float(self._device.hand[HAND_TIME]), value)
 
     def tick(self, number: float, request: int = NO_REQUEST) -> None:
         """Read, compute, write: tick `number`, a whole number, whose time is ``number T``.

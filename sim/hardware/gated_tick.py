@@ -11,7 +11,7 @@ from controllers.safety.faults import FAULT_CODE, Fault, latch
 from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
 from controllers.safety.limiter import LIMITER_FORCE
 from controllers.safety.thermal import hold_to_heat
-from controllers.state import Array
+from controllers.state import HAND_TIME, Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compilation.compiled import entry_point
@@ -91,7 +91,7 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     force[:] = asked
     pass_gate(gated.params, gated.shaking, gated.gate, gated.shaken, faults, device.hand, request, force)
     memory, held_back = device.memory, 1.0 if gated.own_weight else 1.0 - gated.gate[GATE_SHARE]
-    motor_torques(faults, memory, device.hand[0], force, torque)
+    motor_torques(faults, memory, device.hand[HAND_TIME], force, torque)
     # J(θ)ᵀF is ramped in with F, the weight is not yet.
     weight = gravity_torques((memory[0], memory[1], memory[2]))
     for i in range(3):
@@ -101,7 +101,7 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
         for i in range(3):
             torque[i] += weight[i]
     if gated.told[TOLD_HEAT] > HOT:
-        latch(faults, MOTORS_HOT, device.hand[0], gated.told[TOLD_HEAT])
+        latch(faults, MOTORS_HOT, device.hand[HAND_TIME], gated.told[TOLD_HEAT])
     on = pushes(int(gated.gate[GATE_STATE]))
     gated.told[TOLD_PUSHES] = 1.0 if on else 0.0
     if faults[FAULT_CODE] != 0.0 or not on:

@@ -101,11 +101,6 @@ class Identified:
     windows: int
     unexplained: float
 
-    def triple(self, name: str) -> tuple[float, float, float]:
-        """A quantity of the three joints."""
-        a, b, c = (float(self.values[NAMES.index(f"{name}{i}")]) for i in (1, 2, 3))
-        return a, b, c
-
 
 def motions_of(tick: Array, clock: Array, theta: Array, torque: Array, used: npt.NDArray[np.bool_]) -> list[Motion]:
     """Stretches of consecutive ticks that are used, each at least three windows long.

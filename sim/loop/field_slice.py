@@ -1,4 +1,4 @@
-"""The field at many points at once, for those who look at it: none of them leaves a trace in its memory."""
+"""The field at many points at once, for display: its memory stays as it is."""
 
 import numpy as np
 from numba import njit

@@ -7,7 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.fields.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
-from controllers.state import Array, HandState
+from controllers.state import (
+    HAND_ANGULAR_VELOCITY,
+    HAND_QUATERNION,
+    HAND_SWITCH,
+    HAND_TIME,
+    HAND_VELOCITY,
+    POSITION,
+    VELOCITY,
+    Array,
+    HandState,
+)
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import pose_difference
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
@@ -254,8 +264,9 @@ def tick_channels(ticks: TickLog, n: int) -> dict[str, Array]:
     """The first n ticks of a block by channel."""
     hand, trace = ticks.hand[:n], ticks.trace[:n]
     return {
-        "t": hand[:, 0], "p": hand[:, 1:4], "quaternion": hand[:, 4:8], "v": hand[:, 8:11], "omega": hand[:, 11:14],
-        "switch": hand[:, 14],
+        "t": hand[:, HAND_TIME], "p": hand[:, POSITION], "quaternion": hand[:, HAND_QUATERNION:HAND_VELOCITY],
+        "v": hand[:, VELOCITY], "omega": hand[:, HAND_ANGULAR_VELOCITY:HAND_SWITCH],
+        "switch": hand[:, HAND_SWITCH],
         "field": ticks.field[:n], "force": ticks.force[:n], "user": ticks.user[:n],
         "tank": ticks.tank[:n, 0], "tank_scale": ticks.tank[:n, 1], "torque": ticks.torque[:n],
         "phase": trace[:, TRACE_PHASE], "nearest": trace[:, TRACE_POINT : TRACE_POINT + 3],

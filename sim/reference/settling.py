@@ -17,9 +17,8 @@ import math
 import numpy as np
 from numba import njit, types
 
-from controllers.legs.footsteps import limb_end
+from controllers.legs.footsteps import lever, limb_end
 from controllers.legs.limbs import LIMB
-from controllers.rotations import rotate
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
@@ -59,8 +58,7 @@ def approach(state: Array, goal: float, period: float) -> None:
 @njit
 def _height(limb: Array, end: Array, k: int) -> float:
     """Height over the floor [m] of the sphere of a limb's sole that is at column k, the limb's end at `end` (7,)."""
-    _, _, z = rotate(end[3], end[4], end[5], end[6], limb[k], limb[k + 1], limb[k + 2])
-    return end[2] + z - CONTACT_RADIUS
+    return end[2] + lever(limb, k, end)[2] - CONTACT_RADIUS
 
 
 @njit

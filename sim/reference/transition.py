@@ -26,7 +26,7 @@ _SWING = 0.3  # [rad] by which a joint swings on at most
 
 
 class Transition(NamedTuple):
-    """State of the inertialisation (see `inertialization` and `footsteps` in `controllers.haptic_map`).
+    """State of the inertialisation (see `controllers.motion.inertialization`, `controllers.legs.footsteps`).
 
     Attributes
     ----------
@@ -105,11 +105,23 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
     transition.lasts[0] = transition.seconds
     if transition.seconds > 0.0:
         up = np.sqrt(_BEND * abs(transition.change[0, 2]) / _PULL)
-        # No longer: what flies would fly on, and who runs would leave both feet behind.
+        # Not longer: a figure in flight would fly on, and one that runs would leave both feet behind.
         then, next_ = transition.shown[1], transition.shown[2]
         pace = 0.5 * np.hypot(next_[0] - then[0], next_[1] - then[1]) / period
         over = min(np.sqrt(_BEND * aside / _ASIDE), _LONGER * transition.seconds, _STRIDES / max(pace, 1e-9))
         transition.lasts[0] = max(transition.seconds, up, over)
+
+
+@njit
+def _carry(transition: Transition, at: float, pose: Array) -> None:
+    """Where the ends of the limbs are `at` seconds into it, to `ends`; and the offset that is left, onto the pose."""
+    lasts, ends = transition.lasts[0], transition.ends
+    for n in range(transition.limbs.shape[0]):
+        limb_end(transition.limbs[n], pose, ends[n])
+        step_end(transition.limbs[n], transition.steps[n], at, lasts, ends[n])
+    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
+    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
+    add_offset(pose, transition.offset)
 
 
 @njit(forceinline=False)
@@ -119,12 +131,7 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     if since >= lasts:
         return
     at = min(since + s, lasts)
-    for n in range(limbs.shape[0]):
-        limb_end(limbs[n], pose, ends[n])
-        step_end(limbs[n], transition.steps[n], at, lasts, ends[n])
-    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
-    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
-    add_offset(pose, transition.offset)
+    _carry(transition, at, pose)
     x = min(max(at / lasts, 0.0), 1.0)
     pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
     share = smooth_step(min(at, lasts - at) / _GIVING) ** 2
@@ -142,13 +149,8 @@ def plan_depth(transition: Transition) -> None:
     transition.depth[0] = 0.0
     if transition.seconds == 0.0:
         return
-    at, depth = 0.5 * lasts, 0.0
-    for n in range(limbs.shape[0]):
-        limb_end(limbs[n], pose, ends[n])
-        step_end(limbs[n], transition.steps[n], at, lasts, ends[n])
-    offset_left(transition.change[:, :_ROOT], lasts, at, transition.offset[:_ROOT])
-    offset_left(transition.change[:, _ROOT:], lasts, at, transition.offset[_ROOT:], _SWING)
-    add_offset(pose, transition.offset)
+    depth = 0.0
+    _carry(transition, 0.5 * lasts, pose)
     for n in range(limbs.shape[0]):
         depth = max(depth, shortfall(limbs[n], transition.steps[n], pose, ends[n]))
     transition.depth[0] = min(depth, _FALLS * lasts**2)

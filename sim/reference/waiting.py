@@ -23,7 +23,7 @@ def stands(transition: Transition, pose: Array, rise: float) -> bool:
 
 @njit
 def leaps(transition: Transition, pose: Array) -> bool:
-    """Whether a pose is one of a flight that nobody begins in the middle of."""
+    """Whether a pose is one of a flight, in the middle of which no motion can begin."""
     return clearance(transition.limbs, transition.ends, pose) > _LEAPS
 
 

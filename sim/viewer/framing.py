@@ -1,4 +1,4 @@
-"""What keeps a replay in the picture: arrows of a length that fits, and a camera that goes with who travels."""
+"""What keeps a replay in the picture: arrows of a length that fits, and a camera that follows a figure that travels."""
 
 import numpy as np
 

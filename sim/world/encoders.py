@@ -16,7 +16,15 @@ from controllers.safety.faults import (
     latch,
     note_command,
 )
-from controllers.state import Array
+from controllers.state import (
+    HAND_ANGULAR_VELOCITY,
+    HAND_POSITION,
+    HAND_QUATERNION,
+    HAND_SWITCH,
+    HAND_TIME,
+    HAND_VELOCITY,
+    Array,
+)
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,
@@ -33,8 +41,8 @@ Angles = tuple[float, float, float]
 
 PEAK_TORQUE = PREMIUM_1_5.peak_torque
 FRICTION = PREMIUM_1_5.coulomb_friction
-MEMORY_SIZE = 13
-"""Last angles (6, the gimbal's unused) and filtered rates (6), 1 when initialised."""
+ANGLES, RATES, SENSED, MEMORY_SIZE = 0, 6, 12, 13
+"""The velocity filter's memory: last angles (6, the gimbal's unused), filtered rates (6), 1 once it was read."""
 SILENT_PERIODS = 5
 """Periods without reading or command after which the motors are off. At 1 kHz a hand of 0.5 m/s comes 2.5 mm by then,
 which is 1.3 N in a spring of 500 N/m; a bus or a system that is late by less is not worth a loss of force."""
@@ -97,18 +105,18 @@ def take_reading(
     """
     orientation = stylus_orientation(theta, gimbal)
     if verdict == RESTARTED:
-        memory[6:13] = 0.0
-        hand[11:14] = 0.0
-    if memory[12] == 0.0:
-        memory[12] = 1.0
+        memory[RATES:MEMORY_SIZE] = 0.0
+        hand[HAND_ANGULAR_VELOCITY:HAND_SWITCH] = 0.0
+    if memory[SENSED] == 0.0:
+        memory[SENSED] = 1.0
         for i in range(3):
-            memory[i] = theta[i]
+            memory[ANGLES + i] = theta[i]
         for i in range(4):
-            hand[4 + i] = orientation[i]
+            hand[HAND_QUATERNION + i] = orientation[i]
     for i in range(3):
-        memory[6 + i] = keep * memory[6 + i] + (1.0 - keep) * (theta[i] - memory[i]) / period
-        memory[i] = theta[i]
-    rate = (memory[6], memory[7], memory[8])
+        memory[RATES + i] = keep * memory[RATES + i] + (1.0 - keep) * (theta[i] - memory[ANGLES + i]) / period
+        memory[ANGLES + i] = theta[i]
+    rate = (memory[RATES], memory[RATES + 1], memory[RATES + 2])
     j = jacobian(theta)
     p_H = vector_to_hand_frame(forward_kinematics(theta))
     v_H = vector_to_hand_frame(
@@ -119,19 +127,20 @@ def take_reading(
         )
     )
     _turn_rate(hand, orientation, keep, period)
-    hand[0] = t
+    hand[HAND_TIME] = t
     for i in range(3):
-        hand[1 + i] = p_H[i]
-        hand[8 + i] = v_H[i]
+        hand[HAND_POSITION + i] = p_H[i]
+        hand[HAND_VELOCITY + i] = v_H[i]
     for i in range(4):
-        hand[4 + i] = orientation[i]
-    hand[14] = switch
+        hand[HAND_QUATERNION + i] = orientation[i]
+    hand[HAND_SWITCH] = switch
 
 
 @njit
 def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
     """Filter the angular velocity in H: 2 vec(q q_last*) / T, for the small turn of one period."""
-    w, x, y, z = hand[4], -hand[5], -hand[6], -hand[7]
+    last = HAND_QUATERNION
+    w, x, y, z = hand[last], -hand[last + 1], -hand[last + 2], -hand[last + 3]
     scalar = q[0] * w - q[1] * x - q[2] * y - q[3] * z
     sign = 2.0 / period if scalar >= 0.0 else -2.0 / period
     turn = (
@@ -140,7 +149,8 @@ def _turn_rate(hand: Array, q: tuple[float, float, float, float], keep: float, p
         q[0] * z + q[1] * y - q[2] * x + q[3] * w,
     )
     for i in range(3):
-        hand[11 + i] = keep * hand[11 + i] + (1.0 - keep) * sign * turn[i]
+        rate = HAND_ANGULAR_VELOCITY + i
+        hand[rate] = keep * hand[rate] + (1.0 - keep) * sign * turn[i]
 
 
 @njit
@@ -162,7 +172,7 @@ def motor_torques(faults: Array, memory: Array, t: float, force: Array, torque: 
     torque : Array
         Written [N m], shape (3,).
     """
-    theta = (memory[0], memory[1], memory[2])
+    theta = (memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2])
     wanted = joint_torques(theta, vector_to_device_frame((force[0], force[1], force[2])))
     weight = gravity_torques(theta)
     total = wanted[0] + wanted[1] + wanted[2]

@@ -5,10 +5,11 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import HELD, NO_SEQUENCE, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE, Array
+from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
 from models.phantom.kinematics import (
     encoder_reading,
     forward_kinematics,
@@ -20,7 +21,7 @@ from models.phantom.kinematics import (
 )
 from models.scene import PHANTOM
 from sim.errors import SimError
-from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
+from sim.world.encoders import ANGLES, MEMORY_SIZE, RATES, SENSED, motor_torques, plausibility, take_reading
 
 ARM_JOINTS = ("theta1", "theta2", "theta3")
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
@@ -126,7 +127,7 @@ def sense(port: PhantomPort, t: float, switch: float) -> None:
     # A simulated hand that holds on does not tremble; it presses the switch.
     verdict = judge_reading(port.faults, theta, gimbal, port.memory, t, t, NO_SEQUENCE, switch > 0.0)
     if verdict == HELD:
-        port.hand[0] = t
+        port.hand[HAND_TIME] = t
     else:
         take_reading(port.hand, port.memory, port.smoothing, elapsed(port.faults), theta, gimbal, t, switch, verdict)
 
@@ -136,21 +137,26 @@ def sense_in_motion(port: PhantomPort) -> None:
 
     Else a field takes the hand for one that rests, and pushes it on.
     """
-    a, g = port.arm_q, port.gimbal_q
-    for i in range(3):
-        port.memory[6 + i] = port.qvel[port.arm_v[i]]
-    theta = port.qpos[list(a)]
-    port.memory[:3] = encoder_reading.py_func(theta - port.period * port.memory[6:9])
-    port.hand[4:8] = stylus_orientation.py_func(
-        encoder_reading.py_func(theta), gimbal_reading.py_func(port.qpos[list(g)])
+    theta, rate = port.qpos[list(port.arm_q)], port.qvel[list(port.arm_v)]
+    orientation = stylus_orientation.py_func(
+        encoder_reading.py_func(theta), gimbal_reading.py_func(port.qpos[list(port.gimbal_q)])
     )
-    port.hand[0], port.memory[12] = -port.period, 1.0
+    sensed_before(port, encoder_reading.py_func(theta - port.period * rate), rate, orientation)
+    port.hand[HAND_TIME] = -port.period
+
+
+def sensed_before(
+    port: PhantomPort, theta: Array, rate: Array, orientation: npt.ArrayLike = (1.0, 0.0, 0.0, 0.0)
+) -> None:
+    """Let the velocity filter begin with angles and rates, shape (3,) each, and an orientation (wxyz)."""
+    port.memory[ANGLES : ANGLES + 3], port.memory[RATES : RATES + 3], port.memory[SENSED] = theta, rate, 1.0
+    port.hand[HAND_QUATERNION : HAND_QUATERNION + 4] = orientation
 
 
 @njit
 def has_sensed(port: PhantomPort) -> bool:
     """Whether `sense` has been called before."""
-    return port.memory[12] != 0.0
+    return port.memory[SENSED] != 0.0
 
 
 @njit(forceinline=True)
@@ -164,7 +170,7 @@ def actuate(port: PhantomPort, force: Array) -> None:
     force : Array
         In H [N], shape (3,).
     """
-    motor_torques(port.faults, port.memory, port.hand[0], force, port.torque)
+    motor_torques(port.faults, port.memory, port.hand[HAND_TIME], force, port.torque)
     for i in range(3):
         port.ctrl[port.motor[i]] = port.torque[i]
 

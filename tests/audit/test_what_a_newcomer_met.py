@@ -62,6 +62,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["convert"], "missing from hvf convert"),
         (["live", "--port", "99999999"], "--port is 99999999; expected less than 65536"),
         (["convert", "nowhere.bvh", "x.bvh"], "hvf: nowhere.bvh: cannot be opened (No such file or directory)"),
+        (["convert", "walk.bvh", "x.fbx"], "only BVH and glTF can be written; expected a name that ends in .bvh, .glb"),
         (["track", "nowhere.bvh"], "hvf: nowhere.bvh: cannot be opened (No such file or directory)"),
         (["run", "--clips", "nowhere.amc"], "hvf: nowhere.amc: cannot be opened (No such file or directory)"),
     ],

@@ -12,17 +12,18 @@ from controllers.haptic_map.lifting.cores import _WIDEST, core_points, draw_in
 TURN = 2.0 * np.pi
 
 
-def cores_at(sites, angle):
-    """b of all sites at an angle, by their control points."""
-    s = angle * len(sites) / TURN
-    return np.array(basis(s - int(s))) @ core_points(sites)[int(s) : int(s) + 4]
+def cores_at(points, angle):
+    """b of all sites at an angle, by their control points, of which the first three stand again at the end."""
+    s = angle * (len(points) - 3) / TURN
+    return np.array(basis(s - int(s))) @ points[int(s) : int(s) + 4]
 
 
 @pytest.mark.parametrize("m", [2, 4, 9, 40])
 def test_cores_do_not_overlap_and_are_as_wide_as_there_is_room(m):
     sites, shares = wandering(m), []
+    points = core_points(sites)
     for angle in np.linspace(0.0, TURN, 500, endpoint=False):
-        places, cores = round_lap(sites, angle), cores_at(sites, angle)
+        places, cores = round_lap(sites, angle), cores_at(points, angle)
         distance = np.linalg.norm(places[:, None] - places, axis=2) + np.diag(np.full(m, np.inf))
         assert (cores[:, None] + cores < distance).all()
         assert (cores <= _WIDEST + 1e-12).all()

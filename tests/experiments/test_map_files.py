@@ -1,6 +1,7 @@
 """Maps in files: they come back to the last bit, a file that is none is refused, and a run takes its map from one."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,37 +27,45 @@ from sim.errors import SimError
 from sim.recording.recorder import Group, Recorder
 from sim.world.world import World
 
-NAMES = ("walk", "angry", "jump")
-CLIPS = [(clip.poses, clip.fps) for clip in map(embedded, NAMES)]
-LEGS = figure_legs(World(SceneConfig()).figure)
 R, Z = (0.03, 0.06), (-0.02, 0.02)
 
 
+@cache
+def clips():
+    return [(clip.poses, clip.fps) for clip in map(embedded, ("walk", "angry", "jump"))]
+
+
+@cache
+def legs():
+    return figure_legs(World(SceneConfig()).figure)
+
+
+@cache
 def lifted():
     lap = np.arange(16)[:, None] * 2.0 * np.pi / 16
     around = np.arange(3) * 2.0 * np.pi / 3 + 0.2 * np.sin(lap)
     sites = np.stack([0.045 + 0.01 * np.cos(around), 0.01 * np.sin(around)], axis=-1)
-    angles = [np.linspace(0.0, 2.0 * np.pi, len(poses)) for poses, _ in CLIPS[:2]]
-    angles.append(np.linspace(0.2, 5.5, len(CLIPS[2][0])))
-    return Lifted(CLIPS, [True, True, False], angles, sites, LEGS, ("walk", "a/b", "../jump"))
+    angles = [np.linspace(0.0, 2.0 * np.pi, len(poses)) for poses, _ in clips()[:2]]
+    angles.append(np.linspace(0.2, 5.5, len(clips()[2][0])))
+    return Lifted(clips(), [True, True, False], angles, sites, legs(), ("walk", "a/b", "../jump"))
 
 
 def swaying():
-    h_map = Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS)
+    h_map = Cylindrical([*clips(), clips()[0]], R, Z, legs())
     return h_map.with_sway(np.random.default_rng(3).normal(scale=0.01, size=(24, len(h_map.mixtures), 2)))
 
 
-MAPS = [
-    swaying(),
-    Composite(*CLIPS, (1, 2, 3), R, LEGS, apart=True).with_share(0.5),
-    lifted(),
-    Cylindrical([*CLIPS, CLIPS[0]], R, Z, LEGS, upper=(3, 4), legs_of=2).with_share(0.25),
-]
+def apart():
+    return Composite(*clips(), (1, 2, 3), R, legs(), apart=True).with_share(0.5)
 
 
-@pytest.mark.parametrize("haptic_map", MAPS, ids=lambda m: type(m).__name__)
-def test_a_map_comes_back_from_its_file_to_the_last_bit(haptic_map, tmp_path):
-    path = tmp_path / "map.npz"
+def upper_body():
+    return Cylindrical([*clips(), clips()[0]], R, Z, legs(), upper=(3, 4), legs_of=2).with_share(0.25)
+
+
+@pytest.mark.parametrize("made", [swaying, apart, lifted, upper_body])
+def test_a_map_comes_back_from_its_file_to_the_last_bit(made, tmp_path):
+    haptic_map, path = made(), tmp_path / "map.npz"
     save_map(haptic_map, path)
     again = load_map(path)
     assert type(again) is type(haptic_map)
@@ -69,7 +78,7 @@ def test_a_map_comes_back_from_its_file_to_the_last_bit(haptic_map, tmp_path):
 
 def test_a_damaged_file_is_refused_by_name(tmp_path):
     whole, damaged = tmp_path / "whole.npz", tmp_path / "damaged.npz"
-    save_map(MAPS[2], whole)
+    save_map(lifted(), whole)
     data, rng = whole.read_bytes(), np.random.default_rng(1)
     for _ in range(40):
         cut = int(rng.integers(len(data)))
@@ -86,7 +95,7 @@ def test_a_damaged_file_is_refused_by_name(tmp_path):
             again = load_map(damaged)
         except SimError:
             continue
-        np.testing.assert_array_equal(again.compiled().params, MAPS[2].compiled().params)
+        np.testing.assert_array_equal(again.compiled().params, lifted().compiled().params)
 
 
 def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
@@ -108,7 +117,7 @@ def test_a_file_of_something_else_is_refused_with_what_it_is(tmp_path):
 
 @pytest.mark.parametrize("key", ["clip/walk/fps", "closed/a/b", "sites", "limb/1/axis", "margin", "angles/../jump"])
 def test_a_map_without_one_of_its_arrays_is_refused(key, tmp_path):
-    path, arrays = tmp_path / "map.npz", MAPS[2].arrays()
+    path, arrays = tmp_path / "map.npz", lifted().arrays()
     del arrays[key]
     write_archive(path, "Lifted", arrays)
     with pytest.raises(SimError, match=f"the map lacks '{key}'"):
@@ -134,16 +143,16 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
 
 def test_a_run_takes_its_map_and_its_clips_from_a_file(tmp_path):
     path = tmp_path / "map.npz"
-    save_map(MAPS[2], path)
+    save_map(lifted(), path)
     session = wire(run_config(map=str(path), seconds=1.0))
     assert [clip.name for clip in session.clips] == ["walk", "a/b", "../jump"]
-    np.testing.assert_array_equal(session.haptic_map.compiled().params, MAPS[2].compiled().params)
+    np.testing.assert_array_equal(session.haptic_map.compiled().params, lifted().compiled().params)
     assert any("clips are those of the map: walk, a/b" in remark for remark in session.remarks)
 
 
 def test_a_map_of_something_else_than_the_figure_is_refused(tmp_path):
     path = tmp_path / "map.npz"
-    small = [(np.ascontiguousarray(poses[:, :19]), fps) for poses, fps in CLIPS]
+    small = [(np.ascontiguousarray(poses[:, :19]), fps) for poses, fps in clips()]
     save_map(Cylindrical([*small, small[0]], R, Z), path)
     with pytest.raises(SimError, match="its poses have 19 numbers, the figure's have 75"):
         load_figure_map(path)

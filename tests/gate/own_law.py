@@ -11,9 +11,9 @@ from controllers.fields.follow import Follow
 from controllers.fields.python_law import PythonLaw
 from controllers.state import HandState
 from experiments.config.words import run_config
-from experiments.setups.own_law import loop_with
 from sim.loop.loop import groups, record_into
 from sim.recording.recorder import Recorder
+from tests.loop_with_law import loop_with
 
 
 def wall(hand: HandState) -> np.ndarray:

@@ -7,8 +7,8 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
 from experiments.config.words import run_config
-from experiments.setups.own_law import loop_with
 from sim.users.intent import Push
+from tests.loop_with_law import loop_with
 
 CURVE = Trajectory.circle(0.0477, 4.0)
 

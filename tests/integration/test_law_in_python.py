@@ -8,9 +8,9 @@ from controllers.fields.follow import Follow
 from controllers.fields.own_law import law
 from controllers.fields.python_law import PythonLaw
 from experiments.config.words import run_config
-from experiments.setups.own_law import loop_with
 from sim.errors import SimError
 from sim.loop.loop import Loop
+from tests.loop_with_law import loop_with
 
 CONFIG = run_config(clips=("cheer", "angry"), seconds=0.2)
 AROUND, MODE = CONFIG.map.around, CONFIG.mode

@@ -16,6 +16,11 @@ from sim.compilation.deferred_codegen import TESTED, UnitLibrary, install, undef
 VECTOR = types.Array(types.float64, 1, "C")
 
 
+@pytest.fixture(autouse=True)
+def nothing_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
+
+
 @njit
 def _halved(x):
     if x < 0.0:

@@ -10,10 +10,10 @@ from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
 from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
 from experiments.setups.hands import lap_pushes
-from experiments.setups.own_law import loop_with
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
 from sim.users.intent import Push
+from tests.loop_with_law import loop_with
 
 CLIPS = ("cheer", "angry")
 CONFIG = run_config(clips=CLIPS, seconds=1.0)

@@ -166,11 +166,6 @@ def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str,
     }  # fmt: skip
 
 
-def turn_speed(radius: Array, friction: float) -> Array:
-    """Greatest speed in a turn [m/s], √(μ g r), for radii [m] of any shape."""
-    return np.sqrt(friction * GRAVITY * radius)
-
-
 def turn_rate(speed: Array, friction: float) -> Array:
     """Greatest rate of turning [rad/s] at speeds [m/s] of any shape: μ g / v, infinite at rest."""
     return np.where(speed > 0.0, friction * GRAVITY / np.maximum(speed, 1e-12), np.inf)

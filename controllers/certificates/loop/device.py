@@ -1,4 +1,4 @@
-"""What a certificate knows of a device; its kernels are handed over by who knows it."""
+"""What a certificate knows of a device; the caller hands over the device's kernels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -34,14 +34,12 @@ class TubeBounds(NamedTuple):
         Of the weight at the tip [N/m].
     drag : float
         Viscous friction in the metric [1/s].
-    coulomb, coulomb_metric : float
-        Coulomb friction at the tip [N], and in the metric [N/√kg].
+    coulomb : float
+        Coulomb friction at the tip [N].
     rounding : float
         How far the encoders' rounding moves the tip [m].
     motor_force : float
         Force that the motors give in any direction, the weight carried [N].
-    boxes : int
-        That cover the tube.
     """
 
     mass_low: float
@@ -52,10 +50,8 @@ class TubeBounds(NamedTuple):
     weight_slope: float
     drag: float
     coulomb: float
-    coulomb_metric: float
     rounding: float
     motor_force: float
-    boxes: int
 
 
 def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
@@ -110,10 +106,8 @@ def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
         weight_slope=sup(back.T @ ca.jacobian(vector(device.gravity(theta)), theta) @ back),
         drag=sup(unit @ ca.diag(ca.DM(device.viscous)) @ unit.T),
         coulomb=float(np.linalg.norm(magnitude(back.T) @ friction, axis=1).max()),
-        coulomb_metric=float(np.linalg.norm(magnitude(unit) @ friction, axis=1).max()),
         rounding=float(np.linalg.norm(levers @ (0.5 * np.array(device.encoder_step)), axis=1).max()),
         motor_force=float((room / np.linalg.norm(levers, axis=1).max(axis=0)).min()),
-        boxes=len(low),
     )
 
 

@@ -1,1 +1,1 @@
-"""Certificates of crossing rivers: who keeps the hand, and how often that can change."""
+"""Certificates of crossing rivers: which one keeps the hand, and how often that can change."""

@@ -1,4 +1,4 @@
-r"""Cores of curves: a hand near a curve plays the curve's clip, whatever a tremor or a filter does to it sideways.
+r"""Cores of curves: near a curve the map plays that curve's clip alone, so tremor across the curve does not matter.
 
 Before places are weighed, one at q within the core b_i(θ) of a site q_i(θ) is drawn in towards it:
 

@@ -159,7 +159,7 @@ def _compared(own: list[Features], phases: list[Phase], laps: Array) -> Comparis
             moments.append(each.at(np.mod(s, 1.0)))
             inside.append(np.ones(SAMPLES, dtype=np.bool_))
             continue
-        # In the gap an open clip goes from its end to its start, and what it is then is nobody's transition.
+        # In the gap an open clip goes from its end to its start, which is no transition.
         back = np.clip((s - 1.0) * (1.0 - phase.gap) / phase.gap, 0.0, 1.0)
         moments.append(each.at(np.where(s <= 1.0, np.clip(s, 0.0, 1.0), 1.0 - back)))
         inside.append(s <= 1.0)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from models.arrays import Array
-from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
+from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap import quaternions
+from models.mocap.clip import global_rotations
 
 _REACH = 0.9995  # share of a leg's length that a knee can straighten to
 _CHAINS = tuple(
@@ -15,7 +16,7 @@ _CHAINS = tuple(
 def leg_lines(poses: Array) -> tuple[Array, float]:
     """From hips to ankles in the world [m], left and right, shape (n, 2, 3), and the length of a straight leg [m]."""
     thigh, shank = _bones()
-    segments = _segment_rotations(poses)
+    segments = global_rotations(poses)
     lines = [
         quaternions.rotated(segments[:, first], thigh) + quaternions.rotated(segments[:, second], shank)
         for first, second, _ in _CHAINS
@@ -43,7 +44,7 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
     """
     thigh, shank = _bones()
     a, b = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
-    segments = _segment_rotations(poses)
+    segments = global_rotations(poses)
     moved = poses.copy()
     moved[:, :3] += shift
     for leg, (first, second, third) in enumerate(_CHAINS):
@@ -76,16 +77,6 @@ def _bones() -> tuple[Array, Array]:
     """Thigh and shank in their own frames [m]."""
     model = figure_model()
     return model.body("left_shank").pos, model.body("left_foot").pos
-
-
-def _segment_rotations(poses: Array) -> Array:
-    """R_WS of the 18 segments, shape (n, 18, 4)."""
-    local = poses[:, 3:].reshape(len(poses), -1, 4)
-    world = local.copy()
-    for index, segment in enumerate(SEGMENTS):
-        if segment.parent >= 0:
-            world[:, index] = quaternions.product(world[:, segment.parent], local[:, index])
-    return world
 
 
 def _turn(axis: Array, angle: Array) -> Array:

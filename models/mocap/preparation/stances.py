@@ -1,7 +1,7 @@
 r"""Which parts of the soles stand when and where: the contact schedule of a capture, from its soles and its load.
 
-Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Nobody
-rests on the heels: toes at rest stand with them. Where nothing stands but the centre of mass accelerates as if
+Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Toes
+at rest stand with the heels. Where nothing stands but the centre of mass accelerates as if
 something did, captures slide or hover: the stance next to it lasts longer, on its toes after it and on what is lower
 before it; where there is none, the lowest part of the feet bears, and slides.
 """

@@ -1,4 +1,4 @@
-"""How well-formed a clip is: everything that what comes after may rely on, measured and said.
+"""How well-formed a clip is: what its users rely on, measured and reported.
 
 The bounds are those of DESIGN 4.12; `WellFormed.faults` names what is not within them.
 """

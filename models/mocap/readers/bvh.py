@@ -1,4 +1,4 @@
-"""BVH: a reader for anybody's files."""
+"""BVH: a reader for files of any program."""
 
 import re
 from array import array

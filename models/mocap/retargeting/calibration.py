@@ -27,7 +27,7 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap import quaternions
 from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
-from models.mocap.retargeting.skeleton_roles import Roles
+from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 _Z = np.array([0.0, 0.0, 1.0])
 _STRAIGHT = np.deg2rad(20.0)  # angle between trunk and thighs, beyond the least, at which a frame counts 0.6 as neutral
@@ -108,7 +108,7 @@ def calibrate(
         if index is None:
             return None
         end = roles.ends.get(body)
-        if end is not None and body != "foot" and index in _ancestry(parents[end], parents):
+        if end is not None and body != "foot" and index in ancestry(parents[end], parents):
             index = parents[end]
         return rotations[:, index]
 
@@ -177,7 +177,7 @@ def _own_trunk(has_arms: bool) -> Array:
 def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
     """R of the head: level on the average of the frames in which the body is upright, looking where the chest does.
 
-    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). Somebody who never is upright looks ahead.
+    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). A body that is never upright looks ahead.
     """
     upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
     if upright.sum() < 1e-6:
@@ -318,10 +318,3 @@ def _arcs(u: Array, v: Array) -> Array:
     aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
     q = np.where(length > 1e-9, q, np.concatenate([np.zeros((len(u), 1)), aside], axis=1))
     return q / np.linalg.norm(q, axis=1, keepdims=True)
-
-
-def _ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
-    chain = [joint]
-    while parents[chain[-1]] >= 0:
-        chain.append(parents[chain[-1]])
-    return chain

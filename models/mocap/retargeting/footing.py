@@ -119,7 +119,7 @@ def _floor(heights: Array) -> float:
     lower = np.argmin(heights.min(axis=2), axis=1)
     sole = heights[np.arange(len(heights)), lower]
     level = np.ptp(sole, axis=1) < _LEVEL
-    # Somebody who never puts a foot down flat stands on the lowest points instead.
+    # Where no foot is ever put down flat, the lowest points are taken instead.
     return float(np.quantile(sole[level].mean(axis=1) if level.any() else sole.min(axis=1), _SHARE))
 
 

@@ -81,7 +81,7 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
                  ("thigh", named.get(f"{side}_shank")), ("shank", named.get(f"{side}_foot")),
                  ("foot", named.get(f"{side}_toe")))  # fmt: skip
         for part, end in chain:
-            if end is not None and segments.get(f"{side}_{part}") in _ancestry(end, parents)[1:]:
+            if end is not None and segments.get(f"{side}_{part}") in ancestry(end, parents)[1:]:
                 ends[f"{side}_{part}"] = end
     for part in ("left_thigh", "right_thigh"):
         if part not in ends:
@@ -129,7 +129,7 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
         for part, aliases in _SIDED.items():
             find(f"{side}_{part}", side, aliases)
         ankle, foot = bases.get((side, "ankle")), bases.get((side, "foot"))
-        if ankle is not None and foot is not None and ankle in _ancestry(foot, parents):
+        if ankle is not None and foot is not None and ankle in ancestry(foot, parents):
             # SMPL's foot is the ball of the foot.
             found[f"{side}_foot"] = ankle
             found.setdefault(f"{side}_toe", foot)
@@ -139,7 +139,8 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
     return found
 
 
-def _ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
+def ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
+    """A joint, its parent, and so on up to the root."""
     chain = [joint]
     while parents[chain[-1]] >= 0:
         chain.append(parents[chain[-1]])
@@ -148,13 +149,13 @@ def _ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
 
 def _meeting_point(one: int, other: int, parents: tuple[int, ...]) -> int | None:
     """The nearest joint above both, neither of the two itself."""
-    above = set(_ancestry(other, parents)[1:])
-    return next((joint for joint in _ancestry(one, parents)[1:] if joint in above), None)
+    above = set(ancestry(other, parents)[1:])
+    return next((joint for joint in ancestry(one, parents)[1:] if joint in above), None)
 
 
 def _path(top: int, bottom: int, parents: tuple[int, ...]) -> list[int]:
     """Joints from below `top` down to `bottom`; none where `bottom` is not below it."""
-    chain = _ancestry(bottom, parents)
+    chain = ancestry(bottom, parents)
     return chain[: chain.index(top)][::-1] if top in chain else []
 
 

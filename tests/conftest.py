@@ -1,0 +1,61 @@
+"""What all tests share: one thread of BLAS a process, and kernels on disk.
+
+Tests run side by side, a process a core; further threads of BLAS only spin, and lifting four clips took five times the
+processor time. A run compiles its kernels as parts of a few units; a test that calls one by itself would compile it
+anew in each process: such kernels are kept on disk between processes, as units are.
+"""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+from experiments import started  # noqa: F401 - before NumPy is imported
+
+# isort: split
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
+
+from sim.compilation.deferred_codegen import is_nested
+from sim.compilation.unit_cache import UnitCache
+from sim.compilation.unit_key import UnknownIngredient
+
+
+class _BesideUnits(UnitCache):
+    """In a folder of its own, for tests count the files of units."""
+
+    def path(self, signature: Any) -> Path:
+        path = super().path(signature)
+        return path.parent / "kernels" / path.name
+
+
+class _Kept(NullCache):
+    """Keeps a kernel where a key can be made of it; no `UnitCache` itself, so nobody takes the kernel for a unit."""
+
+    def __init__(self, kernel: Dispatcher):
+        self._kernels = _BesideUnits(kernel.py_func, kernel.targetoptions)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return self._kernels.load_overload(sig, target_context)
+        except UnknownIngredient:
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of kernels that hold an address, which are not kept
+            try:
+                self._kernels.save_overload(sig, data)
+            except UnknownIngredient:
+                return
+
+
+_compile = Dispatcher.compile
+
+
+def _compile_or_load(self: Any, signature: Any) -> Any:
+    if type(self._cache) is NullCache and not is_nested():
+        self._cache = _Kept(self)
+    return _compile(self, signature)
+
+
+Dispatcher.compile = _compile_or_load
