@@ -83,7 +83,7 @@ class Database:
         elif held[0] != identity:
             raise StudyError(
                 f"{self._path}: holds another study, {held[1]!r}, or this one before it was changed; give another "
-                "--out, or the study file as it lies beside it"
+                "--out, or the study as it is in the database (table study, column text)"
             )
 
     def add(self, row: Row, what: Mapping[str, object]) -> None:

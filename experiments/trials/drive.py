@@ -79,8 +79,12 @@ def run_missing(
     )  # fmt: skip
     failed = 0
     rows = executor.rows(Task(trial.key, to_json(trial.config), recordings) for trial in missing)
+    before = len(trials) - len(missing)
+    if recordings and before:
+        console.print(f"{before} trials ran before; only those that run now are recorded for certain")
     with Progress(*columns, console=console, speed_estimate_period=60.0) as progress:
-        bar = progress.add_task("", total=len(trials), completed=len(trials) - len(missing), failed="none failed")
+        bar = progress.add_task("", total=len(trials), completed=before, failed="none failed")
+        progress.advance(bar, 0)  # the first sample of its time, from which a rate is told
         for row in rows:
             database.add(row, what[row.key])
             failed += row.state == "failed"

@@ -19,8 +19,9 @@ from experiments.trials.database import Database
 from experiments.trials.drive import run_missing, warm
 from experiments.trials.errors import StudyError
 from experiments.trials.executors import executor
-from experiments.trials.measures import MEASURES, measures_of
+from experiments.trials.measures import MEASURES, OF_CONDITIONS, measures_of
 from experiments.trials.plan import Trial, planned
+from experiments.trials.recordings_place import check_place
 from experiments.trials.run_trial import SHELF, Row
 from experiments.trials.study_config import StudyConfig, read_toml, study_from
 from experiments.trials.where import Where
@@ -141,11 +142,14 @@ class Study:
             Where(threads=threads, workers=workers, cluster=cluster),
         )
         measures, trials = self._measures(), self.trials
+        if self.config.recordings:
+            check_place(self.config.recordings)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             warm((trial.config for trial in trials), SHELF, console)
             with executor(where) as runs:
                 ran = run_missing(trials, database, runs, self.config.recordings, console, _told(trials))
-            rows = {row.key: row for row in database.rows()}
+            planned_keys = {trial.key for trial in trials}
+            rows = {row.key: row for row in database.rows() if row.key in planned_keys}
         frame = table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})
         write_table(frame, folder)
         return self._report(folder, frame, rows, ran, console)
@@ -177,6 +181,9 @@ class Study:
         kinds = {trial.config.figure.kind for trial in planned(replace(config, repetitions=1))}
         there = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
         unasked = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure need not have the defaults
+        for word, name in (("ease", config.ease), ("cost", config.cost)):
+            if name in OF_CONDITIONS:
+                raise StudyError(f"study {config.name!r}: {word} = {name!r} is of a condition; expected one of a trial")
         for name in (*config.measures, config.ease, config.cost):
             if name not in MEASURES:
                 raise StudyError(f"study {config.name!r}: no measure {name!r}; there are {', '.join(MEASURES)}")

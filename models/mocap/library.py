@@ -1,6 +1,6 @@
 """Clips by name or from files: `load_clip` for any format, `embedded` for those of the package."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -134,7 +134,7 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
 
 
 @contextmanager
-def writing(target: Path) -> Iterator[None]:
+def writing(target: Path) -> Generator[None]:
     """Say of a file that cannot be written which one, and why.
 
     Raises

@@ -146,7 +146,7 @@ def sense_in_motion(port: PhantomPort) -> None:
 
 
 def sensed_before(
-    port: PhantomPort, theta: Array, rate: Array, orientation: npt.ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    port: PhantomPort, theta: npt.ArrayLike, rate: npt.ArrayLike, orientation: npt.ArrayLike = (1.0, 0.0, 0.0, 0.0)
 ) -> None:
     """Let the velocity filter begin with angles and rates, shape (3,) each, and an orientation (wxyz)."""
     port.memory[ANGLES : ANGLES + 3], port.memory[RATES : RATES + 3], port.memory[SENSED] = theta, rate, 1.0

@@ -100,9 +100,9 @@ class Report:
 
 def _table(contrasts: Sequence[Contrast]) -> str:
     head = "".join(
-        f"<th{' class=l' if name in ('level', 'against') else ''}>{name}</th>"
-        for name in ("measure", "level", "against", "mean", "reference", "difference", "model", "p", "p Holm", "effect",
-                     "users")
+        f"<th{' class=l' if name in ('factor', 'level', 'against') else ''}>{name}</th>"
+        for name in ("measure", "factor", "level", "against", "mean", "reference", "difference", "model", "p", "p Holm",
+                     "effect", "users")
     )  # fmt: skip
     return f"<table><tr>{head}</tr>{''.join(_row(contrast) for contrast in contrasts)}</table>"
 
@@ -115,8 +115,8 @@ def _row(c: Contrast) -> str:
     )  # fmt: skip
     weak = "" if c.shown else " class=weak"
     cells = "".join(f"<td>{number}</td>" for number in numbers)
-    names = f"<td>{html.escape(MEASURES[c.measure].label)}</td><td class=l>{html.escape(c.level)}</td>"
-    return f"<tr{weak}>{names}<td class=l>{html.escape(c.reference)}</td>{cells}</tr>"
+    levels = "".join(f"<td class=l>{html.escape(name)}</td>" for name in (c.factor, c.level, c.reference))
+    return f"<tr{weak}><td>{html.escape(MEASURES[c.measure].label)}</td>{levels}{cells}</tr>"
 
 
 def _between(value: float, low: float, high: float) -> str:

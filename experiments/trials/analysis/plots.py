@@ -53,9 +53,8 @@ def effects_figure(found: Statistics, factor: str) -> Figure | None:
     axis.invert_yaxis()
     axis.axvline(0.0, color="#333", lw=0.8)
     axis.set_xscale("symlog", linthresh=1.0)
-    axis.set_xlabel(
-        f"d_z or g, from {contrasts[0].reference!r} (linear within ±1; large where simulated users are alike)"
-    )
-    axis.legend(frameon=False, fontsize=9)
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_xlabel(f"d_z or g, from {contrasts[0].reference!r}\n(linear within ±1; large where users are alike)")
+    figure.legend(loc="outside upper center", ncols=min(4, len(levels)), frameon=False, fontsize=9)
     axis.grid(axis="x", alpha=0.3)
     return figure

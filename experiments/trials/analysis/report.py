@@ -1,7 +1,7 @@
 """The analysis of a study's table, written: contrasts, plots, replays, and the page with all of it."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from experiments.trials.analysis.page import Report
 from experiments.trials.analysis.plots import effects_figure, levels_figure
 from experiments.trials.analysis.replays import replays
 from experiments.trials.analysis.sentences import three_sentences
-from experiments.trials.analysis.statistics import Statistics, statistics
+from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.analysis.tidy import measured_columns
 from experiments.trials.measures import MEASURES, OF_CONDITIONS
 from experiments.trials.plan import Trial
@@ -42,17 +42,18 @@ def write_report(
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()
-    sentences = three_sentences(study, found, len(frame), int(failures.sum()))
+    sentences = three_sentences(study, found, frame, int(failures.sum()))
     factor, *rest = factors
     plots = {
         MEASURES[measure].says: levels_figure(frame, factor, factors[factor], rest, measure)
         for measure in dict.fromkeys((study.ease, study.cost)) if measure in measures
     }  # fmt: skip
-    shown = replays(tuple(trials), frame, study.ease) if study.ease in measures else ()
+    shown_by = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
+    shown = replays(tuple(trials), frame, shown_by) if shown_by else ()
     counts = {str(reason): int(count) for reason, count in failures.items()}
     page = Report(study, text, sentences, found, plots, effects_figure(found, factor), counts, shown, made).page()
     path.write_text(page, encoding="utf-8")
-    pd.DataFrame.from_records([asdict(contrast) for contrast in found.contrasts]).to_csv(
-        path.with_name(_CONTRASTS), index=False
-    )
+    rows = [asdict(contrast) for contrast in found.contrasts]
+    columns = [field.name for field in fields(Contrast)]
+    pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS), index=False)
     return found, sentences

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from experiments.trials.analysis.effect_sizes import ALIKE
 from experiments.trials.analysis.statistics import Contrast, Statistics
@@ -9,28 +10,48 @@ from experiments.trials.measures import MEASURES
 from experiments.trials.study_config import StudyConfig
 
 
-def three_sentences(study: StudyConfig, found: Statistics, trials: int, failed: int) -> tuple[str, str, str]:
-    """Who did what; whether the first factor made it easier; and what that cost."""
+def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: int) -> tuple[str, str, str]:
+    """Who did what; whether the first factor made it easier; and what that cost.
+
+    Parameters
+    ----------
+    study, found : StudyConfig, Statistics
+        The study, and its contrasts.
+    frame : pandas.DataFrame
+        Of `experiments.trials.analysis.tidy.table`.
+    failed : int
+        Trials that failed.
+    """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
     ended = "all of which came to their end" if not failed else f"of which {failed} failed"
     first = (
-        f"{study.users.number} simulated people met {counts} conditions ({', '.join(study.factors)}), "
-        f"{_times(study.repetitions)} each: {trials} trials of {study.seconds:g} s, {ended}."
+        f"{_people(study.users.number)} met {counts} conditions ({', '.join(study.factors)}), "
+        f"{_times(study.repetitions)} each: {len(frame)} trials of {study.seconds:g} s, {ended}."
     )
-    return (
-        first,
-        _answer(found.of(study.ease, factor), study.ease, factor),
-        _answer(found.of(study.cost, factor), study.cost, factor),
+    ease, cost = (
+        _answer(found.of(measure, factor), measure, factor, _unknown(frame, measure))
+        for measure in (study.ease, study.cost)
     )
+    return first, ease, cost
 
 
-def _answer(contrasts: Sequence[Contrast], measure: str, factor: str) -> str:
+def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, unknown: str) -> str:
     name = MEASURES[measure].name.replace("_", " ")
     if not contrasts:
-        return f"Of {name}, nothing can be said: it was not measured, or did not differ."
+        return f"Of {name}, nothing can be said: {unknown}."
     told = "; ".join(_compared(contrast) for contrast in contrasts)
     return f"{name[0].upper()}{name[1:]}, by {factor}: {told}."
+
+
+def _unknown(frame: Any, measure: str) -> str:
+    """Why nothing is known of a measure of which there is no contrast."""
+    if measure not in frame:
+        return f"it needs a {MEASURES[measure].figure} figure"
+    values = frame.loc[frame["state"].eq("done"), measure].dropna()
+    if not len(values):
+        return "no trial has it"
+    return "it was the same in all trials" if values.nunique() == 1 else "no level has both it and one to hold against"
 
 
 def _compared(c: Contrast) -> str:
@@ -53,6 +74,10 @@ def _compared(c: Contrast) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.3g}"
+
+
+def _people(count: int) -> str:
+    return "One simulated person" if count == 1 else f"{count} simulated people"
 
 
 def _times(count: int) -> str:

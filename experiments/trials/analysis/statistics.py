@@ -123,7 +123,7 @@ def statistics(
     remarks: dict[str, list[str]] = {}
     for measure in measures:
         rows = frame[frame["state"].eq("done") & frame[measure].notna()]
-        if len(rows) < 3 or not np.ptp(rows[measure].to_numpy()) > 0.0:
+        if len(rows) < 2 or not np.ptp(rows[measure].to_numpy()) > 0.0:
             continue
         varied = [name for name in factors if rows[name].nunique() > 1]
         cells_of[measure] = cells = rows.groupby([*varied, "user"])[measure].mean()

@@ -90,10 +90,37 @@ def test_failed_trials_are_left_out_and_told() -> None:
         "",
     )
     found = statistics(made, FACTORS, (), ["tracking_error", "effort"], 1)
-    said = three_sentences(study, found, len(made), 1)
+    said = three_sentences(study, found, made, 1)
     assert "of which 1 failed" in said[0]
     assert said[1].startswith("Tracking error, by guidance: lower (better) with river than with none")
     assert "no difference shown between river and none" in said[2]
+
+
+def test_what_is_not_known_is_said_with_its_reason() -> None:
+    made = frame(-1.0)
+    made["effort"], made["sparc"] = 2.0, np.nan
+    told = {
+        "expressiveness": "needs a kinematic figure",
+        "effort": "the same in all trials",
+        "sparc": "no trial has it",
+    }
+    for cost, reason in told.items():
+        study = study_from(
+            {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}}, "cost": cost, "users": {"number": 1}}, ""
+        )
+        found = statistics(made, FACTORS, (), ["effort", "sparc"], 1)
+        first, _, said = three_sentences(study, found, made, 0)
+        assert reason in said
+        assert first.startswith("One simulated person met 2 conditions")
+
+
+def test_two_trials_that_differ_are_compared_without_an_interval() -> None:
+    made = frame(-1.0)
+    two = made[(made["user"] == 0) & (made["map"] == "a")].drop_duplicates("guidance")
+    (river,) = statistics(two, FACTORS, (), ["tracking_error"], 1).contrasts
+    assert river.users == 1
+    assert np.isnan(river.low)
+    assert river.difference == pytest.approx(river.mean - river.reference_mean)
 
 
 def test_repetitions_of_a_user_do_not_count_as_users() -> None:

@@ -106,6 +106,18 @@ def test_recordings_are_kept_where_they_are_asked_for(tmp_path: Path) -> None:
     assert row.measures == perform(Task(trial.key, to_json(trial.config))).measures
 
 
+def test_a_place_that_cannot_keep_recordings_is_said_before_the_first_trial(tmp_path: Path) -> None:
+    pytest.importorskip("fsspec")
+    with pytest.raises(StudyError, match=r"recordings = 'nosuch://x'.*a folder, or a URL"):
+        small(recordings="nosuch://x").run(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_condition_is_no_measure_of_ease(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="ease = 'margin_used' is of a condition"):
+        small(ease="margin_used", measures=[]).run(tmp_path / "out")
+
+
 def test_smoothness_is_of_the_code_that_a_key_is_of() -> None:
     from experiments.trials import code_hash
 
