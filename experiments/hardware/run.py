@@ -131,8 +131,8 @@ def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
         If it is not there, or may not be armed.
     """
     if options.name != EMULATED:
-        check_there(options.name)
         check_limits(options)
+        check_there(options.name)
     if options.certificate is not None:
         found = verified(options.certificate, config, options.delay)
         console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)

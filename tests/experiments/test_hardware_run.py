@@ -62,7 +62,8 @@ def test_nobody_at_the_terminal_and_no_arm_is_refused(tmp_path: Path, capsys) ->
     assert not (tmp_path / "run").exists()
 
 
-def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys) -> None:
+def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
     said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
     assert "expected --certificate" in said
 
@@ -191,7 +192,9 @@ def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_s
 
 
 def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
-    device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)  # it falls
+    device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)
+    for _ in range(50):  # it falls
+        device.write(np.zeros(3), False)
     with pytest.raises(SimError, match="hold the stylus still"):
         still_readings(device, 0.3)
 
