@@ -1,5 +1,6 @@
 """`hvf hardware`: what a person, and a program, is told where nothing is connected."""
 
+import errno
 import json
 
 import pytest
@@ -83,6 +84,15 @@ def test_a_pose_at_which_no_phantom_can_stand_is_refused(capsys, tmp_path, pose)
 def test_seconds_that_are_none_are_refused(capsys) -> None:
     assert main(["hardware", "doctor", "--seconds", "0"]) == 2
     assert "seconds" in capsys.readouterr().err
+
+
+def test_a_disk_that_is_full_is_a_line(monkeypatch, capsys) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(hardware_list, "found_devices", full)
+    assert main(["hardware", "list"]) == 2
+    assert capsys.readouterr().err == "hvf: the disk is full; expected room on it, or another --out\n"
 
 
 def test_hidapi_that_is_not_installed_is_a_line(monkeypatch, capsys) -> None:
