@@ -5,6 +5,7 @@ from experiments import started  # noqa: F401  # pyright: ignore[reportUnusedImp
 # isort: split
 
 import contextlib
+import errno
 import io
 import itertools
 import os
@@ -57,12 +58,18 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"hvf: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        said = f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else error
-        print(f"hvf: {said}", file=sys.stderr)
+        print(f"hvf: {_by_the_system(error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"hvf: stopped; {_kept(command)}", file=sys.stderr)
         return 130
+
+
+def _by_the_system(error: OSError) -> str:
+    """What the system refused; a write to a full disk does not tell its file."""
+    if error.errno == errno.ENOSPC:
+        return "the disk is full; expected room on it, or another --out"
+    return f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else str(error)
 
 
 def _kept(command: Any) -> str:

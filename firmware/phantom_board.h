@@ -6,7 +6,7 @@
 
 void board_begin(hvf_identity *identity, hvf_calibration *calibration, uint16_t *boot);
 int board_period(void);                         /* 1 once a period, at its beginning, else 0; -1 to end (never, on a board) */
-uint64_t board_time_us(void);                   /* since power-up */
+uint64_t board_time_us(void);                   /* since power-up; a timer of 32 bits has to be extended: it wraps after 71 minutes */
 void board_sense(hvf_sensors *sensors);         /* encoders latched at once, temperatures, switch, faults, time */
 void board_drive(const hvf_motors *motors);     /* current = torque / k_t; the amplifiers' enable line follows `on` */
 size_t board_receive(uint8_t *bytes, size_t n); /* an output or feature report if one has come, else 0 */

@@ -10,6 +10,7 @@ whoever drives the device read; it is recorded tick by tick.
 | rate impossible | :math:`|\theta_k - \theta_{k-1}| > \omega_{max}\,\Delta t + 2\,\delta`, δ a count of the encoder |
 | stale | a device that numbers its readings has given no new one for longer than the silence |
 | frozen | no encoder counted for longer than `still`, under a torque over `still_load` times a joint's friction |
+| clock back | a reading is numbered after the last one, and made before it |
 | ended | a replayed hand has no more rows |
 
 A **gap** is no fault: when there is more than the silence between two readings, the servo did not run. Then the device
@@ -52,6 +53,8 @@ class Fault(IntEnum):
     MOTORS_HOT = 20
     SERVO_LATE = 21
     CONTROL_LOST = 22
+    MOTORS_OFF = 23
+    CLOCK_BACK = 24
 
     def words(self, value: float) -> str:
         """The fault in words, with its value."""
@@ -73,7 +76,7 @@ _WORDS = {
     Fault.SEQUENCE_BACK: "a reading came {:.0f} numbers behind the last one",
     Fault.OVER_TEMPERATURE: "a motor is at {:.0f} °C",
     Fault.DEVICE_RESET: "the device began again by itself",
-    Fault.VERSION_WRONG: "the device speaks version {:g} of the protocol",
+    Fault.VERSION_WRONG: "the device speaks major version {:.0f} of the protocol",
     Fault.REPORT_MALFORMED: "a report of {:.0f} bytes",
     Fault.DEVICE_REPORTED: "the device reported an error of its own, {:.0f}",
     Fault.OSCILLATION: "the hand was shaken with {:.3g} N at the frequency of an instability",
@@ -82,11 +85,14 @@ _WORDS = {
     Fault.MOTORS_HOT: "the motors have used {:.0%} of what they can dissipate",
     Fault.SERVO_LATE: "the servo was {:.3g} s late",
     Fault.CONTROL_LOST: "who controls the run has not been heard for {:.3g} s",
+    Fault.MOTORS_OFF: "the device left its motors off for {:.3g} s after it was told to switch them on",
+    Fault.CLOCK_BACK: "the device's clock went back by {:.3g} s",
 }
 
 # numba freezes globals; a member of an enumeration would be looked up in each kernel.
 FORCE_NOT_FINITE, LIMITER_NOT_FINITE, TANK_NOT_FINITE = 1, 2, 3
 READING_NOT_FINITE, RATE_IMPOSSIBLE, READING_STALE, ENCODERS_FROZEN, READINGS_ENDED = 4, 5, 6, 7, 8
+CLOCK_BACK = 24
 
 # Layout of a device's `faults`: what is told, what is remembered, and the limits.
 FAULT_CODE, FAULT_TIME, FAULT_VALUE, FAULT_GAPS, FAULT_LAST_GAP, FAULT_RAMP = range(6)
@@ -176,6 +182,8 @@ def judge_reading(
     period = faults[_PERIOD]
     started = faults[_STARTED] != 0.0
     elapsed = clock - faults[_CLOCK] if started else period
+    if sequence >= 0.0 and elapsed < 0.0:  # a simulated device may be run again from its beginning
+        latch(faults, CLOCK_BACK, t, -elapsed)
     faults[_STARTED], faults[_CLOCK] = 1.0, clock
     faults[_ELAPSED] = elapsed if elapsed > _LATE * period else period
     verdict = TAKEN

@@ -18,6 +18,8 @@ from sim.world.linkage import Linkage, Triple
 
 _TRIPLES = ("coulomb", "viscous", "inertia")
 _FORMAT = "hvf-device-1"
+_MOST = 1e3
+"""More than any of the numbers can be: [N m], [N m s/rad], [kg m²], [s], [rad]."""
 
 
 class Calibration(NamedTuple):
@@ -118,19 +120,31 @@ def read_device_file(path: Path) -> dict[str, Any]:
 
 
 def linkage_from(content: Mapping[str, Any]) -> Linkage:
-    """What a content says the linkage is; what cannot be, such as a friction below zero, is taken as zero."""
+    """What a content says the linkage is; a friction or delay that was found below zero is taken as zero.
+
+    Raises
+    ------
+    SimError
+        If a number cannot be, or a rotor has less inertia than none.
+    """
     published = Linkage()
+
+    def numbers(name: str, least: float) -> list[float]:
+        found = [float(x) for x in content[name]["value"]]
+        if not all(abs(x) < _MOST for x in found):  # which NaN is not
+            raise SimError(f"{name} {found}")
+        return [max(least, x) for x in found]
 
     def three(name: str, least: float, otherwise: Triple) -> Triple:
         if name not in content:
             return otherwise
-        a, b, c = (max(least, float(x)) for x in content[name]["value"])
+        a, b, c = numbers(name, least)
         return a, b, c
 
     return Linkage(
         three("coulomb", 0.0, published.coulomb), three("viscous", 0.0, published.viscous),
         three("inertia", -float("inf"), published.inertia),
-        max(0.0, float(content["delay"]["value"][0])) if "delay" in content else 0.0,
+        numbers("delay", 0.0)[0] if "delay" in content else 0.0,
         three("offset", -float("inf"), published.offset),
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import EMULATED, CalibrateHardware
-from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame
+from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
 from models.scene import SceneConfig
 from sim.devices.driver import Driver
 from sim.devices.exchange import READING_SIZE, READING_THETA
@@ -28,8 +28,14 @@ def calibrate(options: CalibrateHardware) -> int:
     Raises
     ------
     SimError
-        If there is no such device, it moves or gives no readings, or the file has a calibration.
+        If no Phantom can be at the pose, there is no such device, it moves or gives no readings, or the file has a
+        calibration.
     """
+    if not within_limits(options.pose):
+        raise SimError(
+            f"--pose {' '.join(f'{angle:g}' for angle in options.pose)} is beyond the joints' stops; expected three "
+            "angles [rad] at which a Phantom can stand, such as 0 0 0"
+        )
     base = read_device_file(options.out) if options.out.exists() else {}
     if "offset" in base and not options.overwrite:
         raise SimError(

@@ -1,5 +1,6 @@
 """What stands between this machine and a device: libraries, permissions, the system's limits, and how late it is."""
 
+import math
 import os
 import platform
 import sys
@@ -159,15 +160,16 @@ def _text(path: str) -> str:
 def measured_lateness(seconds: float = 1.0) -> Lateness:
     """Lateness of a loop of 1 kHz with absolute deadlines in this process; one that is missed is left out."""
     late: list[float] = []
+    deadlines = math.ceil(seconds / PERIOD)
     begin, k, missed = time.monotonic(), 0, 0
-    while k * PERIOD < seconds:
+    while k < deadlines:
         k += 1
         left = begin + k * PERIOD - time.monotonic()
         if left > 0.0:
             time.sleep(left)
         behind = time.monotonic() - begin - k * PERIOD
         late.append(behind)
-        missed += int(behind / PERIOD)
-        k += int(behind / PERIOD)
+        skipped = min(int(behind / PERIOD), deadlines - k)
+        missed, k = missed + skipped, k + skipped
     p50, p99, p999 = np.quantile(late, [0.5, 0.99, 0.999])
     return Lateness(len(late), float(p50), float(p99), float(p999), max(late), missed)

@@ -16,6 +16,7 @@ from models.scene import P_WH, PHANTOM, SceneConfig
 from sim.devices.device import DeviceState
 from sim.devices.driver import Driver
 from sim.devices.exchange import exchange
+from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import GatedServo
@@ -92,7 +93,11 @@ class MakeServo:
         """
         session = session_of(self.config)
         driver = self._driver()
-        check_device(driver.identity, self.calibration)
+        try:
+            check_device(driver.identity, self.calibration)
+        except SimError:
+            driver.close()
+            raise
         return GatedServo(session.servo, session.world, driver, self.gate, np.array(self.offset))
 
     def _driver(self) -> Driver:

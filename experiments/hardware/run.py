@@ -28,8 +28,10 @@ from experiments.saying import say
 from experiments.setups.defaults import resolved
 from experiments.setups.session import Session
 from models.scene import SceneConfig
+from sim.devices.hardware_list import check_there
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun
+from sim.hardware.emulated import steps_late
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
@@ -55,7 +57,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If there is no such device, or it may not be armed with this field; the folder is then as it was.
+        If there is no such device, or it may not be armed with this field; the folder is then as it was, but where only
+        the device itself, once it is open, tells so.
     """
     console = Console(stderr=True)
     check_folder(options.out, options.overwrite)
@@ -63,20 +66,20 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     config = resolved(config)
     _permit(config, options, console)
-    session = _compiled(config, options, console)
     content = content_of(config.device)
+    hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
+    scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
+    if options.name == EMULATED:
+        steps_late(scene, hidden.delay)
+    session = _compiled(config, options, console)
     _begin_folder(config, content, options)
-    job = RecordingJob(
-        options.out / RECORDING, to_dict(config), session.static(), config.seed,
-        SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step),
-    )  # fmt: skip
+    job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
         served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content)
     )
     with contextlib.ExitStack() as stack:
         if options.name == EMULATED:
-            hidden = linkage_from(read_device_file(options.emulate) if options.emulate else content)
-            end = MakeEmulated(job.scene, start_of(session), hidden)
+            end = MakeEmulated(scene, start_of(session), hidden)
             packets = stack.enter_context(emulated(end, options.realtime))
             make = replace(make, packets=packets, calibrated=options.emulate is None or not any(hidden.offset))
         clock = ServoClock(late=options.late, realtime=options.realtime)
@@ -125,10 +128,11 @@ def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
     Raises
     ------
     CertificateError, SimError
-        If it may not be armed.
+        If it is not there, or may not be armed.
     """
     if options.name != EMULATED:
         check_limits(options)
+        check_there(options.name)
     if options.certificate is not None:
         found = verified(options.certificate, config, options.delay)
         console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)

@@ -186,14 +186,31 @@ def open_device(name: str) -> Driver:
     DriverFault
         If it does not answer as it should.
     """
+    check_there(name)
     kind, _, rest = name.partition(":")
     opens: dict[str, Callable[[str], Driver]] = {
         "hid": _open_phantom, "hidraw": _open_phantom, "spacemouse": _open_spacemouse,
         "hdapi": lambda which: HdapiDevice(HDAPI.load(), which), "dhd": lambda _: DhdDevice(DHD.load()),
     }  # fmt: skip
-    if kind not in opens or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
-        raise SimError(f"no device is called {name!r}; {_what_there_is()}")
     return opens[kind](rest)
+
+
+def check_there(name: str) -> None:
+    """Refuse a name that no device has, or whose library is missing; none is opened.
+
+    Raises
+    ------
+    SimError
+        With what there is.
+    """
+    kind, _, rest = name.partition(":")
+    looks: dict[str, Callable[[], object]] = {
+        "hid": lambda: _the_one(rest, "phantom"), "hidraw": lambda: _the_one(rest, "phantom"),
+        "spacemouse": lambda: _the_one(rest, "spacemouse"), "hdapi": HDAPI.path, "dhd": DHD.path,
+    }  # fmt: skip
+    if kind not in looks or (kind == "hidraw" and not rest) or (kind == "dhd" and rest):
+        raise SimError(f"no device is called {name!r}; {_what_there_is()}")
+    looks[kind]()
 
 
 def _what_there_is() -> str:

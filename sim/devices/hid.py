@@ -104,7 +104,7 @@ class HidPhantom:
                 f"{self._transport} answers with the mark {int(who['magic']):#x}; expected {protocol.MAGIC:#x}"
             )
         if int(who["major"]) != protocol.VERSION[0]:
-            raise DriverFault(Fault.VERSION_WRONG, int(who["major"]) + int(who["minor"]) / 10)
+            raise DriverFault(Fault.VERSION_WRONG, int(who["major"]))
         self._who, numbers = who, self._hid.numbers
         numbers[N_BOOT] = int(who["boot"])
         numbers[N_WATCHDOG] = min(round(WATCHDOG * 1e6), int(who["watchdog_max_us"]))
@@ -121,10 +121,11 @@ class HidPhantom:
             )
         self._hid.zero[:], self._hid.angle[:], self._hid.turns[:] = found["zero"], 2.0 * np.pi / counts, turns
         who = self._who
+        motors, watchdog = (bool(self._capabilities & able) for able in (protocol.HAS_MOTORS, protocol.HAS_WATCHDOG))
         self.identity = DeviceIdentity(
             who["name"].decode(errors="replace"), self._transport, who["serial"].decode(errors="replace"),
-            who["firmware"].decode(errors="replace"), bool(self._capabilities & protocol.HAS_MOTORS),
-            bool(self._capabilities & protocol.HAS_WATCHDOG), bool(found["flags"] & protocol.CALIBRATED),
+            who["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
+            watchdog and int(self._hid.numbers[N_WATCHDOG]) > 0, bool(found["flags"] & protocol.CALIBRATED),
             int(self._hid.numbers[N_BOOT]),
         )  # fmt: skip
 
@@ -134,7 +135,8 @@ class HidPhantom:
         Raises
         ------
         SimError
-            If no reading came within a tenth of a second, or the device did not keep it.
+            If no reading came within a tenth of a second, a zero is none that fits into 32 bits, or the device did not
+            keep it.
         """
         self.let_go()
         reading = np.zeros(READING_GIMBAL + 3)
@@ -143,7 +145,12 @@ class HidPhantom:
         counts = self._hid.zero + reading[READING_THETA:] / self._hid.angle
         wanted = protocol.blank(protocol.CALIBRATION)
         wanted["flags"] = protocol.CALIBRATED
-        wanted["zero"] = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
+        zero = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
+        if not np.all(np.abs(zero) < 2**31):  # which NaN is not
+            raise SimError(
+                f"{self._transport}: a zero at {zero.tolist()} counts cannot be kept; expected numbers of 32 bits"
+            )
+        wanted["zero"] = zero
         wanted["counts_per_turn"] = np.rint(2.0 * np.pi / self._hid.angle / protocol.COUNT_UNIT)
         wanted["motor_turns"] = np.rint(self._hid.turns / protocol.TURN_UNIT)
         self._handle.send_feature_report(protocol.sealed(wanted))

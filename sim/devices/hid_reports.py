@@ -31,9 +31,11 @@ N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_AGAIN, N_BOOT, N_WATCHDOG, N_SIZE =
 """Number of the last input report (−1: none), readings handed out, reports in a row whose checksum was wrong, commands
 sent, number of the command that switched the motors on (−1: off), 1 where they went off while nobody was there and are
 to be switched off, then on, the device's boot, and the watchdog's period [µs]."""
-TOLD_FAULT, TOLD_VALUE, TOLD_NEW, TOLD_SIZE, TOLD_NOW, TOLD_GIVEN, TOLD_ENABLE, TOLD_LENGTH = range(8)
+TOLD_FAULT, TOLD_VALUE, TOLD_NEW, TOLD_SIZE, TOLD_NOW, TOLD_GIVEN, TOLD_ENABLE = range(7)
+TOLD_ASKED, TOLD_ASKED_MADE, TOLD_LENGTH = 7, 8, 9
 """What is wrong with a report or a command, with its value; 1 where a report was a new reading; bytes of a report; the
-time by the host's clock, and the device's of the reading that was handed out last [s]; 1 to switch the motors on."""
+time by the host's clock, and the device's of the reading that was handed out last [s]; 1 to switch the motors on; both
+times as they were when the motors were told to switch on."""
 
 _PLACES = {
     record: {name: field[1] for name, field in (layout.fields or {}).items()}
@@ -48,12 +50,14 @@ _OUT_BOOT, _OUT_SEQUENCE = _PLACES[protocol.OUTPUT]["boot"] // 2, _PLACES[protoc
 _OUT_WATCHDOG, _OUT_TORQUE = _PLACES[protocol.OUTPUT]["watchdog_us"] // 4, _PLACES[protocol.OUTPUT]["torque"] // 4
 _OUT_ANSWERS = _PLACES[protocol.OUTPUT]["answers"] // 4
 _SIZE, _INPUT, _OUTPUT, _ENABLE, _SWITCH = protocol.REPORT_SIZE, protocol.INPUT, protocol.OUTPUT, 1, protocol.SWITCH
-_STATUS_WATCHDOG, _STATUS_HOT, _NO_CELSIUS = protocol.STATUS_WATCHDOG, protocol.STATUS_HOT, protocol.NO_TEMPERATURE
+_STATUS_WATCHDOG, _STATUS_HOT, _STATUS_ENABLED = protocol.STATUS_WATCHDOG, protocol.STATUS_HOT, protocol.STATUS_ENABLED
+_NO_CELSIUS = protocol.NO_TEMPERATURE
 _CELSIUS_UNIT, _TORQUE_UNIT = protocol.TEMPERATURE_UNIT, protocol.TORQUE_UNIT
 
 _MALFORMED, _CHECKSUM = int(Fault.REPORT_MALFORMED), int(Fault.CHECKSUM_WRONG)
 _RESET, _BACK, _HOT = int(Fault.DEVICE_RESET), int(Fault.SEQUENCE_BACK), int(Fault.OVER_TEMPERATURE)
 _REPORTED, _NOT_FINITE = int(Fault.DEVICE_REPORTED), int(Fault.FORCE_NOT_FINITE)
+_MOTORS_OFF = int(Fault.MOTORS_OFF)
 
 
 def _remainders() -> IntArray:
@@ -187,15 +191,21 @@ def judge_report(hid: HidMemory) -> None:
     if status & _ERRORS:
         _fault(told, _REPORTED, float(status & _ERRORS))
     if told[TOLD_FAULT] == 0.0:
-        _judge_watchdog(hid, made, answered, status)
+        _judge_motors(hid, made, answered, status)
     told[TOLD_NEW] = 1.0 if told[TOLD_FAULT] == 0.0 else 0.0
+
+
+@njit
+def _ahead(number: np.int64, of: np.int64) -> np.int64:
+    """How far a number of 32 bits, which wraps, is ahead of another."""
+    return (number - of + 2**31) % 2**32 - 2**31
 
 
 @njit
 def _is_next(hid: HidMemory, number: np.int64) -> bool:
     """Whether a report's number is ahead of the last one's; the same one again is refused, an older one a fault."""
     last, telemetry = hid.numbers[N_LAST], hid.telemetry
-    ahead = 1 if last < 0 else (number - last + 2**31) % 2**32 - 2**31
+    ahead = 1 if last < 0 else _ahead(number, last)
     if ahead <= 0:
         telemetry[BAD] += 1.0
         if ahead < 0:
@@ -214,7 +224,7 @@ def _measure(hid: HidMemory, made: float, answered: np.int64) -> None:
     for i in range(3):
         celsius = np.int64(hid.incoming.i16[_CELSIUS + i])
         telemetry[TEMPERATURE + i] = np.nan if celsius == _NO_CELSIUS else celsius * _CELSIUS_UNIT
-    if 0 <= hid.numbers[N_SENT] - answered < _SENT and answered > 0:
+    if 0 <= _ahead(hid.numbers[N_SENT], answered) < _SENT:
         held = np.int64(hid.incoming.u32[_HELD])
         telemetry[ROUND_TRIP] = now - hid.sent_at[answered % _SENT] - held * 1e-6
     note_arrival(telemetry, hid.clocks, now, made)
@@ -232,18 +242,25 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
 
 
 @njit
-def _judge_watchdog(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
-    """The firmware switched off: a fault where commands went out and did not arrive, and else a gap.
+def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
+    """The motors are off that were told to be on.
 
-    After a gap the force is ramped in again by who drives, so the motors may be switched on again.
+    The firmware's watchdog switched them off: a fault where commands went out and did not arrive, and else a gap, after
+    which who drives ramps the force in again, so they may be switched on again. Or they never came on: a fault once
+    that is so by both clocks, for either side may stand still between a reading and its command.
     """
-    since = hid.numbers[N_ENABLED]
-    if since < 0 or not status & _STATUS_WATCHDOG or answered < since:
+    told, since = hid.told, hid.numbers[N_ENABLED]
+    if since < 0 or status & _STATUS_ENABLED:
         return
-    if made - hid.told[TOLD_GIVEN] > 0.5 * WATCHDOG:
-        hid.numbers[N_AGAIN] = 1
-    else:
-        _fault(hid.told, _REPORTED, _STATUS_WATCHDOG)
+    if status & _STATUS_WATCHDOG and _ahead(answered, since) >= 0:
+        if made - told[TOLD_GIVEN] > 0.5 * WATCHDOG:
+            hid.numbers[N_AGAIN] = 1
+        else:
+            _fault(told, _REPORTED, _STATUS_WATCHDOG)
+        return
+    waited = min(told[TOLD_NOW] - told[TOLD_ASKED], made - told[TOLD_ASKED_MADE])
+    if waited > WATCHDOG:
+        _fault(told, _MOTORS_OFF, waited)
 
 
 @entry_point
@@ -262,6 +279,7 @@ def make_command(hid: HidMemory) -> None:
         numbers[N_ENABLED] = -1
     elif numbers[N_ENABLED] < 0:
         numbers[N_ENABLED] = numbers[N_SENT]
+        told[TOLD_ASKED], told[TOLD_ASKED_MADE] = told[TOLD_NOW], told[TOLD_GIVEN]
     words.u8[0], words.u8[1] = _OUTPUT, _ENABLE if enable else 0
     words.u16[_OUT_BOOT], words.u32[_OUT_SEQUENCE] = numbers[N_BOOT], numbers[N_SENT] % 2**32
     words.u32[_OUT_WATCHDOG], words.u32[_OUT_ANSWERS] = numbers[N_WATCHDOG], max(0, numbers[N_LAST])

@@ -36,6 +36,19 @@ class VendorLibrary:
         ours = [name for name in self.names if name.endswith(".dll") == (sys.platform == "win32")]
         return next((found for name in ours if (found := ctypes.util.find_library(name))), None)
 
+    def path(self) -> str:
+        """Where it is.
+
+        Raises
+        ------
+        SimError
+            If it is not installed.
+        """
+        path = self.find()
+        if path is None:
+            raise SimError(f"{self.title} is not installed; {self.install}")
+        return path
+
     def load(self, path: str | None = None) -> ctypes.CDLL:
         """The library with its signatures, from a path or from where it is installed.
 
@@ -44,9 +57,7 @@ class VendorLibrary:
         SimError
             If it is not there, or is another library.
         """
-        path = path or self.find()
-        if path is None:
-            raise SimError(f"{self.title} is not installed; {self.install}")
+        path = path or self.path()
         try:
             library = ctypes.CDLL(path)
             for name, (result, arguments) in self.signatures.items():

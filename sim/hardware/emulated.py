@@ -43,6 +43,25 @@ def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
     return DeviceIdentity("emulated Phantom", transport, "", "", forces=True, watchdog=True, calibrated=calibrated)
 
 
+def steps_late(scene: SceneConfig, delay: float) -> float:
+    """How many physics steps after a period's begin a torque acts that is late by so much [s].
+
+    Raises
+    ------
+    SimError
+        If that is more than the period has.
+    """
+    steps = scene.substeps()
+    # Positions of a semi-implicit step lead by half a step what the torques of a continuous time do.
+    late = delay / scene.servo_period * steps + 0.5
+    if late > steps:
+        raise SimError(
+            f"a delay of {delay} s; expected at most {(1.0 - 0.5 / steps) * scene.servo_period:.4g} s of an emulated "
+            "device, the servo period less half a physics step"
+        )
+    return late
+
+
 class EmulatedPhantom:
     """Driver of a linkage in MuJoCo; one servo period passes in it with every command.
 
@@ -64,7 +83,7 @@ class EmulatedPhantom:
     Raises
     ------
     SimError
-        If the start is out of reach, or the delay more than a period less half a physics step.
+        If the start is out of reach, or as `steps_late`.
     """
 
     def __init__(
@@ -77,14 +96,7 @@ class EmulatedPhantom:
         linkage.into(self.world)
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
         self._plant, self._switch, self._offset = make_plant(self.world), float(presses), np.array(linkage.offset)
-        steps = self._plant.substeps
-        # Positions of a semi-implicit step lead by half a step what the torques of a continuous time do.
-        late = linkage.delay / scene.servo_period * steps + 0.5
-        if late > steps:
-            raise SimError(
-                f"a delay of {linkage.delay} s; expected at most {(1.0 - 0.5 / steps) * scene.servo_period:.4g} s, the "
-                "servo period less half a physics step"
-            )
+        steps, late = self._plant.substeps, steps_late(scene, linkage.delay)
         whole, part = int(late), late % 1.0
         spans = (whole, 0.0), (1 if part > 0.0 else 0, 1.0 - part), (steps - math.ceil(late), 1.0)
         self._spans = [(n, new) for n, new in spans if n > 0]

@@ -196,6 +196,7 @@ def held(tmp_path):
 def playing(device: NodeFirmware) -> Iterator[None]:
     """The device goes on by a period with each command, and by itself while none comes."""
     done = threading.Event()
+    device.linkage.turn(np.zeros(3))  # compiled before anybody waits for a reading
 
     def live() -> None:
         last = 0.0

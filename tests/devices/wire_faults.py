@@ -280,6 +280,19 @@ def jump(wire: Wire, rng: np.random.Generator) -> int:
     return 0
 
 
+def clock_back(wire: Wire, rng: np.random.Generator) -> int:
+    """A timer that was taken for one that does not wrap."""
+    back = int(rng.integers(1, 60)) * 1_000_000
+    wire.handle.spoil = lambda report: [reseal(report, time_us=(field(report, "time_us") - back) % 2**64)]
+    return 0
+
+
+def left_off(wire: Wire, rng: np.random.Generator) -> int:
+    """The motors go off, and the device does not say why."""
+    wire.handle.spoil = lambda report: [reseal(report, status=field(report, "status") & ~protocol.STATUS_ENABLED)]
+    return 0
+
+
 def not_finite(wire: Wire, rng: np.random.Generator) -> int:
     """Integers hold no NaN; a calibration that was spoiled in memory would make one."""
     wire.driver._hid.angle[int(rng.integers(0, 6))] = np.nan
@@ -312,5 +325,7 @@ ORDERS = (
     Order(amplifier, "amplifier fault", Fault.DEVICE_REPORTED),
     Order(encoder, "encoder fault", Fault.DEVICE_REPORTED),
     Order(jump, "encoder jumps by 2000–10 000 counts", Fault.RATE_IMPOSSIBLE),
+    Order(clock_back, "device's clock back by 1–60 s", Fault.CLOCK_BACK),
+    Order(left_off, "motors off, without a reason", Fault.MOTORS_OFF),
     Order(deaf, "commands do not arrive", Fault.DEVICE_REPORTED, None),
 )

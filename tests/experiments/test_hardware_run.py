@@ -62,7 +62,8 @@ def test_nobody_at_the_terminal_and_no_arm_is_refused(tmp_path: Path, capsys) ->
     assert not (tmp_path / "run").exists()
 
 
-def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys) -> None:
+def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
     said = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
     assert "expected --certificate" in said
 
@@ -191,16 +192,42 @@ def test_calibration_finds_the_hidden_zero_of_a_device_and_keeps_what_the_file_s
 
 
 def test_a_stylus_that_moves_while_it_is_calibrated_is_refused() -> None:
-    device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)  # it falls
+    device = EmulatedPhantom(SceneConfig(), np.zeros(3), holds=0.0)
+    for _ in range(50):  # it falls
+        device.write(np.zeros(3), False)
     with pytest.raises(SimError, match="hold the stylus still"):
         still_readings(device, 0.3)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "other"}', '{"format": "hvf-device-1", "coulomb": 3}'])
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", '{"format": "other"}', '{"format": "hvf-device-1", "coulomb": 3}',
+     '{"format": "hvf-device-1", "offset": {"value": [NaN, 0, 0]}}',
+     '{"format": "hvf-device-1", "offset": {"value": [1e300, 0, 0]}}',
+     '{"format": "hvf-device-1", "viscous": {"value": [Infinity, 0, 0]}}',
+     '{"format": "hvf-device-1", "delay": {"value": [NaN]}}'],
+)  # fmt: skip
 def test_a_file_that_is_no_device_is_said_in_a_line(tmp_path: Path, text: str) -> None:
     (tmp_path / "device.json").write_text(text)
     with pytest.raises(SimError, match="expected what hvf hardware identify or calibrate writes"):
         read_device_file(tmp_path / "device.json")
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [('{"format": "hvf-device-1", "delay": {"value": [0.5]}}', "a delay of 0.5 s; expected at most"),
+     ("{}", "expected what hvf hardware identify or calibrate writes"), (None, "cannot be read")],
+)  # fmt: skip
+def test_an_emulated_device_that_cannot_be_is_refused_and_the_folder_is_as_it_was(
+    tmp_path: Path, capsys, content, says
+) -> None:
+    file, kept = tmp_path / "device.json", tmp_path / "run" / "kept"
+    kept.parent.mkdir()
+    kept.write_text("")
+    if content is not None:
+        file.write_text(content)
+    assert says in refused(capsys, "run", "--arm", "--emulate", str(file), "--out", str(kept.parent), "--overwrite")
+    assert kept.exists()
 
 
 def test_identify_refuses_what_is_no_hardware_run(tmp_path: Path, capsys) -> None:

@@ -86,6 +86,10 @@ def jump(axis: int):
     return spoil
 
 
+def clock_back(reading) -> None:
+    reading[READING_CLOCK] -= 3.0
+
+
 def _frozen_sequence(reading) -> None:
     reading[READING_SEQUENCE] = 100.0
 

@@ -19,6 +19,7 @@ from tests.sim.hardware.emulation import (
     PLACES,
     Broken,
     active,
+    clock_back,
     gated_servo,
     jump,
     nan_in,
@@ -77,6 +78,10 @@ def test_a_reading_that_is_no_number(place: int, bad: float) -> None:
 @pytest.mark.parametrize("axis", range(3))
 def test_a_joint_that_jumps(axis: int) -> None:
     assert_lets_go("spoil", jump(axis), Fault.RATE_IMPOSSIBLE)
+
+
+def test_a_clock_that_goes_back() -> None:
+    assert_lets_go("spoil", clock_back, Fault.CLOCK_BACK)
 
 
 @pytest.mark.parametrize(("fault", "value"), DRIVER_FAULTS, ids=lambda x: getattr(x, "name", ""))
