@@ -209,7 +209,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
     if ahead <= 0:
         telemetry[BAD] += 1.0
         if ahead < 0:
-            _fault(hid.told, _BACK, -ahead)
+            _fault(hid.told, _BACK, float(-ahead))
         return False
     telemetry[LOST] += ahead - 1.0
     telemetry[READ] += 1.0
