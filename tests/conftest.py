@@ -17,7 +17,7 @@ from numba.core.dispatcher import Dispatcher
 
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache
-from sim.compilation.unit_key import UnknownIngredient
+from sim.compilation.unit_key import UnknownIngredient, UnknownName
 
 
 class _BesideUnits(UnitCache):
@@ -37,7 +37,7 @@ class _Kept(NullCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return self._kernels.load_overload(sig, target_context)
-        except UnknownIngredient:
+        except (UnknownIngredient, UnknownName):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -45,7 +45,7 @@ class _Kept(NullCache):
             warnings.simplefilter("ignore")  # of kernels that hold an address, which are not kept
             try:
                 self._kernels.save_overload(sig, data)
-            except UnknownIngredient:
+            except (UnknownIngredient, UnknownName):
                 return
 
 
