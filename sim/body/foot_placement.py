@@ -25,8 +25,8 @@ _CLOSENESS = 300.0  # κ [1/m²]: within 1 % of what is asked for, and bounded w
 
 
 @njit
-def place_feet(s: FigureState, q_r: Array, v_r: Array, flies: float) -> None:
-    """Amend the wanted accelerations of both legs by the share 0 to 1 in which the figure flies.
+def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
+    """Amend the wanted accelerations of both legs of a figure in flight.
 
     Parameters
     ----------
@@ -34,8 +34,6 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array, flies: float) -> None:
         Reads state, reference's contact points and gains, writes `acceleration`.
     q_r, v_r : Array
         Reference pose (75) and velocity (57), in the conventions of qpos and qvel.
-    flies : float
-        1 in flight, 0 where the ground bears the figure.
     """
     away, drift, offset, rate = work_array((N_FOOT, 3)), work_array((N_FOOT, 3)), work_array(N_LEG), work_array(N_LEG)
     omega = s.gains.joint_rate
@@ -43,7 +41,7 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array, flies: float) -> None:
         _displacements(s, q_r, v_r, leg, away, drift)
         _leg_for(s.legs[leg], s.points[N_FOOT * leg : N_FOOT * leg + N_FOOT], s.xpos, s.xmat, away, drift, offset, rate)
         for k in range(N_LEG):
-            s.acceleration[3 + 3 * s.legs[leg, k // 3] + k % 3] += flies * omega * (omega * offset[k] + 2.0 * rate[k])
+            s.acceleration[3 + 3 * s.legs[leg, k // 3] + k % 3] += omega * (omega * offset[k] + 2.0 * rate[k])
 
 
 @njit

@@ -51,8 +51,8 @@ def _act(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     wanted_acceleration(s, q_r, v_r, a_r)
     s.wanted_root[:] = s.acceleration[:6]
     support = _find_support(s, q_r, v_r)
-    if support < 1.0:
-        place_feet(s, q_r, v_r, 1.0 - support)
+    if s.report[REPORT_FLIES] == 1.0 and s.loaded.max() == 0.0:
+        place_feet(s, q_r, v_r)
     mode = update_fall(s.twin_model, s.fall, s.qpos, q_r, s.points[:, 2].min())
     s.report[REPORT_DOWN] = mode
     if mode == UP:
