@@ -52,7 +52,7 @@ class FigureGains(NamedTuple):
     placement_reach : float
         Largest horizontal distance by which a foot in flight is put beside its place under the root, towards the one
         in the world (`sim.body.foot_placement`) [m]. With none cmu 01_01, jumps and turns, lacks 15.8 % of weight over
-        20 s and deepmimic/jump falls; with 5, 8 and 15 cm 6.2, 6.1, 6.1 and 4.6 each. With 15 cm a backflip falls.
+        20 s and deepmimic/jump falls; with 8 cm they lack 5.7 and 4.2 %. 5 to 15 cm differ little.
     """
 
     joint_rate: float = 40.0

@@ -1,16 +1,19 @@
 """Where the feet of a figure go whose root strays in flight."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from experiments.preparation.prepared_clip import prepared_clip
 from models.humanoid.skeleton import JOINTS, figure_model, rest_pose
-from models.mocap.library import embedded
 from sim.body.figure import Figure, FigureGains
 from sim.body.tracking import TrackingConfig, floor_world, track
 
 OMEGA = FigureGains().joint_rate
+MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
 
 
 def _in_flight():
@@ -97,11 +100,16 @@ def test_a_figure_at_its_reference_is_left_as_it_is():
 
 
 @pytest.mark.slow
-def test_errors_of_jumps_do_not_grow_from_flight_to_flight():
+def test_a_capture_that_jumps_again_and_again_does_not_fall():
+    file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
+    if not file.is_file():
+        pytest.skip(f"needs motion capture in {MOCAP}")
+    clip = prepared_clip(file).clip
     placed, left = (
-        track(embedded("jump"), 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))
+        track(clip, 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))
         for reach in (FigureGains().placement_reach, 0.0)
     )
+    # 4.2 % without a fall, 20 % and a fall.
     assert not placed.falls
-    assert placed.joint_error < 0.85 * left.joint_error
-    assert placed.residual_force < 0.85 * left.residual_force
+    assert placed.residual_force < 0.08
+    assert placed.residual_force < 0.5 * left.residual_force
