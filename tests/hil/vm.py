@@ -2,9 +2,11 @@
 
 Says that it skips, and why, where something is missing: it needs qemu-system-x86_64, busybox-static, a C compiler, and
 either a kernel with modules in /boot and /lib/modules, or apt-get to fetch Debian's (some 70 MB, kept in runs/hil-vm).
-The guest sees this machine's files and changes none.
+The guest sees this machine's files and changes none. An emulated processor would compile for a quarter of an hour, so
+the driver's units are compiled here beforehand, for any processor of the kind (`tests.hil.rehearsal`).
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -15,6 +17,7 @@ from tests.devices.firmware import COMPILER, ROOT, compiled
 FOLDER = ROOT / "runs" / "hil-vm"
 MODULES = ("virtio_pci", "9pnet_virtio", "9p", "hid-generic", "uhid")
 SECONDS = 400
+ANY_PROCESSOR = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "HVF_CACHE_DIR": str(FOLDER)}
 
 INIT = """#!/bin/busybox sh
 /bin/busybox --install -s /bin
@@ -24,7 +27,7 @@ mount -t 9p -o trans=virtio,version=9p2000.L,msize=524288,cache=loose,ro host /h
 for place in proc sys dev; do mount --move /$place /host/$place; done
 mount -t tmpfs tmp /host/tmp
 cd /host
-export PYTHONDONTWRITEBYTECODE=1 NUMBA_CACHE_DIR=/tmp
+export PYTHONDONTWRITEBYTECODE=1 {settings}
 chroot /host /bin/sh -c 'cd {root} && {python} -m tests.hil.guest {library}'
 poweroff -f
 """
@@ -82,7 +85,10 @@ def initramfs(busybox: str, modules: Path, library: Path) -> Path:
         for module in (modules / "kernel" / part).glob("*.ko*"):
             shutil.copy(module, inside)
     subprocess.run([busybox, "depmod", "-b", tree, modules.name], check=True)
-    script = INIT.format(modules=" ".join(MODULES), root=ROOT, python=sys.executable, library=library)
+    settings = " ".join(f"{name}='{value}'" for name, value in ANY_PROCESSOR.items())
+    script = INIT.format(
+        modules=" ".join(MODULES), settings=settings, root=ROOT, python=sys.executable, library=library
+    )
     (tree / "init").write_text(script)
     (tree / "init").chmod(0o755)
     names = "\n".join(str(path.relative_to(tree)) for path in sorted(tree.rglob("*")))
@@ -105,7 +111,11 @@ def main() -> int:
     except MissingError as missing:
         print(f"hil-vm: skipped: {missing}", file=sys.stderr)
         return 0
-    library = compiled(FOLDER, ROOT / "firmware" / "hvf_hid.c")
+    firmware = ROOT / "firmware" / "hvf_hid.c"
+    library, mock = compiled(FOLDER, firmware), compiled(FOLDER, ROOT / "tests" / "devices" / "mock_hidapi.c", firmware)
+    subprocess.run(
+        [sys.executable, "-m", "tests.hil.rehearsal", mock], cwd=ROOT, env=os.environ | ANY_PROCESSOR, check=True
+    )
     command = [
         qemu, "-accel", "tcg", "-cpu", "max", "-m", "2048", "-smp", "1", "-nographic", "-no-reboot", "-nic", "none",
         "-kernel", str(image), "-initrd", str(initramfs(busybox, modules, library)),
