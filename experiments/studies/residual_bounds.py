@@ -1,25 +1,47 @@
-"""How little help the physical figure needs: clips at smaller and smaller bounds on the residual wrench.
+"""How little help the physical figure needs: clips and runs at smaller and smaller bounds on the residual wrench.
 
-``python -m experiments.studies.residual_bounds [CLIP or FILE...]`` prints the table of
-`docs/validation/residual-bounds.md`, a row a clip as it is done. Runs of a figure with contacts are chaotic, so each
-clip is followed at some speeds that differ in the sixth digit, and falls are counted.
+``python -m experiments.studies.residual_bounds [CLIP or FILE...]`` prints the first table of
+`docs/validation/residual-bounds.md`, a row a clip as it is done, and ``--runs`` the second, of runs in which the
+animation is led, blended, pushed or played at another pace. Runs of a figure with contacts are chaotic, so each is
+repeated at speeds of the clip, or weights of the figure, that differ in the sixth digit, and falls are counted.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from controllers.state import Array
+from experiments.config.words import run_config
 from experiments.setups.clips import load_clips
+from experiments.setups.wiring import wire
+from experiments.trials.trial_log import TrialLog
+from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.clip import Clip
 from models.mocap.library import embedded_names
+from sim.body.falls import UP
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, track
+from sim.loop.loop import Loop
 
 BOUNDS = ((1.0, 0.2), (0.5, 0.1), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01))
 """Force as a share of body weight, moment as one of body weight × stature."""
 
 SECONDS, NUDGES = 8.0, (0.0, 1e-6, -1e-6)
+RUNS: Mapping[str, tuple[float, Mapping[str, Any]]] = {
+    "FOLLOW, pushed": (20.0, {"user": "push"}),
+    "rivers, a clip each": (10.0, {"mode": "rivers", "map": "rivers"}),
+    "stretch-then-follow": (20.0, {"mode": "stretch-then-follow"}),
+    "red-blue composite": (10.0, {"map": "composite", "clips": ("walk", "angry", "cheer")}),
+    "walk, run, jump and angry": (20.0, {"clips": ("walk", "run", "jump", "angry")}),
+    "LEADING a walk": (20.0, {"mode": "lead"}),
+    "LEADING a run": (20.0, {"mode": "lead", "clips": ("run",)}),
+    "a run at 0.92 of its pace": (8.0, {"clips": ("run",)}),
+    "a walk played too fast": (6.0, {"clips": ("walk",) * 4, "user": "trace", "lap": 2.2}),
+    "a jump, pushed": (10.0, {"clips": ("jump",), "user": "push"}),
+}
+"""Seconds and words of runs, named for people."""
 
 
 def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> str:
@@ -30,11 +52,41 @@ def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> s
     return f"{fell} of {len(NUDGES)}, {100 * residual:.1f} %" if fell else f"{100 * residual:.1f} %"
 
 
+def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: float) -> str:
+    """Runs that fell of all; median residual, and the most that one took of force and moment [% of its measure]."""
+    fell, residuals, most = 0, list[float](), np.zeros(2)
+    for nudge in NUDGES:
+        config = run_config(
+            **words, seconds=seconds, residual_force=force, residual_moment=moment, mass=DEFAULT_MASS * (1.0 + nudge)
+        )
+        session = wire(config)
+        log = TrialLog(session.servo, session.world)
+        Loop(session.servo, session.world, log).run(seconds)
+        frames, measure = log.frames, session.weight * np.array([1.0, config.figure.stature])
+        up = frames["down"] == UP
+        fell += int(not up.all())
+        stance = up & (frames["flight"] == 0.0)
+        size = np.array([_sizes(frames["residual"][:, :3]), _sizes(frames["residual"][:, 3:])]) / measure[:, None]
+        residuals.append(float(np.sqrt(np.mean(size[0, stance] ** 2))))
+        most = np.maximum(most, size[:, up].max(axis=1))
+    found = f"{100 * np.median(residuals):.1f} %, {100 * most[0]:.0f} % and {100 * most[1]:.0f} %"
+    return f"{fell} of {len(NUDGES)}, {found}" if fell else found
+
+
+def _sizes(rows: Array) -> Array:
+    sizes: Array = np.linalg.norm(rows, axis=1)
+    return sizes
+
+
 def main(names: Sequence[str]) -> None:
-    """Print the table."""
-    print("| clip | " + " | ".join(f"{force:g}, {moment:g}" for force, moment in BOUNDS) + " |")
+    """Print a table."""
+    runs = names == ["--runs"]
+    print(f"| {'run' if runs else 'clip'} | " + " | ".join(f"{force:g}, {moment:g}" for force, moment in BOUNDS) + " |")
     print("|---" * (1 + len(BOUNDS)) + "|")
-    for name in names:
+    for name, (seconds, words) in RUNS.items() if runs else ():
+        cells = (run_cell(seconds, words, *bounds) for bounds in BOUNDS)
+        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+    for name in () if runs else names:
         (clip,), _ = load_clips((name,))
         print(f"| {name} | " + " | ".join(cell(clip, *bounds) for bounds in BOUNDS) + " |", flush=True)
 

@@ -4,7 +4,8 @@
 `docs/validation/physics-step.md`.
 
 The force of a tick depends on when a count of the encoders comes, which a step of any size moves by a tick: so forces
-are compared below `BAND` as well, that of a hand's own motion, and not tick by tick alone.
+are compared below `BAND` as well, that of a hand's own motion, and not tick by tick alone. Counts that come otherwise
+also let a hand go along its curve a little sooner or later, so its path is compared beside where it is at an instant.
 """
 
 import sys
@@ -44,8 +45,9 @@ MODES: Mapping[str, RunConfig | ArmConfig] = {
     "arm": ArmConfig(),
 }
 HEAD = (
-    "| mode | step ms | stylus apart µm RMS | force apart below 8 Hz, and tick by tick % | closure µm "
-    "| joints apart ° RMS | figure off its reference ° | falls |\n|---|---|---|---|---|---|---|---|"
+    "| mode | step ms | stylus off the path, and apart at an instant µm RMS "
+    "| force apart below 8 Hz, and tick by tick % | closure µm | joints apart ° RMS "
+    "| figure off its reference ° | falls |\n|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -109,14 +111,35 @@ def course(config: RunConfig | ArmConfig, step: float) -> Course:
 def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     """A line of the table."""
     apart, force = 1e6 * _rms(coarse.p - fine.p), 100.0 * _rms(coarse.force - fine.force) / _rms(fine.force)
+    path = 1e6 * _rms(off_path(coarse.p, fine.p))
     band = butter(2, BAND, fs=1.0 / coarse.period, output="sos")
     slow, finer = (np.asarray(sosfiltfilt(band, c.force, axis=0)) for c in (coarse, fine))
     off = ", ".join(f"{np.rad2deg(_off(c.poses, c.reference)):.2f}" for c in (coarse, fine))
     return (
-        f"| {name} | {1e3 * step:g} | {apart:.1f} | {100.0 * _rms(slow - finer) / _rms(finer):.2g}, {force:.0f} | "
-        f"{1e6 * coarse.gap:.2g} | {np.rad2deg(_off(coarse.poses, fine.poses)):.2f} | {off} | "
+        f"| {name} | {1e3 * step:g} | {path:.1f}, {apart:.1f} | "
+        f"{100.0 * _rms(slow - finer) / _rms(finer):.2g}, {force:.0f} | {1e6 * coarse.gap:.2g} | "
+        f"{np.rad2deg(_off(coarse.poses, fine.poses)):.2f} | {off} | "
         f"{coarse.falls}, {fine.falls} |"
     )
+
+
+def off_path(p: Array, other: Array) -> Array:
+    r"""From another course to this, both at the same instants, across the other's way: :math:`(1 - t t^T)(p - p')`.
+
+    Parameters
+    ----------
+    p, other : Array
+        Places [m], shape (n, 3), so near each other that the way between them is straight.
+
+    Returns
+    -------
+    Array
+        Shape (n, 3) [m]. Where the other stands still, all that is between them.
+    """
+    way, apart = np.gradient(other, axis=0), p - other
+    speed = np.linalg.norm(way, axis=1, keepdims=True)
+    along = np.divide(way, speed, out=np.zeros_like(way), where=speed > 0.0)
+    return apart - np.sum(apart * along, axis=1, keepdims=True) * along
 
 
 def _off(poses: Array, others: Array) -> float:
