@@ -1,5 +1,6 @@
 """The key of a unit: other for all that its code is made of, the same for everything else."""
 
+import dis
 import sys
 import types as python_types
 from fractions import Fraction
@@ -16,6 +17,7 @@ from controllers.fields.higher_order import higher_order_wrench
 from controllers.fields.instructions import LAW_ARGUMENTS
 from controllers.fields.stretchy_tubes import stretchy_wrench
 from controllers.haptic_map.evaluate import MAP_ARGUMENTS, MAP_KERNELS
+from sim.compilation import unit_key as unit_key_module
 from sim.compilation.unit_key import UnknownIngredient, UnknownName, describe_type, reached_functions, unit_key
 from sim.loop.servo import run_block
 
@@ -164,6 +166,21 @@ def test_what_is_chosen_by_the_type_of_a_device_is_part_of_the_loop() -> None:
     for kernel in ("devices.exchange.sense_exchange", "devices.simulated.advance_simulated"):
         assert f"sim.{kernel}" in reached
     assert "controllers.safety.faults.judge_reading" in reached
+
+
+def test_instructions_and_names_are_read_as_python_s_own_module_reads_them() -> None:
+    kernels = (run_block, *LAWS, *MAP_KERNELS.values())
+    for function in {id(f): f for kernel in kernels for f in reached_functions(kernel.py_func)}.values():
+        code = function.__code__
+        read = [one for one in dis.get_instructions(code) if one.opname != "EXTENDED_ARG"]
+        ours = [one for one in unit_key_module._instructions(code) if dis.opname[one[0]] != "CACHE"]
+        assert ours == [(one.opcode, one.arg or 0) for one in read]
+        named = {one.argval for one in read if one.opname == "LOAD_GLOBAL"}
+        nested = [part for part in code.co_consts if isinstance(part, python_types.CodeType)]
+        chains = unit_key_module._global_names(code.replace(co_consts=()) if nested else code)
+        assert {chain[0] for chain in chains} == named
+        attributes = {one.argval for one in read if one.opname in ("LOAD_ATTR", "LOAD_METHOD")}
+        assert {name for chain in chains for name in chain[1:]} <= attributes
 
 
 FIRST, SECOND = 1.0, 2.0
