@@ -13,7 +13,7 @@ static struct {
     int buttons, enabled, begun, opened, manual, running, missing, style, no_scheduler;
     unsigned calibration, errors[32];
     int first, last;
-    unsigned long rate, frames;
+    unsigned long rate, frames, served;
     Callback callback;
     void *data;
     unsigned short priority;
@@ -38,11 +38,15 @@ void mock_missing(int missing) { m.missing = missing; }
 void mock_no_scheduler(int none) { m.no_scheduler = none; }
 void mock_temperature(double share) { m.temperature = share; }
 unsigned long mock_frames(void) { return m.frames; }
+unsigned long mock_served(void) { return m.served; }
 int mock_opened(void) { return m.opened; }
 void mock_force(double *force) { /* what the motors give */
     for (int i = 0; i < 3; i++) force[i] = m.enabled && m.opened ? m.force[i] : 0.0;
 }
-void mock_tick(void) { if (m.running && m.callback && m.callback(m.data) == 0) m.callback = 0; }
+void mock_tick(void) {
+    if (m.running && m.callback && m.callback(m.data) == 0) m.callback = 0;
+    m.served++;
+}
 
 /* The interface. */
 unsigned hdInitDevice(const char *name) {
@@ -89,9 +93,11 @@ const char *hdGetErrorString(unsigned code) { return code ? "an error" : "none";
 unsigned hdCheckCalibration(void) { return m.calibration; }
 void hdUpdateCalibration(unsigned style) { if (style != (unsigned)m.style) fail(0x0101); else if (m.calibration == 0x5001) m.calibration = 0x5000; }
 void hdSetSchedulerRate(unsigned long rate) { m.rate = rate; if (rate != 1000 && rate != 500) fail(0x0101); }
+extern void heap_open(void) __attribute__((weak)); /* where calls of the heap are counted */
 static void *serve(void *unused) {
     struct timespec period = {0, 1000000000L / (long)m.rate};
     (void)unused;
+    if (heap_open) heap_open();
     while (m.running) { mock_tick(); nanosleep(&period, 0); }
     return 0;
 }
