@@ -165,7 +165,7 @@ class DhdDevice:
         memory = DhdMemory(
             functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(TOLD_SIZE)
         )
-        self._reading, self._torque, self._off, self._taken = memory.reading, memory.torque, np.zeros(3), 0.0
+        self._memory, self._off, self._taken = memory, np.zeros(3), 0.0
         self._told, self._numbers, self._telemetry = items(memory.told), items(memory.reading), items(self.telemetry)
         self._take, self._send = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
 
@@ -196,7 +196,7 @@ class DhdDevice:
         self._taken += 1.0
         numbers[READING_CLOCK] = self._clock()
         numbers[READING_SEQUENCE] = self._telemetry[READ] = self._taken
-        np.copyto(reading, self._reading)
+        np.copyto(reading, self._memory.reading)
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
@@ -208,7 +208,7 @@ class DhdDevice:
             If the library reported an error, or a torque is not finite: then the motors are off.
         """
         told = self._told
-        np.copyto(self._torque, torque)
+        np.copyto(self._memory.torque, torque)
         told[TOLD_ENABLE] = enable
         self._send()
         if told[TOLD_FAULT] != 0.0:
@@ -218,7 +218,7 @@ class DhdDevice:
 
     def let_go(self) -> None:
         """Motors off, at once; never raises."""
-        np.copyto(self._torque, self._off)
+        np.copyto(self._memory.torque, self._off)
         self._told[TOLD_ENABLE], self._told[TOLD_ENABLED] = 0.0, _UNKNOWN
         self._send()
 

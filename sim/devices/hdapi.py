@@ -131,21 +131,11 @@ class HdapiDevice:
             )
         self.telemetry = fresh_telemetry()
         self.identity = self._who(self._calibrated())
-        functions = [
-            address_of(function) for function in (*(getattr(library, name) for name in FUNCTIONS), self._clock)
-        ]
-        memory = HdMemory.fresh(functions, self._device, self._nominal_force(), self.telemetry)
-        self._numbers, self._reading, self._torque, self._off = (
-            memory.numbers,
-            memory.reading,
-            memory.torque,
-            np.zeros(3),
-        )
-        self._told, self._take, self._send = (
-            items(memory.told),
-            KeptCall(take_sample, (memory,)),
-            KeptCall(send_force, (memory,)),
-        )
+        functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
+        addresses = [address_of(function) for function in functions]
+        memory = HdMemory.fresh(addresses, self._device, self._nominal_force(), self.telemetry)
+        self._memory, self._told, self._off = memory, items(memory.told), np.zeros(3)
+        self._take, self._send = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
         for ability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
             library.hdEnable(ability)
         # Kept for good: the vendor's thread must find it, whoever else is gone.
@@ -213,7 +203,7 @@ class HdapiDevice:
             raise pose_fault(told[TOLD_FAULT], told[TOLD_VALUE])
         if told[TOLD_NEW] == 0.0:
             return False
-        np.copyto(reading, self._reading)
+        np.copyto(reading, self._memory.reading)
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
@@ -225,7 +215,7 @@ class HdapiDevice:
             If a torque is not finite: then there is no force.
         """
         told = self._told
-        np.copyto(self._torque, torque)
+        np.copyto(self._memory.torque, torque)
         told[TOLD_ENABLE] = enable
         self._send()
         if told[TOLD_FAULT] != 0.0:
@@ -233,14 +223,14 @@ class HdapiDevice:
 
     def let_go(self) -> None:
         """Motors off with the next callback; never raises."""
-        np.copyto(self._torque, self._off)
+        np.copyto(self._memory.torque, self._off)
         self._told[TOLD_ENABLE] = 0.0
         self._send()
 
     def close(self) -> None:
         """Let go, and give the device back."""
         self.let_go()
-        self._numbers[N_CLOSING] = 1
+        self._memory.numbers[N_CLOSING] = 1
         self._hd.hdDisable(_FORCE_OUTPUT)
         self._hd.hdStopScheduler()
         self._hd.hdUnschedule(self._task)

@@ -20,6 +20,8 @@ static struct {
     pthread_t thread;
 } m;
 
+extern void heap_open(void) __attribute__((weak)); /* where calls of the heap are counted, those of its thread are */
+
 static void fail(unsigned code) { if (m.last - m.first < 32) m.errors[m.last++ % 32] = code; }
 
 /* What the test does. */
@@ -38,6 +40,7 @@ void mock_missing(int missing) { m.missing = missing; }
 void mock_no_scheduler(int none) { m.no_scheduler = none; }
 void mock_temperature(double share) { m.temperature = share; }
 unsigned long mock_frames(void) { return m.frames; }
+int mock_is_counted(void) { return heap_open != 0; }
 unsigned long mock_served(void) { return m.served; }
 int mock_opened(void) { return m.opened; }
 void mock_force(double *force) { /* what the motors give */
@@ -93,7 +96,6 @@ const char *hdGetErrorString(unsigned code) { return code ? "an error" : "none";
 unsigned hdCheckCalibration(void) { return m.calibration; }
 void hdUpdateCalibration(unsigned style) { if (style != (unsigned)m.style) fail(0x0101); else if (m.calibration == 0x5001) m.calibration = 0x5000; }
 void hdSetSchedulerRate(unsigned long rate) { m.rate = rate; if (rate != 1000 && rate != 500) fail(0x0101); }
-extern void heap_open(void) __attribute__((weak)); /* where calls of the heap are counted */
 static void *serve(void *unused) {
     struct timespec period = {0, 1000000000L / (long)m.rate};
     (void)unused;

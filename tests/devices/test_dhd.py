@@ -1,4 +1,4 @@
-"""DHD by ctypes, against a mock of the library built from C."""
+"""DHD, against a mock of the library built from C."""
 
 import ctypes
 

@@ -80,6 +80,7 @@ class Frames:
         self.hd = HDAPI.load(library)
         self.hd.mock_reset()
         self.hd.mock_manual(0)
+        assert self.hd.mock_is_counted()
         self.hd.mock_served.restype = ctypes.c_ulong
         self.driver, self.transform, self.next = HdapiDevice(self.hd), np.eye(4), 0.0
 
