@@ -147,6 +147,7 @@ class HdapiDevice:
             library.hdUnschedule(self._task)
             library.hdDisableDevice(self._device)
             raise SimError(f"HDAPI does not start its scheduler at {RATE} Hz: {_words(code)}")
+        _asked[addresses[-1]] = self._clock
 
     def _error(self) -> int:
         """The first of the errors that the library has kept, all of which are taken; 0 if there is none."""
@@ -235,6 +236,11 @@ class HdapiDevice:
         self._hd.hdStopScheduler()
         self._hd.hdUnschedule(self._task)
         self._hd.hdDisableDevice(self._device)
+        _asked.pop(address_of(self._clock), None)
+
+
+_asked: dict[int, Any] = {}
+"""Clocks that a vendor's thread asks, whether their drivers are still there or not, by their addresses."""
 
 
 def _words(code: int) -> str:

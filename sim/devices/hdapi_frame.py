@@ -206,7 +206,7 @@ def take_sample(hd: HdMemory) -> None:
     told, numbers, sample, reading = hd.told, hd.numbers, hd.sample.read, hd.reading
     told[TOLD_NEW] = told[TOLD_CODE] = told[TOLD_FAULT] = 0.0
     last = reading[READING_SEQUENCE]
-    whole = read_whole(hd.sample.changes, hd.sample.shared, hd.sample.whole, sample)
+    read_whole(hd.sample.changes, hd.sample.shared, hd.sample.whole, sample)
     barrier()
     if numbers[N_RAISED] != numbers[N_HEARD]:
         barrier()
@@ -214,7 +214,7 @@ def take_sample(hd: HdMemory) -> None:
         barrier()
         numbers[N_HEARD] += 1
         return
-    if not whole or sample[SAMPLE_NUMBER] == last:
+    if sample[SAMPLE_NUMBER] == last:  # as of one that is half written
         return
     told[TOLD_NEW], reading[READING_SEQUENCE] = 1.0, sample[SAMPLE_NUMBER]
     # x_P → −y_H, y_P → z_H, z_P → −x_H, of rows and of columns.

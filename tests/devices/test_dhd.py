@@ -99,6 +99,14 @@ def test_where_the_phantom_cannot_be_and_what_is_no_pose_is_a_fault_and_no_readi
     assert reading[0] == 1.0
 
 
+def test_letting_go_switches_the_motors_off_whoever_switched_them_on(dhd) -> None:
+    device = DhdDevice(dhd)
+    dhd.dhdEnableForce(1, b"\x02")
+    assert dhd.mock_enabled()
+    device.let_go()
+    assert not dhd.mock_enabled()
+
+
 @pytest.mark.parametrize(("code", "fault"), [(2, Fault.UNPLUGGED), (7, Fault.UNPLUGGED), (12, Fault.DEVICE_REPORTED)])
 def test_an_error_is_a_fault_with_the_library_s_words_when_reading_and_when_writing(dhd, code, fault) -> None:
     device = DhdDevice(dhd)

@@ -237,9 +237,10 @@ def test_a_sample_that_is_half_written_is_none(hd, clock) -> None:
     told(device)
 
 
-def test_a_driver_that_nobody_closed_leaves_the_thread_its_memory(hd) -> None:
+@pytest.mark.parametrize("clock", [time.perf_counter, lambda: time.perf_counter()])
+def test_a_driver_that_nobody_closed_leaves_the_thread_what_it_needs(hd, clock) -> None:
     hd.mock_manual(0)
-    device = HdapiDevice(hd)
+    device = HdapiDevice(hd, clock=clock)
     device.write(np.ones(3), True)
     del device
     gc.collect()
