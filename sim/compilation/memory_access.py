@@ -10,19 +10,23 @@ from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 
 
-def _load(kind: types.Type) -> Any:
+def loader(kind: types.Type) -> Any:
+    """What gives the value at an address, of a kind; arrays in it stay those of whoever keeps them there."""
+
     def loading(_: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            return builder.load(builder.inttoptr(given[0], context.get_value_type(kind).as_pointer()))
+            value = builder.load(builder.inttoptr(given[0], context.get_value_type(kind).as_pointer()))
+            context.nrt.incref(builder, kind, value)
+            return value
 
         return kind(types.intp), generate
 
     return intrinsic(loading)
 
 
-number_at: Any = _load(types.float64)
+number_at: Any = loader(types.float64)
 """The number at an address; nothing checks it."""
-int32_at: Any = _load(types.int32)
+int32_at: Any = loader(types.int32)
 
 
 def items(array: Array) -> "memoryview[float]":

@@ -2,34 +2,39 @@
 
 Positions are in metres and forces in newtons, in axes with x towards the user, y to the right and z up, from the middle
 of the workspace, which is taken for H's origin. The library compensates for the device's weight by itself. Signatures
-are those of the SDK's ``dhdc.h``.
+are those of the SDK's ``dhdc.h``. In the loop compiled code calls the library's functions by their address.
 """
 
 import ctypes
-import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from controllers.safety.faults import Fault
-from controllers.state import Array
-from models.phantom.kinematics import R_HP
+from controllers.safety.faults import Fault, first_not_finite
+from controllers.state import Array, IntArray
+from models.phantom.kinematics import vector_to_device_frame, vector_to_hand_frame
+from sim.compilation.c_function import address_of, call_int
+from sim.compilation.compiled import entry_point
+from sim.compilation.kept_call import KeptCall
+from sim.compilation.memory_access import items
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.hid import WATCHDOG
 from sim.devices.vendor_library import VendorLibrary
-from sim.devices.virtual_arm import tip_force, write_pose
+from sim.devices.virtual_arm import place_stylus, pose_fault, tip_force
 from sim.errors import SimError
 
 LARGEST = 8.5
 """Largest force that is sent [N]: the Premium's at its stall. Falcon, omega and delta give 8 to 20 and more."""
 
-_R_HD = np.diag([-1.0, -1.0, 1.0])  # from the library's axes D to H
+_SIGNS = np.array([-1.0, -1.0, 1.0])  # the library's axes, D, in H
 _TIME_GUARD = 1  # nothing new since the last call
 _WATCHDOG_UNIT = 125e-6  # s
 _ERROR_COM, _ERROR_TIMEOUT, _ERROR_NO_DEVICE = 2, 7, 5
+_UNKNOWN = -1.0  # whether the motors are on: they are told to be off again
+_FORCE_NOT_FINITE = int(Fault.FORCE_NOT_FINITE)
 
 _double_p = ctypes.POINTER(ctypes.c_double)
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
@@ -53,6 +58,79 @@ DHD = VendorLibrary(
     "Force Dimension's library dhd", ("dhd", "dhd64.dll"),
     "install the Force Dimension SDK, so that libdhd.so (dhd64.dll) is found", _SIGNATURES,
 )  # fmt: skip
+
+_IN_LOOP = "dhdGetPositionAndOrientationFrame", "dhdGetButton", "dhdSetForce", "dhdEnableForce"
+_GET_POSE, _GET_BUTTON, _SET_FORCE, _ENABLE_FORCE = range(len(_IN_LOOP))
+TOLD_RESULT, TOLD_FAULT, TOLD_VALUE, TOLD_ENABLE, TOLD_ENABLED, TOLD_SIZE = range(6)
+"""What the library returned, negative for an error; what is wrong with a pose or a torque, with its value; 1 to switch
+the motors on, and whether they were."""
+
+
+class DhdMemory(NamedTuple):
+    """A device as compiled code holds it.
+
+    Attributes
+    ----------
+    functions : IntArray
+        Addresses of the library's functions.
+    number : int
+        Of the device.
+    pose : Array
+        As the library tells it: tip [m], and the stylus's frame row by row, shape (12,).
+    frame : Array
+        The stylus's orientation in H, shape (3, 3).
+    reading : Array
+        The last one that can be, of `READING_SIZE`.
+    torque : Array
+        To be commanded [N m], shape (3,).
+    told : Array
+        See `TOLD_RESULT`.
+    """
+
+    functions: IntArray
+    number: int
+    pose: Array
+    frame: Array
+    reading: Array
+    torque: Array
+    told: Array
+
+
+@entry_point
+def take_pose(dhd: DhdMemory) -> None:
+    """Ask the library for pose and button, and write them into the reading."""
+    told, pose, number = dhd.told, dhd.pose, np.int32(dhd.number)
+    told[TOLD_FAULT] = 0.0
+    x = pose.ctypes.data
+    told[TOLD_RESULT] = call_int(dhd.functions[_GET_POSE], (x, x + 8, x + 16, x + 24, number))
+    if told[TOLD_RESULT] < 0.0 or told[TOLD_RESULT] == _TIME_GUARD:
+        return
+    for i in range(3):
+        for j in range(3):
+            dhd.frame[i, j] = _SIGNS[i] * pose[3 + 3 * i + j] * _SIGNS[j]
+    p_P = vector_to_device_frame((_SIGNS[0] * pose[0], _SIGNS[1] * pose[1], _SIGNS[2] * pose[2]))
+    told[TOLD_FAULT], told[TOLD_VALUE] = place_stylus(dhd.reading, p_P, dhd.frame)
+    pressed = call_int(dhd.functions[_GET_BUTTON], (np.int32(0), number)) == 1
+    dhd.reading[READING_SWITCH] = 1.0 if pressed else 0.0
+
+
+@entry_point
+def send_force(dhd: DhdMemory) -> None:
+    """Tell the library the force that the torques stand for; none where the motors are off, or one is not finite."""
+    told, reading, torque, number = dhd.told, dhd.reading, dhd.torque, np.int32(dhd.number)
+    told[TOLD_VALUE] = first_not_finite(torque)
+    told[TOLD_FAULT] = 0.0 if told[TOLD_VALUE] == 0.0 else _FORCE_NOT_FINITE
+    enable = told[TOLD_ENABLE] if told[TOLD_FAULT] == 0.0 else 0.0
+    force = 0.0, 0.0, 0.0
+    if enable > 0.0:
+        theta = (reading[READING_THETA], reading[READING_THETA + 1], reading[READING_THETA + 2])
+        force = vector_to_hand_frame(tip_force(theta, (torque[0], torque[1], torque[2]), LARGEST))
+    told[TOLD_RESULT] = 0.0
+    if enable != told[TOLD_ENABLED]:
+        told[TOLD_RESULT] = call_int(dhd.functions[_ENABLE_FORCE], (np.int32(enable), number))
+        told[TOLD_ENABLED] = enable
+    f_D = _SIGNS[0] * force[0], _SIGNS[1] * force[1], _SIGNS[2] * force[2], number
+    told[TOLD_RESULT] = min(told[TOLD_RESULT], call_int(dhd.functions[_SET_FORCE], f_D))
 
 
 class DhdDevice:
@@ -83,7 +161,13 @@ class DhdDevice:
         name = (library.dhdGetSystemName(self._id) or b"").decode(errors="replace")
         self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True, own_weight=True)
         self.telemetry = fresh_telemetry()
-        self._theta, self._taken, self._enabled = np.zeros(3), 0, False
+        functions = np.array([address_of(getattr(library, name)) for name in _IN_LOOP], np.int64)
+        memory = DhdMemory(
+            functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(TOLD_SIZE)
+        )
+        self._memory, self._off, self._taken = memory, np.zeros(3), 0.0
+        self._told, self._numbers, self._telemetry = items(memory.told), items(memory.reading), items(self.telemetry)
+        self._take, self._send = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
 
     def _words(self) -> str:
         return (self._dhd.dhdErrorGetLastStr() or b"").decode(errors="replace")
@@ -101,23 +185,18 @@ class DhdDevice:
         DriverFault
             If the library reported an error, or the tip is where no Phantom's can be.
         """
-        room = (ctypes.c_double * 12)()
-        addresses = [ctypes.cast(ctypes.byref(room, 8 * k), _double_p) for k in range(4)]
-        result = self._dhd.dhdGetPositionAndOrientationFrame(*addresses, self._id)
-        if result == _TIME_GUARD:
+        told, numbers = self._told, self._numbers
+        self._take()
+        if told[TOLD_RESULT] == _TIME_GUARD:
             return False
-        if result < 0:
+        if told[TOLD_RESULT] < 0.0:
             raise self._fault()
-        pose = np.array(room)
-        p_P = np.array(R_HP).T @ _R_HD @ pose[:3]
-        told = np.zeros(READING_SIZE)
-        write_pose(told, p_P, _R_HD @ pose[3:].reshape(3, 3) @ _R_HD)
-        reading[:] = told
-        self._theta = told[READING_THETA : READING_THETA + 3]
-        self._taken += 1
-        reading[READING_SWITCH] = float(self._dhd.dhdGetButton(0, self._id) == 1)
-        reading[READING_CLOCK] = self._clock()
-        self.telemetry[READ] = reading[READING_SEQUENCE] = self._taken
+        if told[TOLD_FAULT] != 0.0:
+            raise pose_fault(told[TOLD_FAULT], told[TOLD_VALUE])
+        self._taken += 1.0
+        numbers[READING_CLOCK] = self._clock()
+        numbers[READING_SEQUENCE] = self._telemetry[READ] = self._taken
+        np.copyto(reading, self._memory.reading)
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
@@ -128,24 +207,20 @@ class DhdDevice:
         DriverFault
             If the library reported an error, or a torque is not finite: then the motors are off.
         """
-        total = float(np.sum(torque))
-        if not math.isfinite(total):
-            self.let_go()
-            raise DriverFault(Fault.FORCE_NOT_FINITE, total)
-        force = tip_force(self._theta, torque, LARGEST) if enable else np.zeros(3)
-        result = 0
-        if enable != self._enabled:
-            result = self._dhd.dhdEnableForce(int(enable), self._id)
-            self._enabled = enable
-        result = min(result, self._dhd.dhdSetForce(*(_R_HD @ np.array(R_HP) @ force), self._id))
-        if result < 0:
+        told = self._told
+        np.copyto(self._memory.torque, torque)
+        told[TOLD_ENABLE] = enable
+        self._send()
+        if told[TOLD_FAULT] != 0.0:
+            raise DriverFault(Fault.FORCE_NOT_FINITE, told[TOLD_VALUE])
+        if told[TOLD_RESULT] < 0.0:
             raise self._fault()
 
     def let_go(self) -> None:
         """Motors off, at once; never raises."""
-        self._dhd.dhdSetForce(0.0, 0.0, 0.0, self._id)
-        self._dhd.dhdEnableForce(0, self._id)
-        self._enabled = False
+        np.copyto(self._memory.torque, self._off)
+        self._told[TOLD_ENABLE], self._told[TOLD_ENABLED] = 0.0, _UNKNOWN
+        self._send()
 
     def close(self) -> None:
         """Let go, and give the device back."""

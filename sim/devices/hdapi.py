@@ -1,16 +1,15 @@
 """OpenHaptics' HDAPI: how Phantoms and Touch devices with their vendor's driver take forces.
 
 The library is not ours to ship; it is loaded by ctypes where it is installed. Its scheduler calls back at its own rate
-(1 kHz) in its own thread: there the state is read and the last force commanded, and nothing else is done. Positions
-are in millimetres, in axes that are the device frame's P (x right, y up, z to the user), from the middle of the
-workspace, which is taken for P's origin; the end effector's frame is parallel to P when the pen points away from the
-user.
+(1 kHz) in its own thread: there the state is read and the last force commanded, by compiled code (`hdapi_frame.py`),
+and nothing else is done. Positions are in millimetres, in axes that are the device frame's P (x right, y up, z to the
+user), from the middle of the workspace, which is taken for P's origin; the end effector's frame is parallel to P when
+the pen points away from the user.
 
 Constants and signatures are those of OpenHaptics 3.4's ``hd.h``, ``hdDefines.h``, ``hdDevice.h`` and ``hdScheduler.h``.
 """
 
 import ctypes
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -19,22 +18,34 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from models.phantom.kinematics import R_HP
-from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
-from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
+from sim.compilation.c_function import address_of
+from sim.compilation.kept_call import KeptCall, keep_arguments
+from sim.compilation.memory_access import items
+from sim.compilation.python_clock import clock_for_c
+from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.hdapi_frame import (
+    FUNCTIONS,
+    N_CLOSING,
+    TOLD_CODE,
+    TOLD_ENABLE,
+    TOLD_FAULT,
+    TOLD_NEW,
+    TOLD_VALUE,
+    HdMemory,
+    frame_for_c,
+    send_force,
+    take_sample,
+)
 from sim.devices.vendor_library import VendorLibrary
-from sim.devices.virtual_arm import tip_force, write_pose
+from sim.devices.virtual_arm import pose_fault
 from sim.errors import SimError
 
-SILENCE = 5e-3
-"""Time without a command after which the callback commands no force [s]; five of its periods."""
 RATE = 1000  # Hz, of the vendor's scheduler
+_LOOK = 5e-5  # s, between two looks for a new sample
 
 _INVALID_HANDLE = 0xFFFFFFFF
-_CALLBACK_DONE, _CALLBACK_CONTINUE, _MAX_PRIORITY = 0, 1, 0xFFFF
-_BUTTONS, _POSITION, _VELOCITY, _TRANSFORM, _GIMBAL = 0x2000, 0x2050, 0x2051, 0x2052, 0x2150
-_MODEL, _SERIAL, _CALIBRATION_STYLE = 0x2501, 0x2504, 0x2555
-_MAX_FORCE, _MOTOR_TEMPERATURE, _CURRENT_FORCE = 0x2603, 0x2605, 0x2700
+_MAX_PRIORITY = 0xFFFF
+_MODEL, _SERIAL, _CALIBRATION_STYLE, _MAX_FORCE = 0x2501, 0x2504, 0x2555, 0x2603
 _FORCE_OUTPUT, _MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT = 0x4000, 0x4001, 0x4003
 _CALIBRATION_OK, _CALIBRATION_NEEDS_UPDATE = 0x5000, 0x5001
 
@@ -60,8 +71,6 @@ class ErrorInfo(ctypes.Structure):
     ]  # fmt: skip
 
 
-Callback = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)
-
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "hdInitDevice": (ctypes.c_uint, [ctypes.c_char_p]),
     "hdDisableDevice": (None, [ctypes.c_uint]),
@@ -81,7 +90,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "hdSetSchedulerRate": (None, [ctypes.c_ulong]),
     "hdStartScheduler": (None, []),
     "hdStopScheduler": (None, []),
-    "hdScheduleAsynchronous": (ctypes.c_ulong, [Callback, ctypes.c_void_p, ctypes.c_ushort]),
+    "hdScheduleAsynchronous": (ctypes.c_ulong, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_ushort]),
     "hdUnschedule": (None, [ctypes.c_ulong]),
 }
 
@@ -103,7 +112,7 @@ class HdapiDevice:
     name : str
         The device's name in the vendor's set-up; the default device where it is empty.
     clock : callable
-        Seconds, which the readings carry.
+        Seconds, which the readings carry; any but `time.perf_counter` is asked for them with the GIL.
 
     Raises
     ------
@@ -112,7 +121,7 @@ class HdapiDevice:
     """
 
     def __init__(self, library: ctypes.CDLL, name: str = "", clock: Callable[[], float] = time.perf_counter):
-        self._hd, self._clock = library, clock
+        self._hd, self._clock = library, clock_for_c(clock)
         self._device: int = library.hdInitDevice(name.encode() or None)
         code = self._error()
         if code or self._device == _INVALID_HANDLE:
@@ -122,23 +131,23 @@ class HdapiDevice:
             )
         self.telemetry = fresh_telemetry()
         self.identity = self._who(self._calibrated())
-        self._largest = float(self._doubles(_MAX_FORCE, 1)[0])
-        self._lock = threading.Condition()
-        self._sample, self._samples, self._taken = np.zeros(_SAMPLE), 0, 0
-        self._theta, self._force = np.zeros(3), np.zeros(3)
-        self._commanded, self._enable, self._enabled = -np.inf, False, False
-        self._pending: tuple[int, float] = (0, 0.0)
-        self._closing = False
-        self._callback = Callback(self._serve)  # the library keeps its address only
+        functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
+        addresses = [address_of(function) for function in functions]
+        memory = HdMemory.fresh(addresses, self._device, self._nominal_force(), self.telemetry)
+        self._memory, self._told, self._off = memory, items(memory.told), np.zeros(3)
+        self._take, self._send = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
         for ability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
             library.hdEnable(ability)
-        self._task = library.hdScheduleAsynchronous(self._callback, None, _MAX_PRIORITY)
+        # Kept for good: the vendor's thread must find it, whoever else is gone.
+        self._task = library.hdScheduleAsynchronous(frame_for_c(), keep_arguments(memory), _MAX_PRIORITY)
         library.hdSetSchedulerRate(RATE)
         library.hdStartScheduler()
         code = self._error()
         if code:
+            library.hdUnschedule(self._task)
             library.hdDisableDevice(self._device)
             raise SimError(f"HDAPI does not start its scheduler at {RATE} Hz: {_words(code)}")
+        _asked[addresses[-1]] = self._clock
 
     def _error(self) -> int:
         """The first of the errors that the library has kept, all of which are taken; 0 if there is none."""
@@ -150,10 +159,10 @@ class HdapiDevice:
             first = first or code
         return first
 
-    def _doubles(self, parameter: int, n: int) -> Array:
-        room = (ctypes.c_double * n)()
-        self._hd.hdGetDoublev(parameter, room)
-        return np.array(room)
+    def _nominal_force(self) -> float:
+        room = ctypes.c_double(0.0)
+        self._hd.hdGetDoublev(_MAX_FORCE, ctypes.byref(room))
+        return room.value
 
     def _integer(self, parameter: int) -> int:
         room = ctypes.c_int(0)
@@ -174,38 +183,6 @@ class HdapiDevice:
             own_weight=True,
         )  # fmt: skip
 
-    def _serve(self, _: int | None) -> int:
-        """What the vendor's scheduler calls: state in, force out."""
-        hd = self._hd
-        if self._closing:
-            return _CALLBACK_DONE
-        hd.hdBeginFrame(self._device)
-        sample = np.concatenate([
-            self._doubles(_POSITION, 3), self._doubles(_TRANSFORM, 16), self._doubles(_VELOCITY, 3),
-            [self._integer(_BUTTONS)],
-        ])  # fmt: skip
-        with self._lock:
-            alive = self._enable and self._clock() - self._commanded <= SILENCE
-            force = self._force if alive else np.zeros(3)
-            enable = self._enable
-        if enable != self._enabled:
-            (hd.hdEnable if enable else hd.hdDisable)(_FORCE_OUTPUT)
-            self._enabled = enable
-        hd.hdSetDoublev(_CURRENT_FORCE, (ctypes.c_double * 3)(*force))
-        hd.hdEndFrame(self._device)
-        code = self._error()
-        with self._lock:
-            if code and not self._pending[0]:
-                self._pending = code, self._evidence(code, sample)
-            self._sample, self._samples = sample, self._samples + 1
-            self._lock.notify_all()
-        return _CALLBACK_CONTINUE
-
-    def _evidence(self, code: int, sample: Array) -> float:
-        if code == 0x0200:
-            return float(np.max(self._doubles(_MOTOR_TEMPERATURE, 6)))
-        return float(np.linalg.norm(sample[_SPEED])) * 1e-3 if code == 0x0203 else float(code)
-
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`.
 
@@ -214,25 +191,20 @@ class HdapiDevice:
         DriverFault
             If the library reported an error, or the tip is where no Phantom's can be.
         """
-        with self._lock:
-            new = self._lock.wait_for(lambda: self._samples > self._taken or self._pending[0] != 0, timeout)
-            (code, value), self._pending = self._pending, (0, 0.0)
-            sample, samples = self._sample, self._samples
-        if code:
-            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), value, _words(code))
-        if not new:
+        told, take = self._told, self._take
+        take()
+        deadline = time.monotonic() + timeout
+        while told[TOLD_NEW] == 0.0 and told[TOLD_CODE] == 0.0 and time.monotonic() < deadline:
+            time.sleep(_LOOK)
+            take()
+        if told[TOLD_CODE] != 0.0:
+            code = int(told[TOLD_CODE])
+            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), told[TOLD_VALUE], _words(code))
+        if told[TOLD_FAULT] != 0.0:
+            raise pose_fault(told[TOLD_FAULT], told[TOLD_VALUE])
+        if told[TOLD_NEW] == 0.0:
             return False
-        self._taken = samples
-        rows = np.array(R_HP)
-        r_PE = sample[_ROTATION].reshape(4, 4).T[:3, :3]  # OpenGL's order: column by column
-        told = np.zeros(READING_SIZE)
-        write_pose(told, sample[:3] * 1e-3, rows @ r_PE @ rows.T)
-        reading[:] = told
-        self._theta = told[READING_THETA : READING_THETA + 3]
-        reading[READING_SWITCH] = float(int(sample[-1]) & 1)
-        reading[READING_CLOCK] = self._clock()
-        self.telemetry[READ] = samples
-        reading[READING_SEQUENCE] = samples
+        np.copyto(reading, self._memory.reading)
         return True
 
     def write(self, torque: Array, enable: bool) -> None:
@@ -243,30 +215,32 @@ class HdapiDevice:
         DriverFault
             If a torque is not finite: then there is no force.
         """
-        if not np.all(np.isfinite(torque)):
-            self.let_go()
-            raise DriverFault(Fault.FORCE_NOT_FINITE, float(np.sum(torque)))
-        force = tip_force(self._theta, torque, self._largest) if enable else np.zeros(3)
-        with self._lock:
-            self._force, self._enable, self._commanded = force, enable, self._clock()
+        told = self._told
+        np.copyto(self._memory.torque, torque)
+        told[TOLD_ENABLE] = enable
+        self._send()
+        if told[TOLD_FAULT] != 0.0:
+            raise DriverFault(Fault.FORCE_NOT_FINITE, told[TOLD_VALUE])
 
     def let_go(self) -> None:
         """Motors off with the next callback; never raises."""
-        with self._lock:
-            self._force, self._enable = np.zeros(3), False
+        np.copyto(self._memory.torque, self._off)
+        self._told[TOLD_ENABLE] = 0.0
+        self._send()
 
     def close(self) -> None:
         """Let go, and give the device back."""
         self.let_go()
-        self._closing = True
+        self._memory.numbers[N_CLOSING] = 1
         self._hd.hdDisable(_FORCE_OUTPUT)
         self._hd.hdStopScheduler()
         self._hd.hdUnschedule(self._task)
         self._hd.hdDisableDevice(self._device)
+        _asked.pop(address_of(self._clock), None)
 
 
-_SAMPLE = 23
-_ROTATION, _SPEED = slice(3, 19), slice(19, 22)
+_asked: dict[int, Any] = {}
+"""Clocks that a vendor's thread asks, whether their drivers are still there or not, by their addresses."""
 
 
 def _words(code: int) -> str:

@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from controllers.state import Array, IntArray
+from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point
 from sim.compilation.kept_call import KeptCall
 from sim.compilation.memory_access import items
@@ -32,30 +30,17 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
 }  # hidapi.h
 
 
-def _calling(_: Any, function: Any, arguments: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        values = [builder.extract_value(given[1], i) for i in range(len(arguments.types))]
-        shape = ir.FunctionType(ir.IntType(32), [value.type for value in values])
-        return builder.call(builder.inttoptr(given[0], shape.as_pointer()), values)
-
-    return types.int32(types.intp, arguments), generate
-
-
-_c_call: Any = intrinsic(_calling)
-"""The int that a C function at an address returns; arguments of the types that it takes, nothing checks them."""
-
-
 @entry_point
 def read_report(places: IntArray, incoming: Bytes, told: Array) -> None:
     """hid_read_timeout: `places` are its address and the device's, `told` (2,) the timeout [ms] and what it returns."""
     room, size, timeout = incoming.ctypes.data, np.uint64(incoming.shape[0]), np.int32(told[0])
-    told[1] = _c_call(places[0], (places[1], room, size, timeout))
+    told[1] = call_int(places[0], (places[1], room, size, timeout))
 
 
 @entry_point
 def write_report(places: IntArray, outgoing: Bytes, told: Array) -> None:
     """hid_write: `places` are its address and the device's, `told` (1,) what it returns."""
-    told[0] = _c_call(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
+    told[0] = call_int(places[0], (places[1], outgoing.ctypes.data, np.uint64(outgoing.shape[0])))
 
 
 class HidapiNode:
@@ -87,8 +72,7 @@ class HidapiNode:
             raise OSError(f"hidapi cannot open {path}")
 
     def _places(self, name: str) -> IntArray:
-        address = ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
-        return np.array([address, self._device], np.int64)
+        return np.array([address_of(getattr(self._library, name)), self._device], np.int64)
 
     def transfers(self, incoming: Bytes, outgoing: Bytes) -> tuple[Callable[[int], int], Callable[[], int]]:
         """What receives a report into `incoming`, in so many milliseconds, and what sends `outgoing`; kept calls."""

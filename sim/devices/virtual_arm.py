@@ -7,75 +7,172 @@ Libraries of vendors tell a pose and take a force at the tip. With the Phantom's
 
 exactly the force that the field asked for, as long as no torque was cut. N, the weight of the Phantom's linkage, is
 left out: such a device carries its own.
+
+The turret moves the tip sideways, by its distance ρ from the turret's axis; upper arm and forearm move it within their
+plane, at right angles to that. So J has the singular value \|ρ\| and those of the 2×2 matrix of both, whose
+determinant is :math:`l_1 l_2 \cos(\theta_3 - \theta_2)`.
 """
 
+import math
+
 import numpy as np
+from numba import njit
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, gimbal_angles, inverse_kinematics, jacobian, within_limits
+from models.phantom.kinematics import (
+    L1,
+    L2,
+    Quat,
+    Scalars3,
+    Vec3,
+    forward_kinematics,
+    gimbal_angles,
+    inverse_kinematics,
+    within_limits,
+)
+from sim.compilation.compiled import entry_point
 from sim.devices.driver import DriverFault
 from sim.devices.exchange import READING_GIMBAL, READING_THETA
 
 WEAKEST = 0.05
 """Least singular value of J [m/rad] for which a torque is turned into a force: on the turret's axis, where it is zero,
 no torque gives one. The Phantom's is 0.17 at θ = 0."""
+SKEWED = 1e-3
+"""Largest entry of R Rᵀ − 1 of an orientation, which is 0 of a rotation: what was rounded to four digits passes."""
+
+_NOT_FINITE, _LEFT_WORKSPACE = int(Fault.READING_NOT_FINITE), int(Fault.LEFT_WORKSPACE)
 
 
-def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
+@njit
+def quaternion_of(rotation: Array) -> Quat:
     """Unit quaternion wxyz of a rotation matrix (3, 3), with w ≥ 0 (Shepperd 1978: by its largest component)."""
-    trace = float(np.trace(rotation))
-    squares = np.array([trace, *(2.0 * np.diag(rotation) - trace)])
-    i = int(np.argmax(squares))
-    skew = (rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1])
-    q = np.empty(4)
-    q[i] = 1.0 + squares[i]
-    if i == 0:
-        q[1:] = skew
+    a, b, c = rotation[0, 0], rotation[1, 1], rotation[2, 2]
+    x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
+    xy, yz, zx = rotation[1, 0] + rotation[0, 1], rotation[2, 1] + rotation[1, 2], rotation[0, 2] + rotation[2, 0]
+    # In each, four times the component that is largest, times all four.
+    if a + b + c >= max(a, b, c):
+        q = 1.0 + a + b + c, x, y, z
+    elif a >= max(b, c):
+        q = x, 1.0 + a - b - c, xy, zx
+    elif b >= c:
+        q = y, xy, 1.0 + b - c - a, yz
     else:
-        j, k = i % 3 + 1, (i + 1) % 3 + 1
-        q[0] = skew[i - 1]
-        q[j] = rotation[j - 1, i - 1] + rotation[i - 1, j - 1]
-        q[k] = rotation[k - 1, i - 1] + rotation[i - 1, k - 1]
-    q *= (1.0 if q[0] >= 0.0 else -1.0) / np.linalg.norm(q)
-    return float(q[0]), float(q[1]), float(q[2]), float(q[3])
+        q = z, zx, yz, 1.0 + c - a - b
+    scale = math.copysign(1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q[0])
+    return scale * q[0], scale * q[1], scale * q[2], scale * q[3]
 
 
-def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
-    """Write θ and gimbal angles of a pose into a reading.
+@njit
+def skewness(matrix: Array) -> float:
+    """How far a matrix (3, 3) is from a rotation: the largest entry of R Rᵀ − 1, and 2 at least for a reflection."""
+    largest = 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            product = matrix[i, 0] * matrix[j, 0] + matrix[i, 1] * matrix[j, 1] + matrix[i, 2] * matrix[j, 2]
+            largest = max(largest, abs(product - (1.0 if i == j else 0.0)))
+    determinant = (
+        matrix[0, 0] * (matrix[1, 1] * matrix[2, 2] - matrix[1, 2] * matrix[2, 1])
+        + matrix[0, 1] * (matrix[1, 2] * matrix[2, 0] - matrix[1, 0] * matrix[2, 2])
+        + matrix[0, 2] * (matrix[1, 0] * matrix[2, 1] - matrix[1, 1] * matrix[2, 0])
+    )
+    return largest if determinant > 0.0 else max(largest, 2.0)
+
+
+@njit
+def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
+    """Write θ and gimbal angles of a pose into a reading; nothing where that is a fault.
 
     Parameters
     ----------
     reading : Array
         Of an `Exchange`, shape (9,).
-    p_P, r_HS : Array
-        Tip in the device frame [m], shape (3,), and the stylus's orientation in H, shape (3, 3).
+    p_P, r_HS
+        Tip in the device frame [m], and the stylus's orientation in H, shape (3, 3).
+
+    Returns
+    -------
+    fault : int
+        Why the Phantom cannot be there, of `Fault`; 0 where it can.
+    value : float
+        In the fault's unit.
+    """
+    total = p_P[0] + p_P[1] + p_P[2]
+    for i in range(3):
+        for j in range(3):
+            total += r_HS[i, j]
+    if not math.isfinite(total):
+        return _NOT_FINITE, total
+    skewed = skewness(r_HS)
+    if not skewed <= SKEWED:
+        return _NOT_FINITE, skewed
+    a, b, c, reachable = inverse_kinematics(p_P)
+    theta = (a, b, c)
+    if not reachable or not within_limits(theta):
+        x, y, z = forward_kinematics(theta)
+        return _LEFT_WORKSPACE, math.sqrt((x - p_P[0]) ** 2 + (y - p_P[1]) ** 2 + (z - p_P[2]) ** 2)
+    gimbal = gimbal_angles(theta, quaternion_of(r_HS))
+    for i in range(3):
+        reading[READING_THETA + i], reading[READING_GIMBAL + i] = theta[i], gimbal[i]
+    return 0, 0.0
+
+
+@entry_point
+def place_by_numbers(reading: Array, p_P: Array, r_HS: Array, told: Array) -> None:
+    """`place_stylus`, whose result is written to `told`, shape (2,)."""
+    told[0], told[1] = place_stylus(reading, (p_P[0], p_P[1], p_P[2]), r_HS)
+
+
+def write_pose(reading: Array, p_P: Array, r_HS: Array) -> None:
+    """Write θ and gimbal angles of a pose into a reading: `place_stylus`.
 
     Raises
     ------
     DriverFault
-        If the Phantom cannot be there, or the pose is not finite.
+        If the Phantom cannot be there, the pose is not finite, or the orientation no rotation.
     """
-    if not (np.all(np.isfinite(p_P)) and np.all(np.isfinite(r_HS))):
-        raise DriverFault(Fault.READING_NOT_FINITE, float(np.sum(p_P) + np.sum(r_HS)))
-    a, b, c, reachable = inverse_kinematics((p_P[0], p_P[1], p_P[2]))
-    theta = (a, b, c)
-    if not reachable or not within_limits(theta):
-        raise DriverFault(Fault.LEFT_WORKSPACE, float(np.linalg.norm(np.subtract(forward_kinematics(theta), p_P))))
-    reading[READING_THETA : READING_THETA + 3] = theta
-    reading[READING_GIMBAL : READING_GIMBAL + 3] = gimbal_angles(theta, quaternion_of(r_HS))
+    told = np.zeros(2)
+    place_by_numbers(reading, np.ascontiguousarray(p_P), np.ascontiguousarray(r_HS), told)
+    if told[0] != 0.0:
+        raise pose_fault(told[0], told[1])
 
 
-def tip_force(theta: Array, torque: Array, largest: float) -> Array:
-    """Force at the tip in the device frame [N], shape (3,), for torques of the joints [N m], at most `largest`.
+def pose_fault(fault: float, value: float) -> DriverFault:
+    """What `place_stylus` found, to be raised."""
+    skewed = fault == _NOT_FINITE and math.isfinite(value)
+    return DriverFault(Fault(int(fault)), value, "an orientation that is no rotation" if skewed else "")
 
-    Zero where the Jacobian is nearly singular.
+
+@njit
+def least_gain(theta: Vec3) -> float:
+    """Least singular value of J(θ) [m/rad]."""
+    reach = L1 * np.cos(theta[1]) + L2 * np.sin(theta[2])
+    bend = theta[2] - theta[1]
+    mean, half, cross = 0.5 * (L1 * L1 + L2 * L2), 0.5 * (L1 * L1 - L2 * L2), L1 * L2 * np.sin(bend)
+    largest = math.sqrt(mean + math.sqrt(half * half + cross * cross))
+    return min(abs(reach), abs(L1 * L2 * np.cos(bend)) / largest)
+
+
+@njit
+def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
+    """Force at the tip in the device frame [N] for torques of the joints [N m], at most `largest`.
+
+    Zero where the Jacobian is nearly singular, or numbers become too large to be any.
     """
-    angles = (theta[0], theta[1], theta[2])
-    j = np.array(jacobian(angles))
-    if np.linalg.svd(j, compute_uv=False)[-1] < WEAKEST:
-        return np.zeros(3)
-    force: Array = np.linalg.solve(j.T, torque - np.array(gravity_torques(angles))).astype(np.float64)
-    size = float(np.linalg.norm(force))
-    return force * (largest / size) if size > largest else force
+    if least_gain(theta) < WEAKEST:
+        return 0.0, 0.0, 0.0
+    s1, c1 = np.sin(theta[0]), np.cos(theta[0])
+    s2, c2 = np.sin(theta[1]), np.cos(theta[1])
+    s3, c3 = np.sin(theta[2]), np.cos(theta[2])
+    weight = gravity_torques(theta)
+    upper, fore = (torque[1] - weight[1]) / L1, (torque[2] - weight[2]) / L2
+    sideways = (torque[0] - weight[0]) / (L1 * c2 + L2 * s3)
+    bent = np.cos(theta[2] - theta[1])
+    up, outwards = (c3 * upper + s2 * fore) / bent, (c2 * fore - s3 * upper) / bent
+    x, y, z = c1 * sideways + s1 * outwards, up, c1 * outwards - s1 * sideways
+    size = math.sqrt(x * x + y * y + z * z)
+    if not math.isfinite(size):
+        return 0.0, 0.0, 0.0
+    share = largest / size if size > largest else 1.0
+    return share * x, share * y, share * z

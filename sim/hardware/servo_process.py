@@ -26,11 +26,12 @@ from models.errors import ModelError
 from sim.compilation.compiled import entry_point
 from sim.compilation.kept_call import KeptCall
 from sim.compilation.memory_access import items
+from sim.compilation.sequence_lock import read_whole, write_whole
 from sim.devices.driver import BAD, LOST, DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
-from sim.hardware.shared import Ring, SharedNumbers, append_row, read_whole, write_whole
+from sim.hardware.shared import Ring, SharedNumbers, append_row
 from sim.hardware.spread import Quantiles, Spread, count_time
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
@@ -157,7 +158,7 @@ def _leave(number: int, frame: object) -> None:
 
 @entry_point
 def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
-    """Read what the controls order (as `sim.hardware.shared.read_whole`), and whose child this process is, (1,)."""
+    """Read what the controls order (as `read_whole`), and whose child this process is, (1,)."""
     read_whole(count, shared, whole, order)
     parent[0] = _getppid()
 

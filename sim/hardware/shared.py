@@ -1,59 +1,14 @@
-"""Memory that processes share: numbers behind a sequence lock, and a ring of rows. Neither makes its writer wait.
-
-Numbers of eight bytes are written whole; barriers between count and numbers let every process, on every processor, see
-them in the order in which they are written.
-"""
+"""Memory that processes share: numbers behind a sequence lock, and a ring of rows. Neither makes its writer wait."""
 
 import math
 from multiprocessing.shared_memory import SharedMemory
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
-
-_TRIES = 20  # so a writer that was stopped in the middle costs its reader microseconds
-
-
-def _fence(_: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        builder.fence("seq_cst")
-        return context.get_dummy_value()
-
-    return types.none(), generate
-
-
-_barrier: Any = intrinsic(_fence)
-
-
-@entry_point
-def write_whole(count: IntArray, shared: Array, numbers: Array) -> None:
-    """`SharedNumbers.write`."""
-    count[0] += 1
-    _barrier()
-    for i in range(len(numbers)):
-        shared[i] = numbers[i]
-    _barrier()
-    count[0] += 1
-
-
-@entry_point
-def read_whole(count: IntArray, shared: Array, whole: Array, into: Array) -> bool:
-    """`SharedNumbers.read`; `whole` is as long as `into`, for what may not be whole."""
-    for _ in range(_TRIES):
-        before = count[0]
-        _barrier()
-        for i in range(len(whole)):
-            whole[i] = shared[i]
-        _barrier()
-        if before % 2 == 0 and before == count[0]:
-            for i in range(len(whole)):
-                into[i] = whole[i]
-            return True
-    return False
+from sim.compilation.sequence_lock import barrier, read_whole, write_whole
 
 
 @entry_point
@@ -62,7 +17,7 @@ def append_row(count: IntArray, rows: Array, row: Array) -> None:
     place = count[0] % len(rows)
     for i in range(len(row)):
         rows[place, i] = row[i]
-    _barrier()
+    barrier()
     count[0] += 1
 
 
@@ -107,9 +62,8 @@ class _Shared:
 class SharedNumbers(_Shared):
     """Numbers that one process writes and others read, never half of one writing and half of the next.
 
-    A sequence lock: the writer counts up to an odd number, writes, and counts up to an even one; a reader that sees an
-    odd number, or another one after than before, reads again (Lameter, "Effective synchronization on Linux/NUMA
-    systems", 2005). May be sent to another process as an argument of it.
+    By a sequence lock: the writer counts up to an odd number, writes, and counts up to an even one; a reader that sees
+    an odd number, or another one after than before, reads again. May be sent to another process as an argument of it.
 
     Parameters
     ----------

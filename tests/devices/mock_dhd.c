@@ -20,6 +20,7 @@ void mock_error(int error) { m.error = error; }
 void mock_missing(int missing) { m.missing = missing; }
 void mock_guard(int guard) { m.guard = guard; }
 int mock_watchdog(void) { return m.watchdog; }
+int mock_enabled(void) { return m.enabled; }
 int mock_opened(void) { return m.opened; }
 void mock_force(double *force) {
     for (int i = 0; i < 3; i++) force[i] = m.enabled && m.opened ? m.force[i] : 0.0;

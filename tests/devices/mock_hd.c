@@ -13,12 +13,14 @@ static struct {
     int buttons, enabled, begun, opened, manual, running, missing, style, no_scheduler;
     unsigned calibration, errors[32];
     int first, last;
-    unsigned long rate, frames;
+    unsigned long rate, frames, served;
     Callback callback;
     void *data;
     unsigned short priority;
     pthread_t thread;
 } m;
+
+extern void heap_open(void) __attribute__((weak)); /* where calls of the heap are counted, those of its thread are */
 
 static void fail(unsigned code) { if (m.last - m.first < 32) m.errors[m.last++ % 32] = code; }
 
@@ -38,11 +40,16 @@ void mock_missing(int missing) { m.missing = missing; }
 void mock_no_scheduler(int none) { m.no_scheduler = none; }
 void mock_temperature(double share) { m.temperature = share; }
 unsigned long mock_frames(void) { return m.frames; }
+int mock_is_counted(void) { return heap_open != 0; }
+unsigned long mock_served(void) { return m.served; }
 int mock_opened(void) { return m.opened; }
 void mock_force(double *force) { /* what the motors give */
     for (int i = 0; i < 3; i++) force[i] = m.enabled && m.opened ? m.force[i] : 0.0;
 }
-void mock_tick(void) { if (m.running && m.callback && m.callback(m.data) == 0) m.callback = 0; }
+void mock_tick(void) {
+    if (m.running && m.callback && m.callback(m.data) == 0) m.callback = 0;
+    m.served++;
+}
 
 /* The interface. */
 unsigned hdInitDevice(const char *name) {
@@ -92,6 +99,7 @@ void hdSetSchedulerRate(unsigned long rate) { m.rate = rate; if (rate != 1000 &&
 static void *serve(void *unused) {
     struct timespec period = {0, 1000000000L / (long)m.rate};
     (void)unused;
+    if (heap_open) heap_open();
     while (m.running) { mock_tick(); nanosleep(&period, 0); }
     return 0;
 }

@@ -1,13 +1,14 @@
-"""DHD by ctypes, against a mock of the library built from C."""
+"""DHD, against a mock of the library built from C."""
 
 import ctypes
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
+from models.phantom.kinematics import forward_kinematics, joint_torques, stylus_orientation, vector_to_device_frame
 from sim.devices.dhd import DHD, LARGEST, DhdDevice
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
@@ -25,8 +26,9 @@ def dhd(library):
     return library
 
 
-def pose(dhd, p) -> None:
-    dhd.mock_pose((ctypes.c_double * 3)(*p), (ctypes.c_double * 9)(*np.eye(3).ravel()))
+def pose(dhd, p, frame=None) -> None:
+    frame = np.eye(3) if frame is None else frame
+    dhd.mock_pose((ctypes.c_double * 3)(*p), (ctypes.c_double * 9)(*frame.ravel()))
 
 
 def test_who_it_is_and_that_its_watchdog_of_ten_milliseconds_is_set(dhd) -> None:
@@ -68,6 +70,41 @@ def test_forces_are_newtons_in_its_axes_and_no_larger_than_the_limit(dhd) -> Non
     device.write(torque, True)
     device.close()
     assert not dhd.mock_opened()
+
+
+def test_its_frame_is_the_stylus_s_row_by_row(dhd) -> None:
+    device, reading, rng = DhdDevice(dhd), np.zeros(9), np.random.default_rng(8)
+    half = Rotation.from_euler("z", 180, degrees=True)  # its axes are H's, turned about the vertical
+    for _ in range(50):
+        turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3))
+        pose(dhd, np.zeros(3), turn.as_matrix())
+        assert device.read(reading, 0.0)
+        told = Rotation.from_quat(stylus_orientation(tuple(reading[3:6]), tuple(reading[6:9])), scalar_first=True)
+        assert (told.inv() * half * turn * half.inv()).magnitude() < 1e-12
+
+
+def test_where_the_phantom_cannot_be_and_what_is_no_pose_is_a_fault_and_no_reading(dhd) -> None:
+    device, reading = DhdDevice(dhd), np.zeros(9)
+    for p, frame, fault in [
+        ([0.9, 0.0, 0.0], np.eye(3), Fault.LEFT_WORKSPACE), ([0.0, np.nan, 0.0], np.eye(3), Fault.READING_NOT_FINITE),
+        ([0.0, 0.0, 0.0], np.diag([1.0, 1.0, -1.0]), Fault.READING_NOT_FINITE),
+    ]:  # fmt: skip
+        pose(dhd, p, frame)
+        with pytest.raises(DriverFault) as refused:
+            device.read(reading, 0.0)
+        assert refused.value.fault is fault
+    np.testing.assert_array_equal(reading, 0.0)
+    pose(dhd, [0.0, 0.0, 0.0])
+    assert device.read(reading, 0.0)
+    assert reading[0] == 1.0
+
+
+def test_letting_go_switches_the_motors_off_whoever_switched_them_on(dhd) -> None:
+    device = DhdDevice(dhd)
+    dhd.dhdEnableForce(1, b"\x02")
+    assert dhd.mock_enabled()
+    device.let_go()
+    assert not dhd.mock_enabled()
 
 
 @pytest.mark.parametrize(("code", "fault"), [(2, Fault.UNPLUGGED), (7, Fault.UNPLUGGED), (12, Fault.DEVICE_REPORTED)])

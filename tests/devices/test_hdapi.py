@@ -1,13 +1,17 @@
-"""HDAPI by ctypes, against a mock of the library built from C."""
+"""HDAPI, against a mock of the library built from C."""
 
+import ctypes
+import gc
+import threading
 import time
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, joint_torques
+from models.phantom.kinematics import R_HP, forward_kinematics, joint_torques, stylus_orientation
 from sim.devices.driver import DriverFault
 from sim.devices.hdapi import ERRORS, HDAPI, HdapiDevice
 from sim.errors import SimError
@@ -36,7 +40,7 @@ def pose(hd, p_mm, rotation=None) -> None:
     transform[:3, 3] = p_mm
     if rotation is not None:
         transform[:3, :3] = rotation
-    hd.mock_pose((__import__("ctypes").c_double * 16)(*transform.T.ravel()))
+    hd.mock_pose((ctypes.c_double * 16)(*transform.T.ravel()))
 
 
 def told(device) -> np.ndarray:
@@ -122,10 +126,25 @@ def test_every_error_of_the_library_is_a_fault_with_its_name(hd, clock, code) ->
     told(device)  # once
 
 
+def test_the_columns_of_its_transform_are_the_stylus_s_axes_in_its_own(hd, clock) -> None:
+    device, rng, r_HP = HdapiDevice(hd, clock=clock), np.random.default_rng(8), Rotation.from_matrix(R_HP)
+    for _ in range(50):
+        turn = Rotation.from_rotvec(rng.normal(0.0, 0.4, 3))
+        pose(hd, np.zeros(3), turn.as_matrix())
+        hd.mock_tick()
+        reading = told(device)
+        q = stylus_orientation(tuple(reading[3:6]), tuple(reading[6:9]))
+        assert (Rotation.from_quat(q, scalar_first=True).inv() * r_HP * turn * r_HP.inv()).magnitude() < 1e-12
+
+
 def test_where_the_phantom_cannot_be_or_what_is_no_number_is_a_fault(hd, clock) -> None:
     device = HdapiDevice(hd, clock=clock)
-    for p, fault in [([0.0, 0.0, 900.0], Fault.LEFT_WORKSPACE), ([np.nan, 0.0, 0.0], Fault.READING_NOT_FINITE)]:
-        pose(hd, p)
+    for p, rotation, fault in [
+        ([0.0, 0.0, 900.0], None, Fault.LEFT_WORKSPACE), ([np.nan, 0.0, 0.0], None, Fault.READING_NOT_FINITE),
+        ([0.0, 0.0, 0.0], np.diag([1.0, 1.0, -1.0]), Fault.READING_NOT_FINITE),
+        ([0.0, 0.0, 0.0], np.zeros((3, 3)), Fault.READING_NOT_FINITE),
+    ]:  # fmt: skip
+        pose(hd, p, rotation)
         hd.mock_tick()
         with pytest.raises(DriverFault) as refused:
             device.read(np.zeros(9), 0.0)
@@ -156,6 +175,80 @@ def test_the_vendor_s_own_thread_serves_a_thousand_times_a_second(hd) -> None:
     frames = hd.mock_frames()
     time.sleep(0.01)
     assert hd.mock_frames() == frames
+
+
+def test_its_thread_waits_for_no_python_and_lets_go_when_no_command_comes(hd) -> None:
+    hd.mock_manual(0)
+    device, libc = HdapiDevice(hd), ctypes.PyDLL(None)  # which keeps the GIL
+    while not device.read(np.zeros(9), 0.5):
+        pass
+    device.write(np.ones(3), True)
+    frames = hd.mock_frames()
+    libc.usleep(200_000)
+    assert hd.mock_frames() - frames > 50
+    assert not three(hd).any()
+    device.close()
+
+
+def test_a_read_waits_for_a_sample_as_long_as_it_is_told_and_no_longer(hd) -> None:
+    device = HdapiDevice(hd)
+    first = time.perf_counter()
+    assert not device.read(np.zeros(9), 0.05)
+    assert time.perf_counter() - first >= 0.05
+    tick = threading.Timer(0.05, hd.mock_tick)
+    tick.start()
+    assert device.read(np.zeros(9), 60.0)
+    assert time.perf_counter() - first < 30.0
+    tick.join()
+
+
+def test_a_reading_carries_when_it_was_made_by_the_clock(hd) -> None:
+    device, before = HdapiDevice(hd), time.perf_counter()
+    hd.mock_tick()
+    after = time.perf_counter()
+    time.sleep(0.01)
+    assert before <= told(device)[1] <= after
+
+
+def test_a_command_that_is_half_written_is_not_heard_and_the_last_one_grows_old(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    hd.mock_tick()
+    told(device)
+    device.write(np.ones(3), True)
+    hd.mock_tick()
+    force = three(hd)
+    command = device._memory.command
+    command.changes[0] += 1  # a writer was stopped here
+    command.shared[:3] = 100.0
+    clock.now += 4e-3
+    hd.mock_tick()
+    np.testing.assert_array_equal(three(hd), force)
+    clock.now += 2e-3
+    hd.mock_tick()
+    assert not three(hd).any()
+
+
+def test_a_sample_that_is_half_written_is_none(hd, clock) -> None:
+    device = HdapiDevice(hd, clock=clock)
+    hd.mock_tick()
+    device._memory.sample.changes[0] += 1
+    assert not device.read(np.zeros(9), 0.0)
+    device._memory.sample.changes[0] += 1
+    told(device)
+
+
+@pytest.mark.parametrize("clock", [time.perf_counter, lambda: time.perf_counter()])
+def test_a_driver_that_nobody_closed_leaves_the_thread_what_it_needs(hd, clock) -> None:
+    hd.mock_manual(0)
+    device = HdapiDevice(hd, clock=clock)
+    device.write(np.ones(3), True)
+    del device
+    gc.collect()
+    frames = hd.mock_frames()
+    while hd.mock_frames() < frames + 20:
+        time.sleep(1e-3)
+    assert not three(hd).any()
+    hd.hdStopScheduler()
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, joint_torques, stylus_orientation
+from models.phantom.kinematics import forward_kinematics, jacobian, joint_torques, stylus_orientation
 from sim.devices.driver import DriverFault
-from sim.devices.virtual_arm import quaternion_of, tip_force, write_pose
+from sim.devices.virtual_arm import SKEWED, WEAKEST, least_gain, quaternion_of, skewness, tip_force, write_pose
 
 
 def test_the_pose_comes_back_from_the_angles() -> None:
@@ -23,15 +23,18 @@ def test_the_pose_comes_back_from_the_angles() -> None:
         np.testing.assert_allclose(q * np.sign(q[0]), rotation.as_quat(canonical=True, scalar_first=True), atol=1e-12)
 
 
-def test_quaternions_agree_with_scipy_s_also_near_half_a_turn() -> None:
+@pytest.mark.parametrize("angle", [None, 1e-9, 0.1, 2.0, np.pi - 1e-7, np.pi])
+def test_quaternions_are_scipy_s_also_at_half_a_turn(angle) -> None:
     rng = np.random.default_rng(2)
-    for angle in [1e-9, 0.1, 2.0, np.pi - 1e-7, np.pi]:
-        for _ in range(50):
-            axis = rng.normal(size=3)
+    for k in range(300):
+        axis = np.eye(3)[k] if k < 3 else rng.normal(size=3)
+        rotation = Rotation.random(rng=rng)
+        if angle is not None:
             rotation = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
-            ours = np.array(quaternion_of(rotation.as_matrix()))
-            theirs = rotation.as_quat(scalar_first=True)
-            assert abs(abs(ours @ theirs) - 1.0) < 1e-12
+        ours, theirs = np.array(quaternion_of(rotation.as_matrix())), rotation.as_quat(scalar_first=True)
+        np.testing.assert_allclose(ours * np.sign(ours @ theirs), theirs, atol=1e-14)
+        assert ours[0] >= 0.0
+        assert skewness(rotation.as_matrix()) < 1e-14
 
 
 def test_the_force_is_the_one_that_the_torques_were_made_of() -> None:
@@ -40,15 +43,34 @@ def test_the_force_is_the_one_that_the_torques_were_made_of() -> None:
         reading, force = np.zeros(9), rng.uniform(-3.0, 3.0, 3)
         write_pose(reading, rng.uniform(-0.06, 0.06, 3), np.eye(3))
         theta = tuple(reading[3:6])
-        torque = np.add(joint_torques(theta, tuple(force)), gravity_torques(theta))
-        np.testing.assert_allclose(tip_force(reading[3:6], torque, 100.0), force, atol=1e-12)
-        cut = tip_force(reading[3:6], torque, 1.0)
+        torque = tuple(np.add(joint_torques(theta, tuple(force)), gravity_torques(theta)))
+        np.testing.assert_allclose(tip_force(theta, torque, 100.0), force, atol=1e-12)
+        cut = tip_force(theta, torque, 1.0)
         assert np.linalg.norm(cut) <= 1.0 + 1e-12
         np.testing.assert_allclose(np.cross(cut, force), 0.0, atol=1e-12)
 
 
+def test_the_closed_form_is_what_linear_algebra_finds_wherever_the_arm_is() -> None:
+    rng, weak = np.random.default_rng(4), 0
+    for _ in range(2000):
+        theta, torque = tuple(rng.uniform(-1.6, 1.6, 3)), rng.normal(size=3)
+        j = np.array(jacobian(theta))
+        least = np.linalg.svd(j, compute_uv=False)[-1]
+        assert least_gain(theta) == pytest.approx(least, abs=1e-15)
+        expected = np.linalg.solve(j.T, torque - gravity_torques(theta)) if least >= WEAKEST else np.zeros(3)
+        np.testing.assert_allclose(tip_force(theta, tuple(torque), 1e9), expected, rtol=1e-12, atol=1e-12)
+        weak += least < WEAKEST
+    assert 100 < weak < 1900
+
+
 def test_on_the_turret_s_axis_there_is_no_force() -> None:
-    assert not tip_force(np.array([0.0, np.pi / 2.0, 0.0]), np.ones(3), 10.0).any()
+    assert tip_force((0.0, np.pi / 2.0, 0.0), (1.0, 1.0, 1.0), 10.0) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("torque", [1e153, 1e160, 1e308, np.inf, np.nan])
+def test_no_torque_however_large_makes_a_force_that_is_none_or_too_large(torque: float) -> None:
+    force = tip_force((0.1, 0.2, 0.3), (torque, -torque, torque), 8.5)
+    assert np.linalg.norm(force) <= 8.5 * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("p", [[0.0, 0.0, 5.0], [0.0, -0.6, 0.0]])
@@ -65,3 +87,32 @@ def test_a_pose_that_is_not_finite_is_a_fault() -> None:
     with pytest.raises(DriverFault) as refused:
         write_pose(np.zeros(9), np.array([0.0, np.nan, 0.0]), np.eye(3))
     assert refused.value.fault is Fault.READING_NOT_FINITE
+
+
+TURN = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix()
+NO_ROTATIONS = {
+    "zero": 0.0 * TURN,
+    "a reflection": TURN @ np.diag([1.0, 1.0, -1.0]),
+    "point inversion": -TURN,
+    "twice as long": 2.0 * TURN,
+    "a row twice": TURN[[0, 1, 1]],
+    "sheared": TURN @ (np.eye(3) + 2.1 * SKEWED * np.eye(3, k=1)),
+    "beyond all numbers": 1e200 * TURN,
+}
+
+
+@pytest.mark.parametrize("name", NO_ROTATIONS)
+def test_an_orientation_that_is_no_rotation_is_a_fault(name) -> None:
+    reading = np.ones(9)
+    with pytest.raises(DriverFault) as refused:
+        write_pose(reading, np.zeros(3), NO_ROTATIONS[name])
+    assert refused.value.fault is Fault.READING_NOT_FINITE
+    assert refused.value.value > SKEWED
+    np.testing.assert_array_equal(reading, np.ones(9))
+
+
+def test_an_orientation_that_was_rounded_is_taken() -> None:
+    reading, exact = np.zeros(9), np.zeros(9)
+    write_pose(reading, np.zeros(3), np.round(TURN, 4))
+    write_pose(exact, np.zeros(3), TURN)
+    np.testing.assert_allclose(reading, exact, atol=3e-4)

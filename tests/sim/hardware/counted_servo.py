@@ -8,11 +8,16 @@ import ctypes
 import multiprocessing
 import socket
 import sys
+import time
 
 import numpy as np
 
 from controllers.safety.arming import ARM
+from models.phantom.kinematics import L1
+from sim.devices.dhd import DHD, DhdDevice
+from sim.devices.driver import READ
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_THETA
+from sim.devices.hdapi import HDAPI, HdapiDevice
 from sim.devices.hid import HidPhantom
 from sim.devices.hid_protocol import COUNT_UNIT
 from sim.devices.hidapi_node import HidapiNode
@@ -68,10 +73,48 @@ class Reports:
         self.firmware.mock_tick(counts.astype(np.int32).tobytes())
 
 
+class Frames:
+    """A mock of HDAPI, whose thread goes on by itself: a turn that follows in time on one with a sample has to wait."""
+
+    def __init__(self, library: str):
+        self.hd = HDAPI.load(library)
+        self.hd.mock_reset()
+        self.hd.mock_manual(0)
+        assert self.hd.mock_is_counted()
+        self.hd.mock_served.restype = ctypes.c_ulong
+        self.driver, self.transform, self.next = HdapiDevice(self.hd), np.eye(4), 0.0
+
+    def pass_tick(self, number: float) -> None:
+        self.transform[3, 0] = 1e3 * theta_at(number) * L1
+        self.hd.mock_pose(self.transform.ctypes)
+        if number == self.next:
+            self.next = 0.0
+            return
+        while self.hd.mock_served() <= self.driver.telemetry[READ]:
+            time.sleep(1e-4)
+        self.next = number + 1.0
+
+
+class Poses:
+    """A mock of DHD."""
+
+    def __init__(self, library: str):
+        self.dhd = DHD.load(library)
+        self.dhd.mock_reset()
+        self.driver, self.position, self.frame = DhdDevice(self.dhd), np.zeros(3), np.eye(3)
+
+    def pass_tick(self, number: float) -> None:
+        self.position[1] = theta_at(number) * L1
+        self.dhd.mock_pose(self.position.ctypes, self.frame.ctypes)
+
+
+DEVICES = {"packets": Packets, "HID": Reports, "HDAPI": Frames, "DHD": Poses}
+
+
 class CountedServo(ServoProcess):
     """Counts after tick `WARM`, but for what the device does between two turns, and orders its end `TICKS` later."""
 
-    def __init__(self, device: Packets | Reports):
+    def __init__(self, device: Packets | Reports | Frames | Poses):
         self.orders, self.status, self.rows = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE), Ring(100, ROW_SIZE)
         _, told = multiprocessing.get_context("spawn").Pipe(duplex=False)
         self.device, self.order = device, np.zeros(ORDER_SIZE)
@@ -96,13 +139,15 @@ class CountedServo(ServoProcess):
 
 
 if __name__ == "__main__":
-    servo = CountedServo(Reports(sys.argv[1]) if sys.argv[1:] else Packets())
+    servo = CountedServo(DEVICES[sys.argv[1]](*sys.argv[2:]))
     servo.run()
     counted = servo.heap.heap_calls()
     servo.heap.heap_open()
     [float(k) for k in range(1000)]
     servo.heap.heap_close()
     print(servo.ticker.state.name, counted, servo.heap.heap_calls() - counted)
+    print(servo.ticker.fault, file=sys.stderr)
     servo.close()
+    servo.device.driver.close()
     for shared in (servo.orders, servo.status, servo.rows):
         shared.close()

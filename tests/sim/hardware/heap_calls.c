@@ -1,15 +1,19 @@
-/* Counts what one thread takes from the heap while a window is open; preloaded before glibc, whose functions it calls. */
+/* Counts what threads take from the heap, each while its window is open; preloaded before glibc, whose functions it
+ * calls. */
 #include <stddef.h>
 
 extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t);
 extern void *__libc_memalign(size_t, size_t);
 
-static __thread long calls, open;
+static __thread long open;
+static long calls;
 
-void *malloc(size_t size) { calls += open; return __libc_malloc(size); }
-void *calloc(size_t count, size_t size) { calls += open; return __libc_calloc(count, size); }
-void *realloc(void *old, size_t size) { calls += open; return __libc_realloc(old, size); }
-void *memalign(size_t edge, size_t size) { calls += open; return __libc_memalign(edge, size); }
+static void count_call(void) { if (open) __sync_fetch_and_add(&calls, 1); }
+
+void *malloc(size_t size) { count_call(); return __libc_malloc(size); }
+void *calloc(size_t count, size_t size) { count_call(); return __libc_calloc(count, size); }
+void *realloc(void *old, size_t size) { count_call(); return __libc_realloc(old, size); }
+void *memalign(size_t edge, size_t size) { count_call(); return __libc_memalign(edge, size); }
 void *aligned_alloc(size_t edge, size_t size) { return memalign(edge, size); }
 int posix_memalign(void **at, size_t edge, size_t size) { return (*at = memalign(edge, size)) ? 0 : 12; }
 

@@ -23,6 +23,12 @@ from tests.devices.firmware import ROOT, compiled
 from tests.sim.hardware.emulation import AT_ONCE
 
 HERE, DEVICES = Path(__file__).parent, ROOT / "tests" / "devices"
+BEHIND = {
+    "packets": (),
+    "HID": (DEVICES / "mock_hidapi.c", ROOT / "firmware" / "hvf_hid.c"),
+    "HDAPI": (DEVICES / "mock_hd.c",),
+    "DHD": (DEVICES / "mock_dhd.c",),
+}
 RESTRICTED = modes.Follow(
     walls=modes.JointWalls(), governor=modes.SpeedGovernor(), orientation=modes.OrientationMoment(0.05)
 )
@@ -37,16 +43,16 @@ RUNS = {
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="calls of the heap are counted by the loader of glibc")
-@pytest.mark.parametrize("device", ["packets", "HID"])
+@pytest.mark.parametrize("device", BEHIND)
 def test_two_thousand_turns_of_the_loop_call_no_function_of_the_heap(device: str, tmp_path: Path) -> None:
-    """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself."""
+    """Whoever would call one: Python, numba, NumPy, MuJoCo or libc itself, in the servo or a vendor's thread."""
     library = compiled(tmp_path, HERE / "heap_calls.c")
     environment = os.environ | {"LD_PRELOAD": str(library), "PYTHONMALLOC": "malloc"}
-    behind = [compiled(tmp_path, DEVICES / "mock_hidapi.c", ROOT / "firmware" / "hvf_hid.c")] if device == "HID" else []
-    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", *map(str, behind)]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-    state, calls, calls_of_a_thousand_numbers = said.split()
-    assert state == State.ACTIVE.name
+    behind = [str(compiled(tmp_path, *BEHIND[device]))] if BEHIND[device] else []
+    command = [sys.executable, "-m", "tests.sim.hardware.counted_servo", device, *behind]
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    state, calls, calls_of_a_thousand_numbers = said.stdout.split()
+    assert state == State.ACTIVE.name, said.stderr
     assert int(calls) == 0
     assert int(calls_of_a_thousand_numbers) > 1000  # the counter counts
 

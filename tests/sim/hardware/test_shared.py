@@ -27,6 +27,7 @@ def ring() -> Iterator[Ring]:
 
 def test_a_reader_never_sees_half_of_a_write(numbers: SharedNumbers) -> None:
     other, stop, seen = pickle.loads(pickle.dumps(numbers)), threading.Event(), np.zeros(64)
+    numbers.write(seen)  # compiled before anybody reads
 
     def write() -> None:
         k = 0

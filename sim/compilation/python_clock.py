@@ -1,0 +1,41 @@
+"""`time.perf_counter` for compiled code, in threads that Python does not know: the C function that is behind it."""
+
+import ctypes
+import time
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+from controllers.work_array import work_integers
+from sim.compilation.c_function import call_int
+
+_SHAPE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.POINTER(ctypes.c_int64), ctypes.c_void_p)
+_NAMES = "PyTime_PerfCounterRaw", "_PyTime_GetPerfCounterWithInfo"
+"""Of Python's C interface, from 3.13 on and before: each writes nanoseconds to where its first argument points. The
+second one of the older function may be null; the newer one takes none, and does not look at it."""
+
+
+@njit
+def seconds(clock: int) -> float:
+    """What the clock at an address tells [s]."""
+    room = work_integers(1)
+    call_int(clock, (room.ctypes.data, 0))
+    return room[0] / 1e9
+
+
+def clock_for_c(clock: Callable[[], float]) -> Any:
+    """A clock as a C function, whose address `seconds` takes; to be kept for as long.
+
+    `time.perf_counter` is read without the GIL. Any other clock is a function of Python, and holds it.
+    """
+    if clock is time.perf_counter:
+        for name in _NAMES:
+            if hasattr(ctypes.pythonapi, name):
+                return getattr(ctypes.pythonapi, name)
+
+    def tell(room: Any, _: Any) -> int:
+        room[0] = round(clock() * 1e9)
+        return 0
+
+    return _SHAPE(tell)
