@@ -35,7 +35,8 @@ class FigureGains(NamedTuple):
     linear_limit, angular_limit : float
         Largest acceleration taken from the reference [m/s²], [rad/s²]: captured motion is rough.
     force_bound, moment_bound : float
-        Largest residual force as a share of body weight, and moment as a share of body weight × stature.
+        Largest residual force as a share of body weight, and moment as a share of body weight × stature: the least of
+        those tried on which all that are to stand do (docs/validation/residual-bounds.md).
     reference_reach, contact_reach : float
         Height above the floor from which a contact point of the reference, or of the figure itself, bears no load [m].
     settling_reach : float
@@ -62,8 +63,8 @@ class FigureGains(NamedTuple):
     root_turn: float = 300.0
     linear_limit: float = 40.0
     angular_limit: float = 500.0
-    force_bound: float = 1.0
-    moment_bound: float = 0.2
+    force_bound: float = 0.5
+    moment_bound: float = 0.1
     reference_reach: float = 0.03
     contact_reach: float = 0.002
     settling_reach: float = 0.015
