@@ -52,8 +52,8 @@ class FigureGains(NamedTuple):
         How far ahead the reference is looked at for contact points about to be lifted [s].
     placement_reach : float
         Largest horizontal distance by which a foot in flight is put beside its place under the root, towards the one
-        in the world (`sim.body.foot_placement`) [m]. With none cmu 01_01, jumps and turns, lacks 15.8 % of weight over
-        20 s and deepmimic/jump falls; with 8 cm they lack 5.7 and 4.2 %. 5 to 15 cm differ little.
+        in the world (`sim.body.foot_placement`) [m]. With none cmu 01_01, jumps and turns, lacks 12.9 % of weight over
+        20 s and deepmimic/jump falls; with 8 cm they lack 4.9 and 4.0 %. 5 to 15 cm differ little.
     """
 
     joint_rate: float = 40.0
