@@ -9,8 +9,8 @@ flight the joints of each leg are displaced by
 where p_r are the contact points of the foot in the reference, T takes the reference's root to the figure's, H takes the
 horizontal part (a leg that were to reach up or down would bend or stretch far), and σ ≤ 1 shortens what is longer than
 a reach: legs that turn far turn the root the other way. σ also ends, between 26 and 60° from the plumb line, for a foot
-that is not under the root: in a somersault none is about to land. The wanted acceleration of the leg has ω² δ + 2ω δ' more, δ' of
-the rate at which the root's error grows.
+that is not under the root: in a somersault none is about to land. The wanted acceleration of the leg has ω² δ + 2ω δ'
+more, δ' of the rate at which the root's error grows.
 """
 
 import numpy as np
@@ -24,8 +24,8 @@ from sim.body.stance import N_LEG, cross_add, factor, substitute
 
 _CLOSENESS = 300.0  # κ [1/m²]: within 1 % of what is asked for, and bounded where a leg is straight
 _ASIDE, _UNDER = 0.5, 0.9
-"""Cosines of the angles between root to foot and the plumb line, from which a foot is placed at all, and wholly. Without
-them snu/backflip lacks 27 % of weight, with them 8 (no placement: 7); a ramp up to 0.75 leaves 14."""
+"""Cosines of the angles between root to foot and the plumb line, from which a foot is placed at all, and wholly.
+Without them snu/backflip lacks 27 % of weight, with them 8 (no placement: 7); a ramp up to 0.75 leaves 14."""
 
 
 @njit
