@@ -20,9 +20,18 @@ from controllers.curves.trajectory import (
     curve_velocity,
     wrap_phase,
 )
+from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.base import CompiledMap
+from controllers.haptic_map.clip_change import (
+    ClipChange,
+    add_change,
+    change_lasts,
+    gate_behind,
+    known_between,
+    packed_changes,
+)
 from controllers.legs.limbs import Limb
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
@@ -30,12 +39,19 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 RIVER_CLIPS = 5
-# The memory: the lap of the clip that plays, then its river, the last phase on it, and whether it stands still there.
-RIVER, PHASE, STILL = MEMORY, MEMORY + 1, MEMORY + 2
-# Parameters: a header, offsets of the packed curves and of the phases of rest, both, and the blend.
+# The memory: the lap of the clip that plays, then its river, the last phase of the hand, and whether it stands still
+# there; the river along which the hand goes, the phase at which it came there, how far the clip was ahead of it, and
+# the phase that is shown; the change that is gone through (−1: none), its gate, and the phase that was shown when gates
+# were looked for last.
+RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(MEMORY, MEMORY + 10)
+# Parameters: a header, offsets of the packed curves, the phases of rest and the changes, all these, and the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
 _RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip
 _SOON = 0.03  # [s] by which it is foreseen that it will be
+_CATCHES_UP = 2.0  # [s] in which a clip comes to be with a hand that it was ahead of
+_PAST = 0.25  # of a lap: a hand that goes back by as much is no longer before the moment, but after it
+LONGEST = 0.7  # of a lap, that a change may last
+_ALIKE = 1e-6  # [s] by which laps of rivers differ at most
 _NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
 
 
@@ -59,10 +75,21 @@ def _phase_near(params: Array, curve: int, x: Array, last: float) -> float:
 def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian: Array) -> None:
     """Kernel of `RiverClips`: h(x), and h_*(x) unless `jacobian` has no rows."""
     river, rivers = int(memory[RIVER]), int(params[_RIVERS])
-    curve = int(params[_CURVES + river])
+    curve = _course(params, memory)
     phase = memory[PHASE] if memory[STILL] > 0.0 else _phase_near(params, curve, x, memory[PHASE])
+    start, lap = params[curve + START], params[curve + END] - params[curve + START]
+    pace, rate, shown = 2.0 * np.pi / lap, 1.0, phase
     memory[PHASE] = phase
-    pace = 2.0 * np.pi / (params[curve + END] - params[curve + START])
+    if memory[AHEAD] != 0.0:
+        went = min(max(_after(phase, memory[CAME], lap) / _CATCHES_UP, 0.0), 1.0)
+        shown = wrap_phase(params, curve, phase + memory[AHEAD] * (1.0 - smooth_step(went)))
+        rate -= memory[AHEAD] * 30.0 * (went * (1.0 - went)) ** 2 / _CATCHES_UP
+        memory[AHEAD] = memory[AHEAD] if went < 1.0 else 0.0
+    memory[SHOWN] = shown
+    known, change, since = changes_of(params), int(memory[CHANGE]), 0.0
+    if change >= 0:
+        since = _after(shown - start, memory[GATE], lap)
+        memory[CHANGE] = memory[CHANGE] if since < change_lasts(known, change) else -1.0
     there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend = curve_acceleration(params, curve, phase)
     # The nearest point stays nearest: (φ − p)·φ̇ = 0 gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
@@ -72,12 +99,35 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     chain = work_array((3, 6))
     chain[:] = 0.0
     for i in range(3):
-        chain[0, i] = pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
+        chain[0, i] = rate * pace * along[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
     weights, changes = work_array((1, rivers)), work_array((1, 3, rivers))
     weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0
-    angle = pace * (phase - params[curve + START])
+    angle = pace * (shown - start)
     blend(params[int(params[_BLEND]) :], angle, weights, changes, chain, memory, pose, jacobian)
+    if change >= 0:
+        for i in range(6):
+            chain[0, i] /= pace
+        add_change(known, change, since, chain[0], pose, jacobian)
+
+
+@njit
+def _course(params: Array, memory: Array) -> int:
+    """Where the curve along which the hand goes is."""
+    return int(params[_CURVES + int(memory[COURSE])])
+
+
+@njit
+def changes_of(params: Array) -> Array:
+    """The changes that a map knows (`packed_changes`)."""
+    return params[int(params[_CURVES + 2 * int(params[_RIVERS])]) :]
+
+
+@njit
+def _after(phase: float, moment: float, lap: float) -> float:
+    """How long a phase is after a moment of the lap [s]; up to a quarter of it before, that is negative."""
+    way = phase - moment
+    return way - lap * np.floor(way / lap + _PAST)
 
 
 @njit(forceinline=False)
@@ -86,13 +136,14 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
 
     What plays another clip, or the clip that stands still, begins at the phase of the hand on that river.
     """
-    return 0.0 <= river < params[_RIVERS] and (river != memory[RIVER] or memory[STILL] > 0.0)
+    other = river != memory[RIVER] or river != memory[COURSE]
+    return 0.0 <= river < params[_RIVERS] and (other or memory[STILL] > 0.0)
 
 
 @njit(forceinline=False)
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, by the memory a period later."""
-    curve = int(params[_CURVES + int(memory[RIVER])])
+    curve = _course(params, memory)
     lap, way = params[curve + END] - params[curve + START], later[PHASE] - memory[PHASE]
     return (way - lap * np.round(way / lap)) / period
 
@@ -106,7 +157,7 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
     """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
-    curve = int(params[_CURVES + int(memory[RIVER])])
+    curve = _course(params, memory)
     found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
     outside = branches(params, curve, hand[0, 0], hand[0, 1], hand[0, 2], params[_TUBE], found) == 0
     if outside or abs(rate) > _RACES:
@@ -128,16 +179,68 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
 def change_clip(memory: Array, river: float, phase: float) -> None:
     """Let the clip of another river play, from a phase on, in the frame of the lap that is."""
     memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
+    memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
+
+
+@njit(forceinline=False)
+def knows_change(params: Array, memory: Array, river: float) -> bool:
+    """Whether a change from the clip that plays to a river's is known, or is none."""
+    if memory[STILL] > 0.0:
+        return False
+    return river == memory[RIVER] or known_between(changes_of(params), memory[RIVER], river)
+
+
+@njit(forceinline=False)
+def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]:
+    """Change to a river, by its number, whose gate [s] has been passed since the last call; −1 if it has none."""
+    curve, before = _course(params, memory), memory[LOOKED]
+    memory[LOOKED] = memory[SHOWN]
+    start, lap = params[curve + START], params[curve + END] - params[curve + START]
+    return gate_behind(changes_of(params), memory[RIVER], river, before - start, memory[SHOWN] - start, lap)
+
+
+@njit(forceinline=False)
+def changing(memory: Array) -> bool:
+    """Whether a known change is gone through."""
+    return bool(memory[CHANGE] >= 0.0)
+
+
+@njit
+def take_course(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
+    """Let the hand at x be timed by another river's curve, while the clip that plays shows a phase [s]."""
+    memory[COURSE] = river
+    curve = _course(params, memory)
+    phase = _phase_near(params, curve, x, shown)
+    lap, away = params[curve + END] - params[curve + START], shown - phase
+    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, away - lap * np.round(away / lap)
+
+
+@njit
+def hold_at_gate(params: Array, memory: Array, gate: float) -> None:
+    """Let the clip that plays stand where it has a gate [s]."""
+    memory[PHASE] = params[_course(params, memory) + START] + gate
+    memory[STILL], memory[AHEAD] = 1.0, 0.0
+
+
+@njit
+def begin_change(memory: Array, river: float, change: int, gate: float) -> None:
+    """Let the clip of another river play through a known change, from its gate [s] on."""
+    memory[RIVER], memory[LAST_ANGLE], memory[CHANGE], memory[GATE] = river, np.nan, change, gate
+
+
+@njit
+def go_on(memory: Array, phase: float, ahead: float) -> None:
+    """Let a clip that was held go on with the hand, at a phase, and ahead of it by a time [s]."""
+    memory[PHASE], memory[AHEAD], memory[STILL] = phase, ahead, 0.0
 
 
 @njit
 def stop_clip(params: Array, memory: Array, way: float) -> None:
     """Let the clip that plays stand still wherever the stylus is: at the phase of rest nearest to one `way` ahead."""
-    river, rivers = int(memory[RIVER]), int(params[_RIVERS])
-    curve = int(params[_CURVES + river])
+    river, rivers, curve = int(memory[RIVER]), int(params[_RIVERS]), _course(params, memory)
     lap = params[curve + END] - params[curve + START]
     first, last = int(params[_CURVES + rivers + river]), int(params[_CURVES + rivers + river + 1])
-    wanted = wrap_phase(params, curve, memory[PHASE] + way)
+    wanted = wrap_phase(params, curve, memory[SHOWN] + way)
     best, nearest = wanted, math.inf
     for k in range(first, last):
         away = abs(params[k] - wanted)
@@ -145,14 +248,14 @@ def stop_clip(params: Array, memory: Array, way: float) -> None:
         if away < nearest:
             best, nearest = params[k], away
     memory[PHASE], memory[STILL], memory[LAST_ANGLE] = best, 1.0, np.nan
+    memory[AHEAD], memory[CHANGE] = 0.0, -1.0
 
 
 @njit
 def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
     """Go on in the clip that plays at the pace of its river, without the hand; one that stands still stands."""
     if memory[STILL] == 0.0:
-        curve = int(params[_CURVES + int(memory[RIVER])])
-        memory[PHASE], memory[STILL] = wrap_phase(params, curve, memory[PHASE] + seconds), 1.0
+        memory[PHASE], memory[STILL] = wrap_phase(params, _course(params, memory), memory[PHASE] + seconds), 1.0
 
 
 @njit
@@ -184,7 +287,8 @@ class RiverClips(AnimationMap):
     Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
     as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
     jumps: the reference goes on from where the figure stands (`place_clip`), with the offset decaying
-    (`inertialization`). h does not depend on the stylus's orientation.
+    (`inertialization`); or, where a change from the one clip to the other is known (`clip_change`), it begins at the
+    next gate, and h goes through it with the phase of the hand. h does not depend on the stylus's orientation.
 
     Parameters
     ----------
@@ -227,12 +331,13 @@ class RiverClips(AnimationMap):
         if not tube > 0.0:
             raise ParameterError(f"the tube of a map of rivers must be positive, got {tube} m")
         self.curves, self._tube = tuple(curves), tube
-        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header([np.zeros(0)] * len(curves)), (), limbs, lap,
-                         apart)  # fmt: skip
+        self._rests: tuple[Array, ...] = (np.zeros(0),) * len(curves)
+        self.changes: tuple[ClipChange, ...] = ()
+        super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header(), (), limbs, lap, apart)
 
-    def _header(self, rests: Sequence[Array]) -> Array:
+    def _header(self) -> Array:
         """What the kernel reads before the blend."""
-        blocks = [*(curve.packed() for curve in self.curves), *rests]
+        blocks = [*(curve.packed() for curve in self.curves), *self._rests, packed_changes(self.changes)]
         offsets = np.cumsum([_CURVES + len(blocks) + 1, *(len(block) for block in blocks)])
         return np.concatenate([[len(self.curves), self._tube, offsets[-1]], offsets, *blocks])
 
@@ -248,9 +353,44 @@ class RiverClips(AnimationMap):
         if len(phases) != len(self.curves) or not all(np.all(np.isfinite(still)) for still in phases):
             raise ParameterError(f"expected finite phases of rest for each of {len(self.curves)} rivers, got {rests}")
         other = copy(self)
-        other._params = np.concatenate([self._header(phases), self._params[int(self._params[_BLEND]) :]])
-        return other
+        other._rests = tuple(phases)
+        return other._repacked()
+
+    def with_changes(self, changes: Sequence[ClipChange]) -> "RiverClips":
+        """The same map, whose clips go over into each other by changes that are known, where there are.
+
+        Raises
+        ------
+        ParameterError
+            If one is between rivers that are not there or whose laps differ, has no gate, is not of such poses, or
+            lasts longer than 0.7 of a lap.
+        """
+        laps = [curve.duration for curve in self.curves]
+        for change in changes:
+            told = f"the change from river {change.first} to {change.second}"
+            if not {change.first, change.second} <= set(range(len(laps))) or change.first == change.second:
+                raise ParameterError(f"{told} is not between two of {len(laps)} rivers")
+            if abs(laps[change.first] - laps[change.second]) > _ALIKE:
+                raise ParameterError(f"{told} is between laps of {laps[change.first]} and {laps[change.second]} s")
+            if not len(change.gates) or change.offsets.shape[1:] != (3 + 3 * ((self.nq - 3) // 4),):
+                raise ParameterError(f"{told} has {len(change.gates)} gates and offsets {change.offsets.shape}")
+            if not 0.0 < change.seconds < LONGEST * laps[change.first]:
+                raise ParameterError(f"{told} lasts {change.seconds:.2f} s of a lap of {laps[change.first]:.2f} s")
+        other = copy(self)
+        other.changes = tuple(changes)
+        return other._repacked()
+
+    def on_one_river(self) -> "RiverClips":
+        """The same clips with the first river's curve for all: between them then only the motion changes."""
+        other = copy(self)
+        other.curves = (self.curves[0],) * len(self.curves)
+        return other._repacked()
+
+    def _repacked(self) -> "RiverClips":
+        self._params = np.concatenate([self._header(), self._params[int(self._params[_BLEND]) :]])
+        return self
 
     def compiled(self) -> CompiledMap:
         """The map as its kernel takes it, with the memory of a new run: the first river has the hand."""
-        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), [0.0, np.nan, 0.0]]))
+        memory = [0.0, np.nan, 0.0, 0.0, 0.0, 0.0, np.nan, -1.0, 0.0, np.nan]
+        return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), memory]))

@@ -10,7 +10,7 @@ sink or bend beyond their ranges are taken only where the others do not stand, a
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,14 +19,13 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
 from experiments.files.kept import kept_array
 from experiments.setups.alike import motion_of
-from experiments.working import working
+from experiments.setups.verdict import Verdict, tried
 from models.mocap.clip import Clip
 from models.mocap.ranges import beyond_ranges
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
-BEARABLE = 0.12  # [body weights] RMS, as in `followed`
 WELL = 0.06  # [body weights] RMS: half of that, with which the first clip that was named is not passed over
 SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # [m], [m], [rad]: what legs may do at most
 _SECONDS, _FPS = 20.0, 120.0
@@ -37,42 +36,10 @@ _EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and in which one has moved th
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
-class Verdict(NamedTuple):
-    """How the physical figure follows a map.
-
-    Attributes
-    ----------
-    residual : float
-        RMS of the force that is lacking [body weights].
-    fell : float
-        When it fell [s]; infinite if it did not.
-    """
-
-    residual: float
-    fell: float
-
-    @property
-    def bearable(self) -> bool:
-        """Whether it stands and lacks little."""
-        return bool(np.isinf(self.fell)) and self.residual <= BEARABLE
-
-    def worse(self) -> tuple[float, float]:
-        """What is larger, the worse: an earlier fall before all."""
-        return -self.fell, self.residual
-
-
 def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
     """Let the physical figure follow a map about a circle for 20 s, and keep how; needs compiled code."""
-
-    def find() -> Array:
-        from experiments.preparation.followed import followed  # brings signal processing with it
-
-        with working("following the blend"):
-            told = followed(toured(made, lap), _SECONDS)
-        return np.array([[told.residual, np.inf if told.fell is None else told.fell]])
-
     made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
-    return Verdict(*kept_array(kept_folder(__name__), "verdict", made_of, (1, 2), find)[0].tolist())
+    return tried(__name__, lambda: toured(made, lap), _SECONDS, made_of)
 
 
 def _domain(made: Cylindrical | Composite) -> Array:
@@ -146,6 +113,4 @@ def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -
                     best, name, found = made, names[i], verdict
             if found.bearable:
                 return best, ()
-    falls = np.isfinite(found.fell)
-    told = f"falls at {found.fell:.1f} s" if falls else f"lacks {100 * found.residual:.0f} % of weight"
-    return best, (f"the physical figure {told} with the legs of {name}, the best that is found at this lap",)
+    return best, (f"the physical figure {found} with the legs of {name}, the best that is found at this lap",)

@@ -32,12 +32,14 @@ from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joi
 from experiments.setups.balance import balanced
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
 from experiments.setups.carried import carried
+from experiments.setups.changed import not_followed
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
+from experiments.setups.river_changes import with_changes
 from experiments.setups.rivers import default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
@@ -161,8 +163,16 @@ def _river_clips_parts(
     made = RiverClipsMap(
         curves, motions, mode.river_tube, figure_legs(figure), lap, _out_of_step(clips, 3, lap)
     )  # fmt: skip
-    parts = _about_circle(place, made, clips)
-    return replace(parts, plays_rivers=True, refined=lambda: (with_rests(made, figure), ()))
+    parts, names = _about_circle(place, made, clips), [clips[i % len(clips)].name for i in range(3)]
+
+    def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
+        ready = with_rests(made, figure)
+        if config.figure.kind != "physical" or same(clips):
+            return ready, ()
+        changing = with_changes(ready, config.figure.blend, figure)
+        return changing, not_followed(changing, names, config.figure, figure)
+
+    return replace(parts, plays_rivers=True, refined=refined)
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

@@ -15,7 +15,16 @@ from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, VECTOR
 from controllers.haptic_map.base import CompiledMap
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.expressive import base_of
-from controllers.haptic_map.river_clips import RIVER_CLIPS, lets_go, phase_rate, takes_over
+from controllers.haptic_map.river_clips import (
+    COURSE,
+    RIVER_CLIPS,
+    changing,
+    gate_passed,
+    knows_change,
+    lets_go,
+    phase_rate,
+    takes_over,
+)
 from controllers.kernel_call import call_as_given, lend, lent
 from controllers.legs.limbs import LIMB
 from controllers.state import Array
@@ -25,7 +34,7 @@ from sim.compilation.native import mj_differentiate_pos
 from sim.compilation.units import Unit
 from sim.errors import SimError
 from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around
-from sim.reference.river_changes import change_river, may_change, stop
+from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
 from sim.reference.settling import approach, let_down, slowness
 from sim.reference.stylus_filter import smooth_hand, smooth_turn, turn_rate
 from sim.reference.transition import dwells, make_transition
@@ -83,12 +92,19 @@ def _advance(reference: CompiledReference, stylus: Array, trace: Array) -> None:
     follow_trail(reference)
     kind, params = base_of(reference.kind, reference.params)
     # Rivers that share a hand by weights may have it in turns, many times a second: each change is gone through with.
+    plays, river = kind == RIVER_CLIPS, trace[TRACE_RIVER]
     settled = reference.transition.since[0] >= reference.transition.lasts[0]
-    taken = kind == RIVER_CLIPS and takes_over(params, reference.memory, trace[TRACE_RIVER])
-    over = dwells(reference.transition, trace[TRACE_RIVER] if taken else -1.0, period) and settled
-    if over and may_change(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE]):
-        change_river(reference, params, trace[TRACE_RIVER], trace[TRACE_PHASE])
-    elif kind == RIVER_CLIPS:
+    taken = plays and takes_over(params, reference.memory, river)
+    over = dwells(reference.transition, river if taken else -1.0, period)
+    change, gate = gate_passed(params, reference.memory, river) if plays else (-1, 0.0)
+    if over and settled and knows_change(params, reference.memory, river):
+        if river != reference.memory[COURSE]:
+            go_along(reference, params, river)
+        elif change >= 0 and not changing(reference.memory):
+            go_through(reference, params, change, river, gate)
+    elif over and settled and may_change(reference, params, river, trace[TRACE_PHASE]):
+        change_river(reference, params, river, trace[TRACE_PHASE])
+    elif plays:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
         if lets_go(params, reference.memory, trace[TRACE_RIVER], reference.going, rate):
             stop(reference, params)

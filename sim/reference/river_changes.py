@@ -7,12 +7,19 @@ from numba import njit
 
 from controllers.haptic_map.evaluate import evaluate_map
 from controllers.haptic_map.river_clips import (
+    AHEAD,
+    PHASE,
+    SHOWN,
     ahead_in_clip,
+    begin_change,
     change_clip,
+    go_on,
     heading_between,
+    hold_at_gate,
     phase_rate,
     place_clip,
     stop_clip,
+    take_course,
 )
 from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_way
@@ -120,6 +127,31 @@ def change_river(reference: CompiledReference, params: Array, river: float, phas
     _show_on(reference)
     change_clip(reference.memory, river, phase)
     _go_over(reference, params)
+
+
+@njit(forceinline=False)
+def go_along(reference: CompiledReference, params: Array, river: float) -> None:
+    """Let another river's curve time the hand, and the clip that plays go on to a gate of a known change."""
+    scratch, x = reference.scratch_memory, reference.scratch_x
+    x[:3], x[3:] = reference.hand[0], reference.orientation
+    scratch[:] = reference.memory
+    evaluate_map(reference.units, reference.kind, reference.params, x, scratch, reference.before)
+    take_course(params, reference.memory, river, x, scratch[SHOWN])
+
+
+@njit(forceinline=False)
+def go_through(reference: CompiledReference, params: Array, change: int, river: float, gate: float) -> None:
+    """Let a known change to another river's clip begin at a gate that has been passed, from where the old one was."""
+    memory, scratch, x = reference.memory, reference.scratch_memory, reference.scratch_x
+    old, new, phase, ahead = reference.before, reference.after, memory[PHASE], memory[AHEAD]
+    scratch[:] = memory
+    hold_at_gate(params, scratch, gate)
+    evaluate_map(reference.units, reference.kind, reference.params, x, scratch, old)
+    begin_change(memory, river, change, gate)
+    hold_at_gate(params, memory, gate)
+    evaluate_map(reference.units, reference.kind, reference.params, x, memory, new)
+    place_clip(memory, new, old[0], old[1], heading_between(new, old))
+    go_on(memory, phase, ahead)
 
 
 @njit(forceinline=False)

@@ -6,8 +6,9 @@ import pytest
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.setups import carried as rule
 from experiments.setups.alike import arms
-from experiments.setups.carried import Verdict, carried, sound, toured, verdict_on
+from experiments.setups.carried import carried, sound, toured, verdict_on
 from experiments.setups.figure_legs import figure_legs
+from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 

@@ -1,8 +1,9 @@
 r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
 
 A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). An open motion rests at both ends,
-and so does its change: the outer five control points are one, so that δ̇ = δ̈ = 0 there. Each instant depends on six
-control points, so the normal equations are banded; those of a closed motion have a border of the last five of them.
+and so does its change: the outer five control points are one, so that δ̇ = δ̈ = 0 there. A passage goes on beyond its
+ends as it was: there they are none, and δ = 0 besides. Each instant depends on six control points, so the normal
+equations are banded; those of a closed motion have a border of the last five of them.
 """
 
 from dataclasses import dataclass
@@ -43,25 +44,33 @@ class Change:
         q_ref; closed, or open.
     knot, step : float
         About how far knots and sampled instants lie apart [s]; both are made to fit the clip.
+    passage : bool
+        Whether an open clip is a part of a motion that goes on beyond its ends, unchanged.
 
     Attributes
     ----------
     times : array, shape (m,)
         Sampled instants [s].
+    passage : bool
+        As given.
+    outer : int
+        Control points at either end of an open one that are not free.
     basis : list of 4 arrays, shape (m, 6)
         Weights of the six control points that an instant depends on, and their derivatives.
     first : array of int, shape (m,)
         Number of the first of them.
     """
 
-    def __init__(self, clip: Clip, knot: float, step: float) -> None:
-        self.clip, self.closed = clip, clip.closes()
+    def __init__(self, clip: Clip, knot: float, step: float, passage: bool = False) -> None:
+        self.clip, self.closed = clip, clip.closes() and not passage
+        self.passage, self._rests = passage, not self.closed and not passage
+        self.outer = 0 if self.closed else _HELD + int(passage)
         seconds = clip.duration
         self.intervals = max(2 * DEGREE, round(seconds / knot))
         each = max(2, round(seconds / self.intervals / step))
         count = self.intervals * each
         self.times = np.arange(count + (not self.closed)) * seconds / count
-        self.n_points = self.intervals if self.closed else self.intervals + DEGREE - 2 * _HELD
+        self.n_points = self.intervals if self.closed else self.intervals + DEGREE - 2 * self.outer
         spacing = seconds / self.intervals
         knots = (np.arange(self.intervals + 2 * DEGREE + 1) - DEGREE) * spacing
         self._spline = BSpline(knots, np.eye(self.intervals + DEGREE), DEGREE)
@@ -77,12 +86,13 @@ class Change:
             poses, first = around(clip, _MARGIN)
             self._reference = CubicSpline((np.arange(len(poses)) - first) / clip.fps, poses)
         else:
-            self._reference = CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses, bc_type="clamped")
+            ends = "clamped" if self._rests else "not-a-knot"
+            self._reference = CubicSpline(np.arange(clip.n_frames) / clip.fps, clip.poses, bc_type=ends)
         self._end = seconds
         self.border = DEGREE * N_TANGENT if self.closed else 0
 
     def _reference_at(self, times: Array) -> Array:
-        poses = self._reference(times if self.closed else np.clip(times, 0.0, self._end))
+        poses = self._reference(np.clip(times, 0.0, self._end) if self._rests else times)
         turns = poses[:, 3:].reshape(len(poses), -1, 4)
         poses[:, 3:] = (turns / np.linalg.norm(turns, axis=2, keepdims=True)).reshape(len(poses), -1)
         return poses
@@ -90,8 +100,17 @@ class Change:
     def points(self, x: Array) -> Array:
         """All control points, those that wrap or are held included, shape (intervals + 5, 57)."""
         if not self.closed:
-            return np.pad(x, ((_HELD, _HELD), (0, 0)), mode="edge")
+            return np.pad(x, ((self.outer, self.outer), (0, 0)), mode="edge" if self._rests else "constant")
         return np.vstack((x, x[:DEGREE] @ self.wrap.T))
+
+    def free(self, interval: int) -> tuple[int, Array]:
+        """The six control points of a knot interval of an open motion by free ones: the first, and shares (6, 6)."""
+        points = np.arange(interval, interval + DEGREE + 1) - self.outer
+        inside = np.clip(points, 0, self.n_points - 1)
+        first = min(int(inside[0]), self.n_points - DEGREE - 1)
+        shares = np.eye(DEGREE + 1)[inside - first]
+        shares[(inside != points) & self.passage] = 0.0
+        return first, shares
 
     def states(self, x: Array, instants: npt.NDArray[np.intp] | slice = slice(None)) -> State:
         """The changed motion at the sampled instants, or at some of them."""
@@ -113,7 +132,7 @@ class Change:
         a[:, :3] = (moments[2][:, :3] - 2 * moments[1][:, :3] + moments[0][:, :3]) / _STEP**2
         v[:, 3:] = between(turns[0], turns[2]) / (2 * _STEP)
         a[:, 3:] = (between(turns[1], turns[2]) - between(turns[0], turns[1])) / _STEP**2
-        if not self.closed:
+        if self._rests:
             rests = (times <= 0.0) | (times >= self._end - 1e-9)
             v[rests] = a[rests] = 0.0
         return State(moments[1], v, a)
@@ -162,13 +181,10 @@ class Normal:
         """Add a block (342, 342) that couples the six control points of a knot interval."""
         n, change = N_TANGENT, self._change
         if not change.closed:
-            points = np.clip(np.arange(interval, interval + DEGREE + 1) - _HELD, 0, change.n_points - 1)
-            if points[0] == points[1] or points[-2] == points[-1]:
-                interval = min(int(points[0]), change.n_points - DEGREE - 1)
-                fold = np.kron(np.eye(DEGREE + 1)[points - interval], np.eye(n))
+            interval, shares = change.free(interval)
+            if not np.array_equal(shares, np.eye(DEGREE + 1)):
+                fold = np.kron(shares, np.eye(n))
                 block = fold.T @ block @ fold
-            else:
-                interval = int(points[0])
         if not change.closed or interval + DEGREE < change.n_points - DEGREE:
             for column in range(self._width):
                 self.band[: self._width - column, interval * n + column] += block[column, column:]
@@ -204,9 +220,11 @@ class Normal:
             total[:DEGREE] += total[change.intervals :] @ change.wrap
             total = total[: change.intervals]
         else:
-            total[_HELD] += total[:_HELD].sum(axis=0)
-            total[-_HELD - 1] += total[-_HELD:].sum(axis=0)
-            total = total[_HELD:-_HELD]
+            outer = change.outer
+            if not change.passage:
+                total[outer] += total[:outer].sum(axis=0)
+                total[-outer - 1] += total[-outer:].sum(axis=0)
+            total = total[outer:-outer]
         return total.ravel()
 
     def times(self, x: Array) -> Array:

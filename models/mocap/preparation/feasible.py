@@ -136,8 +136,9 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS
-) -> Feasible:
+    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS,
+    passage: bool = False,
+) -> Feasible:  # fmt: skip
     """The nearest motion with these contacts that needs no help.
 
     Parameters
@@ -152,8 +153,10 @@ def feasible(
         Frames per second of the result.
     weights : FeasibleWeights
         Of the errors.
+    passage : bool
+        Whether the clip is a part of a motion that goes on beyond its ends, and is left there as it is.
     """
-    change = Change(clip, _KNOT, _STEP)
+    change = Change(clip, _KNOT, _STEP, passage)
     problem = _Problem(change, schedule, weights)
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
@@ -298,9 +301,9 @@ class _Problem:
         return _Errors(weighted, jacobian, residual)
 
 
-def contact_residual(clip: Clip, schedule: Stances) -> float:
-    """RMS of the force that these contacts cannot give a clip as it is [body weights]."""
-    change = Change(clip, _KNOT, _STEP)
+def contact_residual(clip: Clip, schedule: Stances, passage: bool = False) -> float:
+    """RMS of the force that these contacts cannot give a clip as it is [body weights]; a passage, as `feasible` has."""
+    change = Change(clip, _KNOT, _STEP, passage)
     problem = _Problem(change, schedule, _WEIGHTS)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
     return _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / problem.floor.body_weight

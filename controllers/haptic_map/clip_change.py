@@ -1,0 +1,160 @@
+r"""A change from one river's clip to another's that is known beforehand, as what is added to the second clip.
+
+.. math:: h = \rho_j(\varphi)\,\exp o(\varphi - g), \qquad o(s) = 0 \text{ for } s \ge T
+
+g is the gate, a phase at which it begins: up to there o is the way from the second clip to the first, so that nothing
+jumps. The root's place is moved in its own frame, rotations turn in theirs. o is a uniform cubic B-spline, C².
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from controllers.borrowed import borrowed
+from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.rotations import angular_velocity, exponential, multiply, rotate
+from controllers.state import Array, Pose
+from controllers.work_array import work_array
+
+FPS = 120.0  # rows a second of the phase
+MARGIN = 0.1  # [s] before the gate from which on rows are given
+_BEFORE = round(MARGIN * FPS)
+_PADDING = 16  # rows after the last over which the spline comes back to the first: what is not smooth there is not read
+# A row of the directory: the rivers, where rows and gates begin, and how many there are.
+_FIRST, _SECOND, _ROWS, _COUNT, _GATES, _PHASES, _ENTRY = range(7)
+
+
+class ClipChange(NamedTuple):
+    """A change from a river's clip to another's.
+
+    Attributes
+    ----------
+    first, second : int
+        Rivers.
+    gates : Array, shape (m,)
+        Phases at which it may begin, after the start of the lap [s].
+    offsets : Array, shape (n, nv)
+        Rows of o from `MARGIN` before the gate on, `FPS` a second; zero at the end.
+    """
+
+    first: int
+    second: int
+    gates: Array
+    offsets: Array
+
+    @property
+    def seconds(self) -> float:
+        """T, from the gate to the end [s]."""
+        return (len(self.offsets) - 1) / FPS - MARGIN
+
+
+def packed_changes(changes: Sequence[ClipChange]) -> Array:
+    """What the kernels read of changes: how many, a directory, and their rows and gates."""
+    at, rows, data = 1 + _ENTRY * len(changes), [], []
+    for change in changes:
+        blank = np.zeros((_PADDING, change.offsets.shape[1]))
+        samples = np.concatenate([change.offsets, blank, blank + change.offsets[0]])
+        control = control_points(samples, np.ones(1)).ravel()
+        gates = np.asarray(change.gates, dtype=np.float64)
+        rows.append([change.first, change.second, at, len(change.offsets), at + len(control), len(gates)])
+        data += [control, gates]
+        at += len(control) + len(gates)
+    return np.concatenate([[len(changes)], *rows, *data])
+
+
+@njit
+def known_between(changes: Array, first: float, second: float) -> bool:
+    """Whether a change from a river to another is known."""
+    for k in range(int(changes[0])):
+        entry = changes[1 + k * _ENTRY :]
+        if entry[_FIRST] == first and entry[_SECOND] == second:
+            return True
+    return False
+
+
+@njit
+def gate_behind(
+    changes: Array, first: float, second: float, before: float, now: float, lap: float
+) -> tuple[int, float]:
+    """Number and gate [s] of a change from a river to another that is passed between two phases after a lap's start.
+
+    The number is −1 if none is.
+    """
+    way = now - before
+    way -= lap * np.round(way / lap)
+    for k in range(int(changes[0])):
+        entry = changes[1 + k * _ENTRY :]
+        if entry[_FIRST] == first and entry[_SECOND] == second:
+            gates = int(entry[_GATES])
+            for i in range(gates, gates + int(entry[_PHASES])):
+                behind = now - changes[i]
+                behind -= lap * np.floor(behind / lap)
+                if behind < way:
+                    return k, float(changes[i])
+    return -1, 0.0
+
+
+@njit
+def change_lasts(changes: Array, k: int) -> float:
+    """T of a change [s]."""
+    return (changes[1 + k * _ENTRY + _COUNT] - 1.0) / FPS - MARGIN
+
+
+@njit
+def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacobian: Array) -> None:
+    """Add a change to a pose s seconds of the phase after its gate, and to its derivative unless that has no rows.
+
+    Parameters
+    ----------
+    changes : Array
+        `packed_changes`.
+    k, s
+        Which one, and the phase after the gate [s]; beyond its ends as there.
+    along : Array, shape (6,)
+        Derivatives of s.
+    pose : Pose
+        Updated.
+    jacobian : Array, shape (nv, 6) or (0, 6)
+        Updated.
+    """
+    entry = changes[1 + k * _ENTRY :]
+    size, last = 6 + 3 * ((pose.shape[0] - 7) // 4), int(entry[_COUNT]) - 1
+    u = min(max((s + MARGIN) * FPS, 0.0), float(last))
+    row = min(int(u), last - 1)
+    b0, b1, b2, b3 = basis(u - row)
+    d0, d1, d2, d3 = basis_slope(u - row)
+    rows = borrowed(changes[int(entry[_ROWS]) + row * size :])
+    offset, rate = work_array(size), work_array(size)
+    for i in range(size):
+        p0, p1, p2, p3 = rows[i], rows[size + i], rows[2 * size + i], rows[3 * size + i]
+        offset[i] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+        rate[i] = FPS * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+    w, a, b, c = pose[3], pose[4], pose[5], pose[6]
+    x, y, z = rotate(w, a, b, c, offset[0], offset[1], offset[2])
+    pose[0], pose[1], pose[2] = pose[0] + x, pose[1] + y, pose[2] + z
+    if jacobian.shape[0] > 0:
+        x, y, z = rotate(w, a, b, c, rate[0], rate[1], rate[2])
+        for column in range(6):
+            p, q, r = jacobian[3, column], jacobian[4, column], jacobian[5, column]
+            o, t, v = offset[0], offset[1], offset[2]
+            m, n, l = rotate(w, a, b, c, q * v - r * t, r * o - p * v, p * t - q * o)
+            jacobian[0, column] += m + x * along[column]
+            jacobian[1, column] += n + y * along[column]
+            jacobian[2, column] += l + z * along[column]
+    for at in range(3, size, 3):
+        o, t, v = offset[at], offset[at + 1], offset[at + 2]
+        w, a, b, c = exponential(o, t, v)
+        if jacobian.shape[0] > 0:
+            x, y, z = angular_velocity(o, t, v, rate[at], rate[at + 1], rate[at + 2])
+            for column in range(6):
+                p, q, r = jacobian[at, column], jacobian[at + 1, column], jacobian[at + 2, column]
+                m, n, l = rotate(w, -a, -b, -c, p, q, r)
+                jacobian[at, column] = m + x * along[column]
+                jacobian[at + 1, column] = n + y * along[column]
+                jacobian[at + 2, column] = l + z * along[column]
+        joint = 3 + 4 * ((at - 3) // 3)
+        pose[joint], pose[joint + 1], pose[joint + 2], pose[joint + 3] = multiply(
+            pose[joint], pose[joint + 1], pose[joint + 2], pose[joint + 3], w, a, b, c
+        )

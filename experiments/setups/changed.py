@@ -1,0 +1,62 @@
+"""Whether the physical figure follows from river to river, where each plays a clip of its own."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from controllers.easing import smooth_step
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.haptic_map.river_clips import RiverClips
+from experiments.config.run_config import Figure
+from experiments.setups.figure_legs import packed_legs
+from experiments.setups.stylus import stylus_path
+from experiments.setups.verdict import tried
+from models.mocap.clip import Clip
+from sim.reference.reference import make_reference, reference_along
+
+_FPS = 120.0
+_WAY = (0, 1, 2, 0, 2, 1, 0)  # over three rivers: each change from one to another once
+_STAY, _GLIDE = 5.5, 0.3  # [s] on a river, in which a gate is passed and a change ends; and to go over
+_SECONDS = _STAY * len(_WAY)
+
+
+def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
+    """The animation of a hand that goes at the rivers' pace, and over from each of the three to each other."""
+    # The filter of the stylus begins at rest: what it shows in its first second is not looked at.
+    times = np.arange(round((_SECONDS + 2.0) * _FPS)) / _FPS - 1.0
+    stay = np.clip(times // _STAY, 0, len(_WAY) - 1).astype(int)
+    way = np.array(_WAY)
+    share = np.array([smooth_step.py_func(x) for x in (times - _STAY * stay) / _GLIDE])[:, None]
+    phases = np.array([curve.start + times % curve.duration for curve in made.curves])
+    points = np.array([curve.point(phase) for curve, phase in zip(made.curves, phases, strict=True)])
+    rows = np.arange(len(times))
+    now, before = points[way[stay], rows], points[way[np.maximum(stay - 1, 0)], rows]
+    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
+    traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = way[stay], phases[way[stay], rows]
+    reference = make_reference(figure, made.compiled(), 1.0 / _FPS, part.smoothing, part.blend, packed_legs(figure))
+    reference_along(reference, stylus_path(before + share * (now - before)), traces, poses)
+    return Clip(poses[times >= 0.0], _FPS, "rivers")
+
+
+def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
+    """What is to be said of a map of three rivers that the physical figure does not follow; needs compiled code.
+
+    Parameters
+    ----------
+    made : RiverClips
+    names : sequence of str
+        Of the rivers' clips.
+    part : Figure
+        How one clip goes over into another.
+    figure : mujoco.MjModel
+        The figure alone.
+    """
+    made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
+    verdict = tried(__name__, lambda: toured(made, part, figure), _SECONDS, made_of)
+    if verdict.bearable:
+        return ()
+    stay = min(int(verdict.fell // _STAY), len(_WAY) - 1) if verdict.falls else 0
+    after = f", {verdict.fell - _STAY * stay:.1f} s after {names[_WAY[stay - 1]]} gives way to {names[_WAY[stay]]}"
+    where = after if stay else ", before any river changes" if verdict.falls else ""
+    return (f"from river to river the physical figure {verdict}{where}; no other clips were tried",)

@@ -1,0 +1,185 @@
+"""Changes from river to river that floor contact alone can drive, found before a run.
+
+Where a clip goes over into another by offsets that decay and hasty steps (`sim.reference.river_changes`), a figure
+lacks 13 to 25 % of its weight, and may fall. So that is only where the search begins: of some moments of the stride the
+one is taken at which such a change lacks least, and from a third of a second before it to half of one after it the
+motion is made feasible as a capture is (`models.mocap.preparation.feasible`); both of its ends stay as the clips are.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from controllers.easing import smooth_step
+from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
+from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
+from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
+from controllers.state import Array
+from experiments.files.kept import kept_array
+from experiments.setups.figure_legs import packed_legs
+from experiments.setups.stylus import stylus_path
+from experiments.working import working
+from models.mocap import quaternions
+from models.mocap.clip import Clip
+from models.mocap.preparation.feasible import contact_residual, feasible
+from models.mocap.preparation.stances import Stances, stances
+from sim.compilation.sources import kept_folder
+from sim.reference.reference import make_reference, poses_along, reference_along
+
+_LEAD, _TAIL = 0.7, 0.9  # [s] before a change and after it that are its own
+_SETTLES, _BANDWIDTH = 1.0, 40.0  # [s], [Hz] of the stylus filter, which is hardly to be seen
+_AT_ONCE = 6  # rows between two looks whether the clip has changed
+_ITERATIONS = 12
+_AROUND = 0.5  # [s] beside the part that is made feasible, by which its stances are told
+_MOMENTS = 6  # of a stride, at which a change is tried
+_WAITS = 2.4  # [s] for the next gate, at most about
+_MOST = 8  # strides in a lap
+_LONG = 8.0  # [s] after which a change is given up
+_ROWS = 840  # of a lap: any number of strides up to `_MOST` divides it
+_REPEATS = 0.02  # [rad], [m] by which strides of one clip differ
+
+
+class _Passage(NamedTuple):
+    """A change by offsets that decay.
+
+    Attributes
+    ----------
+    poses : Array, shape (n, nq)
+        From `_AROUND` before what is its own to `_AROUND` after, `FPS` a second.
+    second : Array, shape (n, nq)
+        The new clip alone, where it then is.
+    gate : float
+        Phase at which its own begins, after the start of the lap [s].
+    """
+
+    poses: Array
+    second: Array
+    gate: float
+
+    @property
+    def own(self) -> slice:
+        """Rows that are its own."""
+        return slice(round(_AROUND * FPS), len(self.poses) - round(_AROUND * FPS))
+
+    def clip(self) -> Clip:
+        """What is its own."""
+        return Clip(self.poses[self.own], FPS, "change")
+
+    def stances(self) -> Stances:
+        """Its stances, told with what is beside it."""
+        whole, own = Clip(self.poses, FPS, "change"), self.own
+        told = stances(whole, whole)
+        return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own])
+
+
+def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> RiverClips:
+    """The same map, whose clips go over into each other by feasible changes; needs compiled code, and they are kept.
+
+    Parameters
+    ----------
+    made : RiverClips
+        Whose rivers have laps of one duration.
+    blend : float
+        Time in which one clip goes over into another where the search begins [s].
+    figure : mujoco.MjModel
+        The figure alone.
+    """
+    rivers, alike = range(len(made.curves)), made.on_one_river()
+    pairs = [(first, second) for first in rivers for second in rivers if first != second]
+    made_of = (made.compiled().params, np.array([blend]))
+    changes: list[ClipChange] = []
+    for first, second in pairs:
+        lap, strides = made.curves[first].duration, _strides(alike, first, second)
+        parts = max(1, round(lap / strides / _WAITS))
+        for k in range(parts):
+
+            def find(
+                first: int = first, second: int = second, span: float = lap / strides / parts, k: int = k
+            ) -> Array:
+                moments = span * (k + np.arange(_MOMENTS) / _MOMENTS)
+                with working("making rivers' changes feasible"):
+                    return _found(alike, blend, figure, first, second, moments)
+
+            name = f"change-{first}-{second}-{k}"
+            gate, *rows = kept_array(kept_folder(__name__), name, made_of, (-1, 57), find)
+            if rows:
+                gates = (gate[0] + lap / strides * np.arange(strides)) % lap
+                changes.append(ClipChange(first, second, gates, np.array(rows)))
+    return made.with_changes(changes)
+
+
+def _strides(made: RiverClips, first: int, second: int) -> int:
+    """In how many equal parts a lap of both clips falls."""
+    laps = [
+        _alone(made, river, np.arange(_ROWS) * made.curves[river].duration / _ROWS)[:, 7:] for river in (first, second)
+    ]
+    for strides in range(_MOST, 1, -1):
+        if all(np.abs(lap - np.roll(lap, _ROWS // strides, axis=0)).max() < _REPEATS for lap in laps):
+            return strides
+    return 1
+
+
+def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
+    """Poses of a river's clip at phases after the start of the lap, from a memory on."""
+    kind, params, fresh = made.compiled()
+    memory = fresh.copy() if memory is None else memory.copy()
+    memory[RIVER] = river
+    curve, poses = made.curves[river], np.empty((len(phases), made.nq))
+    poses_along(kind, params, memory, stylus_path(curve.point(curve.start + phases % curve.duration)), poses)
+    return poses
+
+
+def _passage(
+    made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
+) -> _Passage | None:
+    """A clip that goes over into another's at a moment of the lap [s] or soon after; None if it does not."""
+    curve = made.curves[first]
+    lap = curve.duration
+    times = lap + moment - _LEAD - _AROUND - _SETTLES + np.arange(_AT_ONCE * round(_LONG * FPS / _AT_ONCE)) / FPS
+    stylus = stylus_path(curve.point(curve.start + times % lap))
+    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
+    traces[:, TRACE_RIVER] = np.where(times < lap + moment, first, second)
+    traces[:, TRACE_PHASE] = curve.start + times % lap
+    compiled = made.compiled()
+    compiled.memory[RIVER] = first
+    reference = make_reference(figure, compiled, 1.0 / FPS, _BANDWIDTH, blend, packed_legs(figure))
+    changed, tail = None, round((_TAIL + _AROUND) * FPS)
+    for k in range(0, len(times) - tail, _AT_ONCE):
+        part = slice(k, k + _AT_ONCE)
+        reference_along(reference, stylus[part], traces[part], poses[part])
+        changed = k if changed is None and reference.memory[RIVER] == second else changed
+        if changed is not None and reference.transition.since[0] >= reference.transition.lasts[0]:
+            rest = slice(part.stop, part.stop + tail)
+            reference_along(reference, stylus[rest], traces[rest], poses[rest])
+            rows = np.arange(changed - round((_LEAD + _AROUND) * FPS), rest.stop)
+            alone = _alone(made, second, times[rows[::-1]], reference.memory)[::-1]
+            return _Passage(poses[rows], alone, float((times[rows[0]] + _AROUND) % lap))
+    return None
+
+
+def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
+    """A row with the gate [s], and the offsets (n, 57) of a change that begins there; none if none is found."""
+    passages = [_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
+    longest = LONGEST * made.curves[first].duration
+    tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
+    if not tried:
+        return np.zeros((0, 57))
+    best = min(tried, key=lambda passage: contact_residual(passage.clip(), passage.stances(), passage=True))
+    poses, own = best.poses.copy(), best.own
+    poses[own] = feasible(best.clip(), best.stances(), _ITERATIONS, FPS, passage=True).clip.poses
+    shown = slice(own.start - round(MARGIN * FPS), own.stop)
+    offsets = _way(best.second[shown], poses[shown])
+    # What is left of the filter's lag.
+    left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)
+    offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
+    return np.vstack([np.full((1, 57), best.gate), offsets])
+
+
+def _way(second: Array, shown: Array) -> Array:
+    """Offsets (n, 57) from poses of the second clip to those that are shown, as `clip_change` adds them."""
+    n = len(second)
+    turns = [poses[:, 3:].reshape(n, -1, 4) for poses in (second, shown)]
+    away = quaternions.rotated(quaternions.conjugate(turns[0][:, 0]), shown[:, :3] - second[:, :3])
+    between = quaternions.logarithm(quaternions.product(quaternions.conjugate(turns[0]), turns[1]))
+    return np.hstack([away, between.reshape(n, -1)])

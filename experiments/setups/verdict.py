@@ -1,0 +1,73 @@
+"""How the physical figure follows what a map shows, tried before a run and kept."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from controllers.state import Array
+from experiments.files.kept import kept_array
+from experiments.working import working
+from models.mocap.clip import Clip
+from sim.compilation.sources import kept_folder
+
+BEARABLE = 0.12  # [body weights] RMS, as in `followed`
+
+
+class Verdict(NamedTuple):
+    """How the physical figure follows a map.
+
+    Attributes
+    ----------
+    residual : float
+        RMS of the force that is lacking [body weights].
+    fell : float
+        When it fell [s]; infinite if it did not.
+    """
+
+    residual: float
+    fell: float
+
+    @property
+    def falls(self) -> bool:
+        """Whether it falls."""
+        return bool(np.isfinite(self.fell))
+
+    @property
+    def bearable(self) -> bool:
+        """Whether it stands and lacks little."""
+        return not self.falls and self.residual <= BEARABLE
+
+    def worse(self) -> tuple[float, float]:
+        """What is larger, the worse: an earlier fall before all."""
+        return -self.fell, self.residual
+
+    def __str__(self) -> str:
+        """What the figure does."""
+        return f"falls at {self.fell:.1f} s" if self.falls else f"lacks {100 * self.residual:.0f} % of weight"
+
+
+def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterable[npt.NDArray[np.generic]]) -> Verdict:
+    """Let the physical figure follow an animation, and keep how; needs compiled code.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name of the module that shows it: what is kept is found anew after a change of its code.
+    show : callable
+        Makes the animation.
+    seconds : float
+        For how long the figure follows [s].
+    made_of : iterable of arrays
+        Everything else that the animation depends on.
+    """
+
+    def find() -> Array:
+        from experiments.preparation.followed import followed  # brings signal processing with it
+
+        with working("following the blend"):
+            told = followed(show(), seconds)
+        return np.array([[told.residual, np.inf if told.fell is None else told.fell]])
+
+    return Verdict(*kept_array(kept_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())
