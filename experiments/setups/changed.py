@@ -59,4 +59,4 @@ def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: m
     stay = min(int(verdict.fell // _STAY), len(_WAY) - 1) if verdict.falls else 0
     after = f", {verdict.fell - _STAY * stay:.1f} s after {names[_WAY[stay - 1]]} gives way to {names[_WAY[stay]]}"
     where = after if stay else ", before any river changes" if verdict.falls else ""
-    return (f"from river to river the physical figure {verdict}{where}; no other clips were tried",)
+    return (f"from river to river the physical figure {verdict}{where}",)

@@ -1,9 +1,9 @@
 """Changes from river to river that floor contact alone can drive, found before a run.
 
 Where a clip goes over into another by offsets that decay and hasty steps (`sim.reference.river_changes`), a figure
-lacks 13 to 25 % of its weight, and may fall. So that is only where the search begins: of some moments of the stride the
-one is taken at which such a change lacks least, and from a third of a second before it to half of one after it the
-motion is made feasible as a capture is (`models.mocap.preparation.feasible`); both of its ends stay as the clips are.
+lacks 13 to 25 % of its weight, and may fall. So that is only where the search begins: at some moments of the stride
+such a change is tried, and from 0.7 s before it to 0.9 s after it the motion is made feasible as a capture is
+(`models.mocap.preparation.feasible`), beginning with what lacks least; both of its ends stay as the clips are.
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from experiments.setups.stylus import stylus_path
 from experiments.working import working
 from models.mocap import quaternions
 from models.mocap.clip import Clip
-from models.mocap.preparation.feasible import contact_residual, feasible
+from models.mocap.preparation.feasible import Feasible, contact_residual, feasible
 from models.mocap.preparation.stances import Stances, stances
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import make_reference, poses_along, reference_along
@@ -32,7 +32,8 @@ _SETTLES, _BANDWIDTH = 1.0, 40.0  # [s], [Hz] of the stylus filter, which is har
 _AT_ONCE = 6  # rows between two looks whether the clip has changed
 _ITERATIONS = 12
 _AROUND = 0.5  # [s] beside the part that is made feasible, by which its stances are told
-_MOMENTS = 6  # of a stride, at which a change is tried
+_MOMENTS = 8  # of a stride, at which a change by offsets is tried
+_TRIES, _WELL = 3, 300.0  # of these that are made feasible at most, and the cost at which one is done well
 _WAITS = 2.4  # [s] for the next gate, at most about
 _MOST = 8  # strides in a lap
 _LONG = 8.0  # [s] after which a change is given up
@@ -165,9 +166,15 @@ def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, s
     tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not tried:
         return np.zeros((0, 57))
-    best = min(tried, key=lambda passage: contact_residual(passage.clip(), passage.stances(), passage=True))
+    tried.sort(key=lambda passage: contact_residual(passage.clip(), passage.stances(), passage=True))
+    made_so: list[tuple[_Passage, Feasible]] = []
+    for passage in tried[:_TRIES]:
+        made_so.append((passage, feasible(passage.clip(), passage.stances(), _ITERATIONS, FPS, passage=True)))
+        if made_so[-1][1].costs[-1] < _WELL:
+            break
+    best, changed = min(made_so, key=lambda found: found[1].costs[-1])
     poses, own = best.poses.copy(), best.own
-    poses[own] = feasible(best.clip(), best.stances(), _ITERATIONS, FPS, passage=True).clip.poses
+    poses[own] = changed.clip.poses
     shown = slice(own.start - round(MARGIN * FPS), own.stop)
     offsets = _way(best.second[shown], poses[shown])
     # What is left of the filter's lag.

@@ -75,8 +75,8 @@ def test_a_run_governs_its_field_by_its_own_animation():
     np.testing.assert_allclose(begins, maps.curve.point(maps.curve.start + own), atol=1.5e-3)
     plain = wire(run_config(clips=("backflip",), seconds=1.0), session.clips)
     assert session.servo.field.budget[0] > plain.servo.field.budget[0]
-    gated = wire(run_config(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True), load_clips(
-        ("cheer", "backflip"))[0])  # fmt: skip
+    rivers = run_config(clips=("cheer", "backflip"), mode="rivers", map="rivers", governor=True, figure="kinematic")
+    gated = wire(rivers, load_clips(("cheer", "backflip"))[0])
     flies = [river.speeds[:, 0].max() > 0.0 for river in gated.field.bundle.rivers]
     assert flies == [False, True, False]
 

@@ -11,11 +11,12 @@ from models.mocap.preparation.poses import plus, resampled, smoothed
 from models.mocap.preparation.stances import stances
 
 
-@pytest.fixture(scope="module", params=["closed", "open"])
+@pytest.fixture(scope="module", params=["closed", "open", "passage"])
 def change(request):
     walk = resampled(embedded("walk"), 60.0)
     clip = walk if request.param == "closed" else Clip(walk.poses[:40], 60.0, "part")
-    return Change(clip, 0.1, 0.05)
+    return Change(clip, 0.1 if request.param != "passage" else 0.05, 0.05 if request.param != "passage" else 0.025,
+                  request.param == "passage")  # fmt: skip
 
 
 def test_carried_poses_are_mujocos():
@@ -45,6 +46,25 @@ def test_a_changed_open_motion_still_rests_at_its_ends(change):
         rates = np.einsum("mk,mkn->mn", change.basis[order], change.points(x)[change.first[:, None] + np.arange(6)])
         np.testing.assert_allclose(rates[[0, -1]], 0.0, atol=1e-6)
         assert np.abs(rates).max() > 0.05
+
+
+def test_a_passage_goes_on_at_its_ends_as_it_was():
+    """Value, velocity and acceleration of the change vanish there, and the motion is not taken for one at rest."""
+    walk = resampled(embedded("walk"), 60.0)
+    clip = Clip(walk.poses[:60], 60.0, "part")
+    change = Change(clip, 0.05, 0.0125, passage=True)
+    x = 0.02 * np.random.default_rng(1).normal(size=(change.n_points, N_TANGENT))
+    for order in (0, 1, 2):
+        values = np.einsum("mk,mkn->mn", change.basis[order], change.points(x)[change.first[:, None] + np.arange(6)])
+        np.testing.assert_allclose(values[[0, -1]], 0.0, atol=1e-6)
+        assert np.abs(values).max() > 0.02
+    state = change.states(x)
+    gone = pose_difference(clip.poses[:1], clip.poses[1:2])[0] * clip.fps
+    assert np.linalg.norm(state.v[0, :3]) == pytest.approx(np.linalg.norm(gone[:3]), rel=0.1)
+    assert np.linalg.norm(gone[:3]) > 0.5
+    changed = change.changed(x, 60.0)
+    for end in (0, -1):
+        np.testing.assert_allclose(changed.poses[end], clip.poses[end], atol=1e-12)
 
 
 def test_memory_does_not_hold_all_jacobians(change, monkeypatch):
@@ -98,6 +118,6 @@ def test_the_jacobian_of_the_errors(change, monkeypatch):
     ahead, behind = (problem.errors(x + sign * step * along, False).weighted for sign in (1, -1))
     found = (ahead - behind) / (2 * step)
     # The two ends of an open motion take the velocities of their neighbours.
-    inner = slice(1, -1) if not change.closed else slice(None)
+    inner = slice(1, -1) if not (change.closed or change.passage) else slice(None)
     scale = np.abs(found[inner]).max(axis=0) + 1.0
     assert np.quantile(np.abs(told - found)[inner] / scale, 0.99) < 0.02
