@@ -1,5 +1,6 @@
 """How the physical figure follows a clip alone: what preparing it is for."""
 
+from collections.abc import Callable
 from time import process_time
 from typing import NamedTuple
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from models.mocap.clip import Clip, pose_difference
 from sim.body.tracking import TrackingConfig, report, tracked_motion
+from sim.compilation.units import Unit
 
 SECONDS = 20.0  # followed
 FALLEN = 1.0  # m between the root and its reference
@@ -59,10 +61,12 @@ class Followed(NamedTuple):
         return ()
 
 
-def followed(clip: Clip, seconds: float = SECONDS) -> Followed:
-    """Let the physical figure follow a clip."""
+def followed(
+    clip: Clip, seconds: float = SECONDS, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
+) -> Followed:
+    """Let the physical figure follow a clip; `ready` is called with what is to be compiled for it."""
     began = process_time()
-    motion = tracked_motion(clip, seconds, TrackingConfig())
+    motion = tracked_motion(clip, seconds, TrackingConfig(), ready)
     cost = (process_time() - began) / seconds
     away = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
     told = report(motion)

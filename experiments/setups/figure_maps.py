@@ -40,7 +40,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.river_changes import with_changes
-from experiments.setups.rivers import default_choice, river_bundle
+from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
@@ -172,7 +172,10 @@ def _river_clips_parts(
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, not_followed(changing, names, config.figure, figure)
 
-    return replace(parts, plays_rivers=True, refined=refined)
+    pace, lap = place.curve.length / place.curve.duration, place.curve.duration
+    slow = (f"a lap of {lap:.0f} s leads the hand at {1e3 * pace:.0f} mm/s, at which noise of the encoders decides "
+            f"which river has it; below {1e3 * SLOWEST:.0f} mm/s choose a shorter --lap",)  # fmt: skip
+    return replace(parts.said(slow if pace < SLOWEST else ()), plays_rivers=True, refined=refined)
 
 
 def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:

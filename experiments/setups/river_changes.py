@@ -30,11 +30,12 @@ from sim.reference.reference import make_reference, poses_along, reference_along
 _LEAD, _TAIL = 0.7, 0.9  # [s] before a change and after it that are its own
 _SETTLES, _BANDWIDTH = 1.0, 40.0  # [s], [Hz] of the stylus filter, which is hardly to be seen
 _AT_ONCE = 6  # rows between two looks whether the clip has changed
-_ITERATIONS = 12
+_ITERATIONS = 10
 _AROUND = 0.5  # [s] beside the part that is made feasible, by which its stances are told
 _MOMENTS = 8  # of a stride, at which a change by offsets is tried
-_TRIES, _WELL = 3, 300.0  # of these that are made feasible at most, and the cost at which one is done well
-_WAITS = 2.4  # [s] for the next gate, at most about
+_TRIES, _WELL = 2, 400.0  # of these that are made feasible at most, and the cost at which one is done well
+_WAITS = 2.0  # [s] for the next gate, at most about, of a stride that has
+_GATES = 3  # gates at most: one takes some seconds to find
 _MOST = 8  # strides in a lap
 _LONG = 8.0  # [s] after which a change is given up
 _ROWS = 840  # of a lap: any number of strides up to `_MOST` divides it
@@ -92,7 +93,7 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
     changes: list[ClipChange] = []
     for first, second in pairs:
         lap, strides = made.curves[first].duration, _strides(alike, first, second)
-        parts = max(1, round(lap / strides / _WAITS))
+        parts = min(int(np.ceil(lap / strides / _WAITS)), _GATES)
         for k in range(parts):
 
             def find(

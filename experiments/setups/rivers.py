@@ -28,6 +28,7 @@ BESIDE = 0.05  # the hysteresis of rivers side by side, as a map's own are: plac
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
 # Encoders make 10 mm/s of noise, which is more than the smooth form's σ; the discrete one has its hysteresis.
 LOOK = {"discrete": 0.0, "smooth": 8e-3}
+SLOWEST = 0.03  # [m/s], three times that noise: rivers along which the hand goes more slowly are told apart by chance
 GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
 WAVE = 0.6  # height of the wave, of the map's half width
 

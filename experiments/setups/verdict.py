@@ -11,6 +11,7 @@ from experiments.files.kept import kept_array
 from experiments.working import working
 from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
+from sim.compilation.unit_workers import compile_units
 
 BEARABLE = 0.12  # [body weights] RMS, as in `followed`
 
@@ -67,7 +68,7 @@ def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterab
         from experiments.preparation.followed import followed  # brings signal processing with it
 
         with working("following the blend"):
-            told = followed(show(), seconds)
+            told = followed(show(), seconds, compile_units)
         return np.array([[told.residual, np.inf if told.fell is None else told.fell]])
 
     return Verdict(*kept_array(kept_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())

@@ -15,7 +15,7 @@ from models.mocap.library import embedded
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
-SECONDS = 8.0  # followed
+SECONDS = 20.0  # followed
 HEAD = (
     "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
     "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root moved RMS | most "
