@@ -20,7 +20,6 @@ from controllers.work_array import work_array
 
 FPS = 120.0  # rows a second of the phase
 MARGIN = 0.1  # [s] before the gate from which on rows are given
-_BEFORE = round(MARGIN * FPS)
 _PADDING = 16  # rows after the last over which the spline comes back to the first: what is not smooth there is not read
 # A row of the directory: the rivers, where rows and gates begin, and how many there are.
 _FIRST, _SECOND, _ROWS, _COUNT, _GATES, _PHASES, _ENTRY = range(7)

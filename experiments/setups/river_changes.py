@@ -34,8 +34,8 @@ _ITERATIONS = 10
 _AROUND = 0.5  # [s] beside the part that is made feasible, by which its stances are told
 _MOMENTS = 8  # of a stride, at which a change by offsets is tried
 _TRIES, _WELL = 2, 400.0  # of these that are made feasible at most, and the cost at which one is done well
-_WAITS = 2.0  # [s] for the next gate, at most about, of a stride that has
-_GATES = 3  # gates at most: one takes some seconds to find
+_WAITS = 2.0  # [s] for the next gate, at most about
+_GATES = 3  # of a stride at most, for one takes some seconds to find
 _MOST = 8  # strides in a lap
 _LONG = 8.0  # [s] after which a change is given up
 _ROWS = 840  # of a lap: any number of strides up to `_MOST` divides it
@@ -104,10 +104,10 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
                     return _found(alike, blend, figure, first, second, moments)
 
             name = f"change-{first}-{second}-{k}"
-            gate, *rows = kept_array(kept_folder(__name__), name, made_of, (-1, 57), find)
-            if rows:
-                gates = (gate[0] + lap / strides * np.arange(strides)) % lap
-                changes.append(ClipChange(first, second, gates, np.array(rows)))
+            rows = kept_array(kept_folder(__name__), name, made_of, (-1, 57), find)
+            if len(rows):
+                gates = (rows[0, 0] + lap / strides * np.arange(strides)) % lap
+                changes.append(ClipChange(first, second, gates, rows[1:]))
     return made.with_changes(changes)
 
 

@@ -1,5 +1,6 @@
 """Changes that are known before a run: they begin at a gate, end in the other clip, and nothing jumps meanwhile."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -101,6 +102,17 @@ def test_a_hand_that_comes_back_before_the_gate_never_changes(known: RiverClips)
 def test_changes_that_are_not_known_go_by_offsets_as_they_did(plain: RiverClips, known: RiverClips) -> None:
     rivers = [(1.4, 2), (4.3, 0)]
     np.testing.assert_array_equal(_played(known, rivers, 6.0)[0], _played(plain, rivers, 6.0)[0])
+
+
+def test_where_no_change_is_found_the_map_is_as_it_was(
+    plain: RiverClips, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
+    monkeypatch.setattr(river_changes, "_passage", lambda *rest: None)
+    for _ in range(2):  # found, and as it is kept
+        made = river_changes.with_changes(plain, 0.4, FIGURE)
+        assert made.changes == ()
+        np.testing.assert_array_equal(made.compiled().params, plain.compiled().params)
 
 
 def test_strides_of_two_clips_are_told(plain: RiverClips) -> None:
