@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from experiments import commands as hvf_commands
+from experiments.studies.row_spread import README, said
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
 FALLS = ["hvf run --clips backflip --governor"]  # pages say so beside them
@@ -29,8 +30,7 @@ TYPED = [page for page in PAGES if page == ROOT / "README.md" or page.parent.nam
 NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [["COMMAND", "--help"]]
 SHOWN = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
-RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
-SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried
+SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried (`row_spread`)
 HOUR = 3600.0  # [s] that a command may take at most: user studies and tunings do on a busy machine
 
 
@@ -44,23 +44,10 @@ def lines(page: Path) -> list[str]:
     return [line for line in typed if not any(words in line for words in ELSEWHERE)]
 
 
-def said(page: Path) -> dict[str, tuple[float, float]]:
-    """Residual [%] that the rows of a page's table say of their runs, from and to."""
-    rows: dict[str, tuple[float, float]] = {}
-    for line, measured in ROW.findall(page.read_text(encoding="utf-8")):
-        found = RESIDUAL.search(measured)
-        if found is not None:
-            low = float(found[1])
-            rows[shlex.join(shlex.split(line))] = low, float(found[2] or low)
-    return rows
-
-
 def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None:
-    stands = [
-        line for line, measured in ROW.findall((ROOT / "README.md").read_text(encoding="utf-8")) if "stands" in measured
-    ]
+    stands = [line for line, measured in ROW.findall(README.read_text(encoding="utf-8")) if "stands" in measured]
     assert len(stands) >= 8
-    assert [shlex.join(shlex.split(line)) for line in stands] == list(said(ROOT / "README.md"))
+    assert [shlex.join(shlex.split(line)) for line in stands] == list(said(README.read_text(encoding="utf-8")))
 
 
 @pytest.mark.commands
@@ -69,7 +56,7 @@ def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> N
     for file, source in GIVEN.items():
         shutil.copy(ROOT / source, tmp_path / file)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    residuals = said(page)
+    residuals = said(page.read_text(encoding="utf-8"))
     for line in EARLIER.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
         shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none

@@ -19,7 +19,7 @@ from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
-from experiments.setups.certified_law import certified_laws, governor_drag, leading_drag, left_out
+from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, left_out
 from experiments.setups.defaults import resolved
 from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
@@ -38,7 +38,8 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
     """
     from experiments.setups.pace import course_of
 
-    return MAP_CURVES[config.map.kind](config, config.map, partial(course_of, drag=leading_drag(config)))
+    stiffness, drag = leading_gains(config)
+    return MAP_CURVES[config.map.kind](config, config.map, partial(course_of, drag=drag, stiffness=stiffness))
 
 
 def given_curves(config: RunConfig) -> dict[str, Trajectory]:

@@ -41,12 +41,12 @@ def certified_laws(config: RunConfig) -> Laws:
     return _LAWS[config.mode.kind](resolved(config).mode)
 
 
-def leading_drag(config: RunConfig) -> float:
-    """Damping [N s/m] with which a run leads along its curve; 0 where it does not lead."""
+def leading_gains(config: RunConfig) -> tuple[float, float]:
+    """Stiffness [N/m] and damping [N s/m] with which a run leads along its curve; 0 where it does not lead."""
     mode = resolved(config).mode
     if isinstance(mode, Rivers):
-        return river_gains(mode)[1]
-    return mode.damping if isinstance(mode, Follow | StretchThenFollow) else 0.0
+        return river_gains(mode)
+    return (mode.stiffness, mode.damping) if isinstance(mode, Follow | StretchThenFollow) else (0.0, 0.0)
 
 
 def governor_drag(config: RunConfig) -> float:

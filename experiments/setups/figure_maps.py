@@ -32,7 +32,6 @@ from experiments.setups.alike import arms, carries_alike, moves_alike, upper_joi
 from experiments.setups.balance import balanced
 from experiments.setups.blendable import grounded, keeps_pace, not_blendable, off_pace, same
 from experiments.setups.carried import carried
-from experiments.setups.changed import not_followed
 from experiments.setups.figure_legs import figure_legs
 from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
@@ -40,6 +39,7 @@ from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
 from experiments.setups.rests import with_rests
 from experiments.setups.river_changes import with_changes
+from experiments.setups.river_tour import not_followed
 from experiments.setups.rivers import SLOWEST, default_choice, river_bundle
 from models.humanoid.skeleton import N_POSE
 from models.mocap.clip import Clip
@@ -139,7 +139,7 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
 
     return ClipMapParts(
         haptic_map=cast(ClipMap, haptic_map), clips=(), curve=reached(curve), reach=Circle().radius, rivers=none,
-        river_pushes=none, course=lambda damping: curve,
+        river_pushes=none, course=lambda damping, stiffness: curve,
     )  # fmt: skip
 
 

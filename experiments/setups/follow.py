@@ -12,7 +12,7 @@ from experiments.setups.parts import ClipMapParts, Notes, Parts
 
 def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "follow"."""
-    course = maps.course(mode.damping)
+    course = maps.course(mode.damping, mode.stiffness)
     law, urged = governed(mode.governor, FollowLaw(course, mode.stiffness, mode.damping, mode.tube), course, maps)
     power, springs = river_power(mode.damping, fastest(course)), ((mode.stiffness, mode.tube),)
     field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)

@@ -73,9 +73,9 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
     SimError
         If the Phantom does not reach a curve.
     """
-    damping = river_gains(mode)[1]
+    stiffness, damping = river_gains(mode)
     given = tuple(haptic_map.curve(i) for i in range(len(haptic_map.names)))
-    rivers = tuple(lifted_river(paced(curve, damping), mode) for curve in given)
+    rivers = tuple(lifted_river(paced(curve, damping, stiffness), mode) for curve in given)
     return side_by_side(RiverBundle(rivers, haptic_map.names), given)
 
 

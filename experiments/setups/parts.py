@@ -153,7 +153,7 @@ class ClipMapParts(MapParts[ClipMap]):
     river_pushes : callable
         From the mode and the time of the run [s] to what a hand does that pushes over into another river.
     course : callable
-        From the damping of a field [N s/m] to the curve along which it leads.
+        From damping [N s/m] and stiffness [N/m] of a field to the curve along which it leads.
     carry : float
         Share of the default ways by which a hand bends a curve.
     held_seconds : float
@@ -163,7 +163,7 @@ class ClipMapParts(MapParts[ClipMap]):
     reach: float
     rivers: Callable[[Rivers], RiverChoice]
     river_pushes: Callable[[Rivers, float], tuple[Push, ...]]
-    course: Callable[[float], Trajectory]
+    course: Callable[[float, float], Trajectory]
     carry: float = 1.0
     held_seconds: float = 0.0
 

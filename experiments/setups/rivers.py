@@ -36,7 +36,7 @@ WAVE = 0.6  # height of the wave, of the map's half width
 def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "rivers"."""
     stiffness, damping = river_gains(mode)
-    course, choice, urged = maps.course(damping), maps.rivers(mode), 0.0
+    course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
     if mode.governor is not None and mode.crossing != "sum":
         law = law_of(mode, gated(choice, maps), GATE)
     else:
@@ -86,7 +86,7 @@ def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice
         If the Phantom does not reach one of them.
     """
     bundle = river_bundle(curve, reach, river_time(mode), river_gains(mode)[1], mode.river_tube)
-    led = tuple(replace(river, curve=paced(river.curve, river.drag)) for river in bundle.rivers)
+    led = tuple(replace(river, curve=paced(river.curve, river.drag, river.drag / river.tau)) for river in bundle.rivers)
     given = tuple(river.curve for river in bundle.rivers)
     return RiverChoice(replace(bundle, rivers=led), given, curve.length / curve.duration, HYSTERESIS)
 

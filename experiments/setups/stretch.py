@@ -55,7 +55,7 @@ def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch-then-follow", which performs once the last grab is over."""
-    course = maps.course(mode.damping)
+    course = maps.course(mode.damping, mode.stiffness)
     user = _user(config, mode, maps)
     until = edited_until(user.grabs)
     carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)

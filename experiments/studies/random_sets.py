@@ -12,14 +12,18 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
+from experiments.files.map_files import save_map
+from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clip
 from experiments.setups.alike import motion_of
@@ -93,15 +97,25 @@ def _other(clip: Clip) -> Clip:
     return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
 
 
-def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str) -> dict[str, Any]:
-    """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure."""
+def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
+    """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure.
+
+    On a lifted map the hand follows the first clip's curve, at that clip's pace.
+    """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    lap = natural_lap(led_by(grounded(clips), loops))
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
-    config = run_config(mode=mode, map=kind, user=user, clips=names, lap=lap, seconds=SECONDS, seed=seed)
-    session = wire(config, tuple(clips))
+    with TemporaryDirectory() as made:
+        if kind == "lifted":
+            file = Path(made) / "map.npz"
+            save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
+            lap, words = clips[0].duration, dict[str, Any](map=str(file))
+        else:
+            lap = natural_lap(led_by(grounded(clips), loops))
+            words = dict[str, Any](map=kind, clips=names, lap=lap)
+        config = run_config(mode=mode, user=user, seconds=SECONDS, seed=seed, **words)
+        session = wire(config, tuple(clips))
     played = getattr(session.haptic_map, "loops", loops)
     log = TrialLog(session.servo, session.world)
     Loop(session.servo, session.world, log).run(SECONDS)
@@ -113,10 +127,10 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str)
     rate = 1.0 / float(np.diff(frames["t"]).mean())
     return {
         "set": number, "map": kind, "clips": names, "seed": seed, "lap": lap,
-        "pace": [round(one.duration / lap, 2) for one in played],
+        "pace": [1.0 if kind == "lifted" else round(one.duration / lap, 2) for one in played],
         "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
         "share": getattr(session.parts.maps.haptic_map, "share", None),
-        "remarks": session.remarks, "off_pace": off_pace(clips, played, lap), "fell": fell,
+        "remarks": session.remarks, "off_pace": () if kind == "lifted" else off_pace(clips, played, lap), "fell": fell,
         "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
@@ -167,7 +181,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-SIZES = {"cylindrical": 4, "composite": 3, "rivers": 3}
+SIZES = {"cylindrical": 4, "composite": 3, "rivers": 3, "lifted": 4}
 
 
 def main() -> None:
@@ -191,7 +205,7 @@ def main() -> None:
                 clips.append(clip)
         rows: list[dict[str, Any]] = []
         tasks = [
-            pool.submit(run_set, k, kind, chosen, given.seed + k, given.user)
+            pool.submit(run_set, k, kind, chosen, given.seed + k, given.user, given.folder)
             for k, sets in enumerate(
                 islice(zip(*(drawn(clips, SIZES[m], given.seed) for m in given.maps), strict=True), given.sets)
             )

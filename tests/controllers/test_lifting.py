@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, is_apart, on_lap
+from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, arrange, is_apart, on_lap
 from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
 from controllers.haptic_map.lifting.common_lap import common_lap
 from controllers.haptic_map.lifting.layouts import lattice, scaled
@@ -242,10 +242,25 @@ def test_the_same_seed_gives_the_same_curves():
 
 
 def test_a_fast_clip_is_kept_where_the_device_can_follow():
-    fast = [FOUR[0], motion(FOUR[3].poses, "fast", fps=150.0)]
-    free = lifted_at(fast, Room(acceleration=100.0)).after.curves[1].acceleration
-    bound = lifted_at(fast, Room(acceleration=0.7 * free)).after.curves[1].acceleration
-    assert bound <= 0.7 * free
+    fast = [FOUR[0], FOUR[1], motion(FOUR[3].poses, "fast", fps=150.0)]
+    free = lifted_at(fast, Room(acceleration=100.0)).after.curves[2].acceleration
+    # At the innermost radius it is 0.9 of that.
+    bound = lifted_at(fast, Room(acceleration=0.93 * free)).after.curves[2].acceleration
+    assert bound <= 0.93 * free
+
+
+def test_the_faster_a_curve_is_gone_round_the_less_it_bends():
+    # Two motions that are alike twice a lap.
+    lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, SAMPLES, endpoint=False))
+    distance = lap[:, None, None] * (1.0 - np.eye(2))
+    bends = list[float]()
+    for rate in (1.0, 3.0, 9.0):
+        still = np.zeros((SAMPLES, 2))
+        task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
+        bends.append(np.ptp(arrange(task, np.random.default_rng(0))[0], axis=0).max())
+    assert bends[0] > 3e-3
+    assert bends[1] < 0.8 * bends[0]
+    assert bends[2] < 0.1 * bends[0]
 
 
 def test_many_clips_are_kept_apart():

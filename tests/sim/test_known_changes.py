@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
-from experiments.setups import changed, river_changes
+from experiments.setups import river_changes, river_tour
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.rests import with_rests
@@ -20,6 +19,7 @@ from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip, pose_difference
 from sim.reference.reference import make_reference, poses_along, reference_along
+from tests.sim.gliding_hand import gliding_hand
 
 LAP, PERIOD = 3.4, 2e-3
 FIGURE = figure_model()
@@ -42,25 +42,15 @@ def known(plain: RiverClips) -> RiverClips:
     return plain.with_changes([ClipChange(0, 1, gate[:1], np.array(rows))])
 
 
-def _played(clips: RiverClips, rivers: list[tuple[float, int]], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def _played(clips: RiverClips, rivers: tuple[tuple[float, int], ...], seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Poses of a hand that each river has from a moment on, and what the memory then holds."""
     t = np.arange(round(seconds / PERIOD)) * PERIOD
-    river, share = np.zeros(len(t)), np.zeros((3, len(t)))
-    share[0] = 1.0
-    for moment, number in rivers:
-        river[t >= moment] = number
-        s = np.clip((t - moment) / 0.3 + 0.5, 0.0, 1.0)
-        s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        share *= 1.0 - s
-        share[number] += s
-    points = sum(w[:, None] * curve.point(t % LAP) for w, curve in zip(share, CURVES, strict=True))
-    traces = np.zeros((len(t), TRACE_SIZE))
-    traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = river, t % LAP
+    stylus, traces = gliding_hand(CURVES, LAP, rivers, t)
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, 0.4, packed_legs(FIGURE))
     poses, memory = np.empty((len(t), 75)), np.empty((len(t), len(reference.memory)))
     for k in range(0, len(t), 5):
         rows = slice(k, k + 5)
-        reference_along(reference, stylus_path(points[rows]), traces[rows], poses[rows])
+        reference_along(reference, stylus[rows], traces[rows], poses[rows])
         memory[rows] = reference.memory
     return poses, memory
 
@@ -68,7 +58,7 @@ def _played(clips: RiverClips, rivers: list[tuple[float, int]], seconds: float) 
 def test_a_known_change_begins_at_its_gate_ends_in_the_other_clip_and_nothing_jumps(known: RiverClips) -> None:
     (change,) = known.changes
     gate, begins = change.gates[0], 0.3
-    poses, memory = _played(known, [(begins, 1)], 2.0 * LAP)
+    poses, memory = _played(known, ((begins, 1),), 2.0 * LAP)
     t = np.arange(len(poses)) * PERIOD
     # The hand is timed by the river that has it at once, the clip plays on to the gate.
     assert t[memory[:, COURSE] == 1.0][0] < begins + 0.1
@@ -91,7 +81,7 @@ def test_a_known_change_begins_at_its_gate_ends_in_the_other_clip_and_nothing_ju
 def test_a_hand_that_comes_back_before_the_gate_never_changes(known: RiverClips) -> None:
     gate = known.changes[0].gates[0]
     leaves = (gate + 0.3) % LAP
-    poses, memory = _played(known, [(LAP + leaves, 1), (LAP + leaves + 0.6, 0)], 2.6 * LAP)
+    poses, memory = _played(known, ((LAP + leaves, 1), (LAP + leaves + 0.6, 0)), 2.6 * LAP)
     assert np.all(memory[:, RIVER] == 0.0)
     assert np.any(memory[:, COURSE] == 1.0)
     assert memory[-1, COURSE] == 0.0
@@ -100,7 +90,7 @@ def test_a_hand_that_comes_back_before_the_gate_never_changes(known: RiverClips)
 
 
 def test_changes_that_are_not_known_go_by_offsets_as_they_did(plain: RiverClips, known: RiverClips) -> None:
-    rivers = [(1.4, 2), (4.3, 0)]
+    rivers = ((1.4, 2), (4.3, 0))
     np.testing.assert_array_equal(_played(known, rivers, 6.0)[0], _played(plain, rivers, 6.0)[0])
 
 
@@ -145,8 +135,8 @@ def test_what_is_not_followed_is_said_with_the_change_before(
 ) -> None:
     from experiments.config.run_config import Figure
 
-    monkeypatch.setattr(changed, "tried", lambda *rest: verdict)
-    assert changed.not_followed(plain, NAMES, Figure(), FIGURE) == said
+    monkeypatch.setattr(river_tour, "tried", lambda *rest: verdict)
+    assert river_tour.not_followed(plain, NAMES, Figure(), FIGURE) == said
 
 
 @pytest.mark.slow
@@ -160,9 +150,9 @@ def test_the_figure_follows_over_all_changes_of_three_clips_that_it_loses_by_off
     assert {(change.first, change.second) for change in found.changes} == {
         (a, b) for a in range(3) for b in range(3) if a != b
     }
-    seconds = changed._SECONDS
-    by_offsets, by_changes = (followed(changed.toured(made, Figure(), FIGURE), seconds) for made in (plain, found))
+    seconds = river_tour._SECONDS
+    by_offsets, by_changes = (followed(river_tour.toured(made, Figure(), FIGURE), seconds) for made in (plain, found))
     # 4 and 16 % when this was written; half of what is lacking is the margin.
     assert by_changes.fell is None
     assert by_changes.residual < min(0.08, 0.5 * by_offsets.residual)
-    assert isinstance(changed.toured(found, Figure(), FIGURE), Clip)
+    assert isinstance(river_tour.toured(found, Figure(), FIGURE), Clip)

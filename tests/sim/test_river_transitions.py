@@ -29,6 +29,7 @@ from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
 from sim.reference.transition import DWELL
+from tests.sim.gliding_hand import gliding_hand
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "river_clips.csv"
 FIGURE = figure_model()
@@ -45,22 +46,12 @@ def clips_of_rivers() -> RiverClips:
 def _played(clips: RiverClips, blend: float, none_between: bool = False) -> np.ndarray:
     """Poses of a hand that glides from river to river, every 8 ms for 7.2 s."""
     t = np.arange(900) * PERIOD
-    river, share = np.zeros(len(t)), np.zeros((3, len(t)))
-    share[0] = 1.0
-    for moment, number in CHANGES:
-        river[t >= moment] = number
-        s = np.clip((t - moment) / 0.3 + 0.5, 0.0, 1.0)
-        s = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        share *= 1.0 - s
-        share[number] += s
-        if none_between:
-            river[(t >= moment - 0.1) & (t < moment)] = -1.0
-    points = sum(w[:, None] * curve.point(t % LAP) for w, curve in zip(share, CURVES, strict=True))
-    traces = np.zeros((len(t), TRACE_SIZE))
-    traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = river, t % LAP
+    stylus, traces = gliding_hand(CURVES, LAP, CHANGES, t)
+    for moment, _ in CHANGES if none_between else ():
+        traces[(t >= moment - 0.1) & (t < moment), TRACE_RIVER] = -1.0
     reference = make_reference(FIGURE, clips.compiled(), PERIOD, 6.0, blend, packed_legs(FIGURE))
     poses = np.empty((len(t), 75))
-    reference_along(reference, stylus_path(points), traces, poses)
+    reference_along(reference, stylus, traces, poses)
     return poses
 
 

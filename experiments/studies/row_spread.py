@@ -1,0 +1,75 @@
+"""How far apart runs of README's rows end: the residual from other starts, of other weights, by other kernels.
+
+``python -m experiments.studies.row_spread [CORE...]`` runs each row of README's table that says a residual, thrice by
+each of the kernels that OpenBLAS is told to pick (``OPENBLAS_CORETYPE``: Haswell, SkylakeX, Zen; without a word those
+of this processor), and prints the table of `docs/validation/residual-bounds.md`. A figure with contacts is chaotic: a
+seed draws where the hand lets go of the stylus, and weights differ in the sixth digit.
+"""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from models.humanoid.skeleton import DEFAULT_MASS
+
+README = Path(__file__).parents[2] / "README.md"
+NUDGES = ((0, 0.0), (1, 1e-6), (2, -1e-6))
+"""Seed, and by what share the figure is heavier."""
+
+_ROW = re.compile(r"^\| [^|]+ \| `(hvf (?:run|lift) [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
+_RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
+
+
+def said(page: str) -> dict[str, tuple[float, float]]:
+    """Commands of a page's rows, and from and to what residual [%] each says of its run."""
+    found = ((shlex.join(shlex.split(line)), _RESIDUAL.search(measured)) for line, measured in _ROW.findall(page))
+    return {line: (float(says[1]), float(says[2] or says[1])) for line, says in found if says is not None}
+
+
+def measured(line: str, folder: Path, core: str) -> tuple[float, bool]:
+    """Residual [%] of a command's run in a folder by a kernel, and whether its figure fell."""
+    words = shlex.split(line)
+    _typed(words, folder, core)
+    summary = json.loads((folder / words[words.index("--out") + 1] / "summary.json").read_text(encoding="utf-8"))
+    return 100.0 * summary["figure"]["residual_force_rms"], bool(summary["figure"]["falls"])
+
+
+def _typed(words: Sequence[str], folder: Path, core: str) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(README.parent), **({"OPENBLAS_CORETYPE": core} if core else {})}
+    command = [sys.executable, "-m", "experiments.cli", *words[1:], "--overwrite"]
+    subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def main(cores: Sequence[str]) -> None:
+    """Print the table."""
+    page = README.read_text(encoding="utf-8")
+    with TemporaryDirectory() as made:
+        folders = {core: Path(made) / (core or "own") for core in cores or [""]}
+        for core, folder in folders.items():
+            folder.mkdir()
+            for line, _ in _ROW.findall(page):
+                if line.startswith("hvf lift "):
+                    _typed(shlex.split(line), folder, core)
+        print("| command | README says % | residual %, from and to | falls |\n|---|---|---|---|")
+        for line, (low, high) in said(page).items():
+            runs = [
+                measured(f"{line} --seed {seed} --mass {DEFAULT_MASS * (1.0 + nudge)!r}", folder, core)
+                for core, folder in folders.items()
+                for seed, nudge in NUDGES
+            ]
+            residuals, falls = [residual for residual, _ in runs], sum(fell for _, fell in runs)
+            print(
+                f"| `{line}` | {low:g} to {high:g} | {min(residuals):.2f} to {max(residuals):.2f} "
+                f"| {falls} of {len(runs)} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
