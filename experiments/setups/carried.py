@@ -54,9 +54,7 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     pushed from radius R to r goes round at R/r of its pace, as in FOLLOW.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
-    turn, phase = 2.0 * np.pi * times / _SECONDS, times / _EVERY % 2.0
-    ramp = np.clip(np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN, 0.0, 1.0)
-    pushed = _PUSHED * ramp**2 * (3.0 - 2.0 * ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0)
+    turn, pushed = 2.0 * np.pi * times / _SECONDS, _PUSHED * push_profile(times)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = _domain(made).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
@@ -68,6 +66,13 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     kind, params, memory = made.compiled()
     poses_along(kind, params, memory.copy(), stylus, poses)
     return Clip(poses, _FPS, "blend")
+
+
+def push_profile(times: Array) -> Array:
+    """How a hand is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
+    phase = times / _EVERY % 2.0
+    ramp = np.clip(np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN, 0.0, 1.0)
+    return np.asarray(ramp**2 * (3.0 - 2.0 * ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
 def sound(made: Cylindrical | Composite, lap: float) -> bool:

@@ -37,6 +37,7 @@ from experiments.setups.hands import river_pushes
 from experiments.setups.lifted_runs import HELD_GAINS, default_pushes, lifted_choice, lifted_curve
 from experiments.setups.pace import course_of
 from experiments.setups.parts import ClipMapParts
+from experiments.setups.pushed_off import not_followed as not_carried
 from experiments.setups.rests import with_rests
 from experiments.setups.river_changes import with_changes
 from experiments.setups.river_tour import not_followed
@@ -185,6 +186,8 @@ def _file_parts(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figur
         if part.around != Circle():
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = _on_lifted(part, made, clips)
+        if config.user.does == "push" and config.figure.kind == "physical" and not isinstance(config.mode, Rivers):
+            parts = replace(parts, refined=lambda: (made, not_carried(made, parts.curve)))
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or give --map a lifted one")
     else:

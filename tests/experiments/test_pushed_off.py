@@ -1,0 +1,44 @@
+"""What is said before a run of a lifted map whose hand pushes: the hand is pushed off its curve, and back."""
+
+import numpy as np
+import pytest
+
+from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.room import Room
+from experiments.lifting.lift import lift_clips
+from experiments.setups import pushed_off
+from experiments.setups.verdict import Verdict
+from models.mocap.clip import pose_difference
+
+
+@pytest.fixture(scope="module")
+def lifted() -> Lifted:
+    return lift_clips(("squat_dance", "cheer"), Room()).haptic_map
+
+
+def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
+    curve = lifted.curve(0)
+    shown = pushed_off.toured(lifted, curve).poses
+    monkeypatch.setattr(pushed_off, "_PUSHED", 0.0)
+    alone = pushed_off.toured(lifted, curve).poses
+    apart = np.abs(pose_difference(alone, shown)[:, 6:]).max(axis=1)
+    times = np.arange(len(shown)) / 120.0
+    assert apart[times < 1e-3].max() < 1e-9
+    # Out in the first push, in in the third one's time: other clips, or other phases of its own.
+    assert apart[(times > 0.3) & (times < 1.4)].min() > 1e-3
+    assert apart.max() > 0.05
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        (Verdict(0.05, np.inf), ()),
+        (Verdict(0.2, np.inf), ("pushed off its curve to those beside it, the physical figure lacks 20 % of weight",)),
+        (Verdict(0.2, 3.0), ("pushed off its curve to those beside it, the physical figure falls at 3.0 s",)),
+    ],
+)
+def test_what_a_pushed_figure_does_not_follow_is_said(
+    verdict: Verdict, said: tuple[str, ...], lifted: Lifted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pushed_off, "tried", lambda *rest: verdict)
+    assert pushed_off.not_followed(lifted, lifted.curve(0)) == said
