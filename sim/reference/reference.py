@@ -191,10 +191,10 @@ def begin_in_motion(reference: CompiledReference, motion: Array) -> None:
     reference.hand[:] = motion
     for _ in range(_ROUNDS):
         before = reference.hand
-        jerk, snap = -(turn_rate.py_func(before[1], before[2]) ** 2) * before[1:]
-        acceleration = a - period * (jerk + 0.5 * period * snap)
-        velocity = v - period * (acceleration + period * (0.5 * jerk + period * snap / 6.0))
-        point = p - period * (velocity + period * (0.5 * acceleration + period * (jerk / 6.0 + period * snap / 24.0)))
+        jerk = -(turn_rate.py_func(before[1], before[2]) ** 2) * before[1]
+        acceleration = a - period * jerk
+        velocity = v - period * acceleration - 0.5 * period**2 * jerk
+        point = p - period * velocity - 0.5 * period**2 * acceleration - period**3 * jerk / 6.0
         reference.hand[:] = point, velocity, acceleration
 
 

@@ -7,14 +7,12 @@ What moves, or turns about a fixed axis, with constant acceleration is followed 
 A hand on a lap does neither: its acceleration turns with it. Along a circle at the rate Ω that has the jerk −Ω² ṗ,
 which a filter without it pays for with a velocity that is 1.6 % short on the default circle in 2.2 s, and a figure
 with a reference that does not move as fast as its velocity says. So the prediction is that of a coordinated turn
-(Bar-Shalom, Li and Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to fourth order
+(Bar-Shalom, Li and Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 11.7), to third order
 in T:
 
-.. math:: j = -\Omega^2 \dot p, \qquad s = -\Omega^2 \ddot p, \qquad
-          \Omega = \min(|\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2),\ \max(2\pi,\ |\dot p|/\varrho))
+.. math:: j = -\Omega^2 \dot p, \qquad \Omega = \min(|\dot p \times \ddot p| \,/\, (\dot p^2 + v_0^2),\ 2\pi)
 
-Without the bound a slow hand's noise turns the prediction: the run that is led falls at 7.9 s. With 2π alone a hand
-that goes round a captured run's stride in 0.55 s has a velocity of 1.11 of its own, and the runner falls.
+Without the bound a slow hand's noise turns the prediction: the run that is led falls at 7.9 s.
 """
 
 import numpy as np
@@ -24,8 +22,7 @@ from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array
 
 _SLOW = 0.02  # v₀ [m/s], below which encoder noise has no direction to turn
-_FASTEST = 2.0 * np.pi  # [rad/s]: a slow hand that seems to turn faster is noise
-_TIGHTEST = 0.015  # ϱ [m]: no lap is nearer to the axis
+_FASTEST = 2.0 * np.pi  # [rad/s]: no lap takes less than a second, and a slow hand that seems to turn faster is noise
 
 
 @njit
@@ -41,25 +38,21 @@ def smooth_hand(hand: Array, measured: Array, smoothing: float, period: float) -
     g, h, k = filter_gains(smoothing, period)
     turn = turn_rate(hand[1], hand[2])
     for i in range(3):
-        jerk, snap = -(turn**2) * hand[1, i], -(turn**2) * hand[2, i]
-        second = hand[2, i] + period * (jerk + 0.5 * period * snap)
-        speed = hand[1, i] + period * (hand[2, i] + period * (0.5 * jerk + period * snap / 6.0))
-        predicted = hand[0, i] + period * (
-            hand[1, i] + period * (0.5 * hand[2, i] + period * (jerk / 6.0 + period * snap / 24.0))
-        )
+        jerk = -(turn**2) * hand[1, i]
+        predicted = hand[0, i] + period * (hand[1, i] + period * (0.5 * hand[2, i] + period * jerk / 6.0))
+        speed = hand[1, i] + period * (hand[2, i] + 0.5 * period * jerk)
         residual = measured[i] - predicted
         hand[0, i] = predicted + g * residual
         hand[1, i] = speed + h * residual
-        hand[2, i] = second + k * residual
+        hand[2, i] += period * jerk + k * residual
 
 
 @njit
 def turn_rate(v: Array, a: Array) -> float:
     """Ω [rad/s] at which a hand with a velocity and an acceleration (3,) turns."""
     x, y, z = v[1] * a[2] - v[2] * a[1], v[2] * a[0] - v[0] * a[2], v[0] * a[1] - v[1] * a[0]
-    square = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
-    rate = np.sqrt(x * x + y * y + z * z) / (square + _SLOW**2)
-    return min(rate, max(_FASTEST, np.sqrt(square) / _TIGHTEST))
+    rate = np.sqrt(x * x + y * y + z * z) / (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 + _SLOW**2)
+    return min(rate, _FASTEST)
 
 
 @njit(forceinline=False)
