@@ -104,7 +104,7 @@ def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
     it = engine(mode)
     for gain, value in gains_of(it.config).items():
         # What paces a curve that can be bent: of the test below.
-        if (mode, gain.name) != ("stretch-then-follow", "damping"):
+        if mode != "stretch-then-follow" or gain.name not in ("damping", "stiffness"):
             it.set_gains(with_gain(it.config, gain.name, 1.25 * value))
     other = engine(mode, **{gain.name: value for gain, value in gains_of(it.config).items()})
     for _ in range(60):
@@ -114,12 +114,13 @@ def test_gains_that_move_are_those_of_a_run_that_begins_with_them(mode):
     np.testing.assert_array_equal(it.logs[0].force, other.logs[0].force)
 
 
-def test_a_curve_that_can_be_bent_keeps_its_pace_while_the_damping_that_paced_it_moves():
+@pytest.mark.parametrize(("gain", "value"), [("damping", 20.0), ("stiffness", 600.0)])
+def test_a_curve_that_can_be_bent_keeps_its_pace_while_a_gain_that_paced_it_moves(gain, value):
     it, same = engine("stretch-then-follow"), engine("stretch-then-follow")
-    other = engine("stretch-then-follow", damping=20.0)
+    other = engine("stretch-then-follow", **{gain: value})
     record = it.tubes.record_at()
     assert len(other.memory) != len(it.memory) or np.any(other.memory[record:] != it.memory[record:])
-    it.set_gains(with_gain(it.config, "damping", 20.0))
+    it.set_gains(with_gain(it.config, gain, value))
     np.testing.assert_array_equal(it.memory[record:], same.memory[record:])
     np.testing.assert_array_equal(it.memory[:record], other.memory[:record])
     assert np.any(it.memory[:record] != same.memory[:record])
