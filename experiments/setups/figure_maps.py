@@ -224,7 +224,7 @@ def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapP
     )
     between = not_blendable(clips)
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=part.reach,
+        haptic_map=made, clips=clips, curve=curve, lap_seconds=curve.duration, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
         course=cache(partial(course_of, curve)),

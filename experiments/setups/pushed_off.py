@@ -12,6 +12,7 @@ from sim.reference.reference import poses_along
 
 _SECONDS, _FPS = 20.0, 120.0
 _PUSHED = 8e-3  # [m]: 2.5 N against 300 N/m
+_FIRST = 1.7  # [s], when the first push begins
 
 
 def toured(made: Lifted, curve: Trajectory) -> Clip:
@@ -20,7 +21,7 @@ def toured(made: Lifted, curve: Trajectory) -> Clip:
     A push leaves its speed over the ground as it is, as in FOLLOW, so it goes round the more slowly the further out.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
-    pushed, phase = _PUSHED * push_profile(times), curve.start
+    pushed, phase = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0)), curve.start
     points, poses = np.empty((len(times), 3)), np.empty((len(times), made.nq))
     for point, off in zip(points, pushed, strict=True):
         point[:] = curve.point(phase)
