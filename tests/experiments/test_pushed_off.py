@@ -45,7 +45,10 @@ def test_a_hand_is_pushed_out_and_in_and_has_its_clip_between(lifted: Lifted, mo
 def test_what_a_pushed_figure_does_not_follow_is_said(
     verdict: Verdict, said: tuple[str, ...], lifted: Lifted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pushed_off, "tried", lambda *rest: verdict)
+    def tried(*_: object) -> Verdict:
+        return verdict
+
+    monkeypatch.setattr(pushed_off, "tried", tried)
     assert pushed_off.not_followed(lifted, lifted.curve(0)) == said
 
 
