@@ -12,6 +12,7 @@ from controllers.certificates.switching.common_lyapunov import common_lyapunov, 
 from controllers.certificates.switching.switching import Keeping, Sharing, hysteresis_dwell, switching
 from controllers.certificates.switching.switching_search import SECONDS, Course, Push, counterexample, failure
 from experiments.certify.certified_device import phantom_device
+from experiments.certify.certified_field import given_curves
 from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
 from experiments.certify.certify import certified_rivers
 from experiments.certify.crossing_simulation import simulated_course
@@ -183,7 +184,9 @@ def test_the_rivers_of_a_run_do_not_keep_every_hand_and_mujoco_agrees():
     assert verdict.verdict == "refuted"
     assert verdict.figures["common_rate"] < 1.0
     assert np.linalg.eigvalsh(verdict.figures["common_p"])[0] > 0.0
-    found, field = verdict.counterexample, law_of(config.mode, default_choice(config.mode, curve, config.map.reach))
+    # The rivers are paced from the curve as the map has it, not from one that already is.
+    choice = default_choice(config.mode, given_curves(config)[""], config.map.reach)
+    found, field = verdict.counterexample, law_of(config.mode, choice)
     way = _in_mujoco(field, clock, found)
     ended = failure(way.river, clock.period, found["river"], any(found["force"]))
     assert ended.kind == found["kind"]
