@@ -2,7 +2,8 @@
 
 ``python -m experiments.studies.random_sets FOLDER --half tuning|judging --sets 40 --processes 4 --out OUT`` prepares
 the files, says which cannot be blended and why, draws sets of four of the others, runs each for 20 s with pushes, and
-prints the table of `docs/validation/blended-motions.md`. Rows are written as they come, one JSON object a line.
+prints the table of `docs/validation/blended-motions.md`; ``--files NAME...`` draws of these in the folder instead.
+Rows are written as they come, one JSON object a line.
 """
 
 import argparse
@@ -189,6 +190,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder")
     parser.add_argument("--half", choices=("tuning", "judging"), default="tuning")
+    parser.add_argument("--files", nargs="+", help="in the folder, in place of a half")
     parser.add_argument("--sets", type=int, default=10)
     parser.add_argument("--maps", nargs="+", default=["cylindrical"], choices=tuple(SIZES))
     parser.add_argument("--seed", type=int, default=1)
@@ -196,7 +198,7 @@ def main() -> None:
     parser.add_argument("--user", default="push")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    files = TUNING if given.half == "tuning" else JUDGING
+    files = given.files or (TUNING if given.half == "tuning" else JUDGING)
     clips: list[Clip] = []
     with ProcessPoolExecutor(given.processes) as pool, given.out.open("w") as out:
         for found, clip in pool.map(captured, [given.folder] * len(files), files):

@@ -3,7 +3,8 @@ r"""How a capture goes on: as a cycle, with a way back, or not at all; closed in
 Two frames are as alike as `laps` has it. A part of the clip is its cycle if its ends are alike and the rest of the clip
 only repeats it; it is closed by fading over from what led to its start, so that poses and velocities agree at the seam.
 A gesture, which ends with the feet where they were, gets a way back. Half a stride of a gait, which ends as it began in
-a mirror, is gone on with by its mirror image. Everything else rests at both ends.
+a mirror, is gone on with by its mirror image. Everything else rests at both ends. What stands on a foot all the time
+comes back to its place: a lap that ended a centimetre beside its start would drag that foot by it for ever.
 """
 
 from typing import Literal, NamedTuple
@@ -14,9 +15,10 @@ import numpy.typing as npt
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.clip import Clip, pose_difference
+from models.mocap.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
+from models.mocap.preparation.stances import stances
 
 _GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]; walkers have 0.1 to 0.3
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps
@@ -151,8 +153,8 @@ def _fast(clip: Clip) -> bool:
 
 def _in_place(clip: Clip) -> bool:
     """Whether the root ends where it began, looking where it did."""
-    there = clip.displacement
-    return bool(np.hypot(there.x, there.y) < _STEP and abs(there.yaw) < _YAW)
+    way = clip.poses[-1, :2] - clip.poses[0, :2]
+    return bool(np.hypot(*way) < _STEP and abs(clip.displacement.yaw) < _YAW)
 
 
 def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> Looped:
@@ -185,8 +187,31 @@ def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -
         join = Clip(np.vstack((other.poses[0], lap[-1])), clip.fps, clip.name).displacement
         lap = np.vstack((lap, join.moved(other.poses)[1:]))
     lap[-1] = Clip(lap, clip.fps, clip.name).displacement.moved(lap[0])
-    kind: Kind = "half stride" if half else "cycle"
-    return Looped(Clip(lap, clip.fps, clip.name), kind, first / clip.fps, last / clip.fps, gap)
+    made = Clip(lap, clip.fps, clip.name)
+    if _in_place(made) and _stands(made):
+        made = _brought_back(made)
+    return Looped(made, "half stride" if half else "cycle", first / clip.fps, last / clip.fps, gap)
+
+
+def _stands(clip: Clip) -> bool:
+    """Whether a foot stands from the first frame to the last."""
+    standing = stances(clip, clip).standing.reshape(clip.n_frames, 2, -1)
+    return bool(standing.any(axis=2).all(axis=0).any())
+
+
+def _brought_back(clip: Clip) -> Clip:
+    """A lap without the displacement that it has, which is taken from it little by little."""
+    there, start = clip.displacement, clip.poses[0, :2]
+    way = clip.poses[-1, :2] - start
+    poses = clip.poses.copy()
+    for k, share in enumerate(np.linspace(0.0, 1.0, clip.n_frames)):
+        turned = PlanarDisplacement(0.0, 0.0, -share * there.yaw)
+        moved = clip.poses[k].copy()
+        moved[:2] -= start + share * way
+        poses[k] = turned.moved(moved)
+        poses[k, :2] += start
+    poses[-1] = poses[0]
+    return Clip(poses, clip.fps, clip.name)
 
 
 def _same(clip: Clip) -> Clip:
@@ -216,8 +241,7 @@ def _smooth(x: float) -> float:
 
 def _with_way_back(clip: Clip, gap: float) -> Looped:
     """The clip and a smooth way from its last frame to its first one, velocities kept (a quintic in the tangent)."""
-    there = clip.displacement
-    first, last = there.moved(clip.poses[0]), clip.poses[-1]
+    first, last = clip.poses[0] if _stands(clip) else clip.displacement.moved(clip.poses[0]), clip.poses[-1]
     difference = pose_difference(last, first)
     largest = float(np.linalg.norm(difference[6:].reshape(-1, 3), axis=1).max())
     n = round((_BACK[0] + _BACK[1] * largest) * clip.fps)

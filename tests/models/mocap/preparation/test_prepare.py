@@ -4,7 +4,7 @@ import pytest
 from experiments.preparation.command import prepare_file, summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.clip import Clip, pose_difference
+from models.mocap.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.library import embedded, load
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import resampled, sole_points
@@ -34,6 +34,26 @@ def test_the_lap_of_a_walk_is_found_and_closed(walks):
 
 def test_a_closed_clip_is_left_as_it_is(walks):
     assert looped(walks[0]).clip is walks[0]
+
+
+def test_a_lap_on_a_foot_that_stands_ends_where_it_began():
+    """A cheer whose capture turns by 4° and goes 2 cm aside in a lap, away from the origin."""
+    cheer = resampled(embedded("cheer"), 120.0)
+    n = cheer.n_frames - 1
+    frames, share = np.arange(int(2.4 * n)), np.arange(int(2.4 * n)) / n
+    poses = np.array([PlanarDisplacement(3.0, -2.0, 0.0).moved(cheer.poses[k % n]) for k in frames])
+    drift = [PlanarDisplacement(0.02 * s, 0.0, np.deg2rad(4.0) * s) for s in share]
+    for k, there in enumerate(drift):
+        poses[k, :2] -= 3.0, -2.0
+        poses[k] = there.moved(poses[k])
+        poses[k, :2] += 3.0, -2.0
+    found = looped(Clip(poses, 120.0, "drifting"))
+    assert found.kind == "cycle"
+    np.testing.assert_allclose(found.clip.poses[-1], found.clip.poses[0], atol=1e-12)
+    feet = sole_points(found.clip.poses)[:, :, :2]
+    without = sole_points(cheer.poses)[:, :, :2]
+    assert np.ptp(feet, axis=0).max() < np.ptp(without, axis=0).max() + 2e-3
+    np.testing.assert_allclose(np.linalg.norm(found.clip.poses[:, 3:7], axis=1), 1.0, atol=1e-9)
 
 
 def test_what_does_not_repeat_rests_at_both_ends(walks):
