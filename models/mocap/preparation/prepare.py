@@ -11,7 +11,7 @@ from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.looping import Looped, looped
 from models.mocap.preparation.pace import Paced, paced
 from models.mocap.preparation.poses import resampled, smoothed
-from models.mocap.preparation.stances import stances
+from models.mocap.preparation.stances import rested, stances
 from models.mocap.retargeting.retarget import Hints, RetargetReport
 
 FPS = 120.0  # of prepared clips [1/s], CMU's: slower captures gain what the change adds
@@ -86,7 +86,8 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     timed = paced(resampled(captured, FPS))
     cycle = looped(resampled(timed.clip, FPS), loop, loaded.loops, mirror)
     smooth = smoothed(cycle.clip, _CORNER)
-    made = feasible(smooth, stances(cycle.clip, smooth), fps=FPS)
+    schedule = rested(stances(cycle.clip, smooth), cycle.clip)
+    made = feasible(smooth, schedule, fps=FPS)
     near = made.turned < _TURNED and made.moved < _MOVED and made.residual < _LACKS
     taken = made.clip if near else smooth
     clip = Clip(taken.poses, taken.fps, captured.name)

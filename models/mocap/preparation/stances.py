@@ -3,7 +3,8 @@ r"""Which parts of the soles stand when and where: the contact schedule of a cap
 Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Toes
 at rest stand with the heels. Where nothing stands but the centre of mass accelerates as if
 something did, captures slide or hover: the stance next to it lasts longer, on its toes after it and on what is lower
-before it; where there is none, the lowest part of the feet bears, and slides.
+before it; where there is none, the lowest part of the feet bears, and slides. What ends upright rests on both feet: on
+the toes of one, as captures are cut, nobody stays.
 """
 
 from typing import NamedTuple
@@ -33,6 +34,8 @@ _NEAR = 0.015  # over the lowest sphere [m]: they bear together
 _SMOOTHING = 0.02  # of the load [s]
 _SWING = 0.015  # least height of a swinging foot [m]: what tracks takes one below 8 mm for standing ...
 _RISE = 0.08  # ... reached so long before and after it stands [s]; captured feet swing at 2 to 5 cm
+_RESTS = 0.1  # at both ends of an open clip [s], in which both feet stand ...
+_UPRIGHT = 0.55  # ... where the root is higher than this [m]: who crawls or lies bears on something else
 _GRAVITY = 9.81
 
 
@@ -101,6 +104,38 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     return Stances(standing[here], pushing[here], places[here], sliding[here] & ~standing[here])
 
 
+def rested(schedule: Stances, clip: Clip) -> Stances:
+    """The contact schedule of an open clip whose ends are at rest on both feet, flat where they are.
+
+    Parameters
+    ----------
+    schedule : Stances
+        As `stances` tells it.
+    clip : Clip
+        Whose it is.
+    """
+    if clip.closes():
+        return schedule
+    standing, pushing, places, sliding = schedule
+    made = Stances(standing.copy(), pushing.copy(), places.copy(), sliding.copy())
+    points, turned = sole_points(clip.poses), global_rotations(clip.poses)
+    k = round(_RESTS * clip.fps)
+    for at, span in ((0, slice(0, k)), (-1, slice(clip.n_frames - k, clip.n_frames))):
+        if clip.poses[at, 2] < _UPRIGHT:
+            continue
+        for foot, side in enumerate(("left", "right")):
+            mine = slice(4 * foot, 4 * foot + 4)
+            if schedule.standing[at, mine].any():
+                place = schedule.places[at, mine]
+            else:
+                yaw = float(_heading(turned[at, BODIES.index(f"{side}_foot")]))
+                place = _lying(points[None, at, mine], soles()[mine], yaw, [0, 1, 2, 3])
+            made.places[span, mine] = place
+            made.standing[span, mine] = made.pushing[span, mine] = True
+            made.sliding[span, mine] = False
+    return made
+
+
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
     """Least heights of the parts of the feet that swing [m], rising from where they stand, shape (n, 8).
 
@@ -160,10 +195,7 @@ def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
 def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array) -> None:
     """Write one foot's places: one flat one for each stance."""
     heel, toe = parts.T
-    # Heading of the foot's own forward axis.
-    x = 1.0 - 2.0 * (turned[:, 2] ** 2 + turned[:, 3] ** 2)
-    y = 2.0 * (turned[:, 1] * turned[:, 2] + turned[:, 0] * turned[:, 3])
-    yaw = np.unwrap(np.arctan2(y, x))
+    yaw = np.unwrap(_heading(turned))
     for start, end in _runs(heel | toe):
         span = np.arange(start, end)
         flat = span[heel[span] & toe[span]]
@@ -173,10 +205,22 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
             frames, spheres = span[toe[span]], [2, 3]
         else:
             frames, spheres = span[heel[span]], [0, 1]
-        angle = float(np.median(yaw[frames]))
-        c, s = np.cos(angle), np.sin(angle)
-        lying = sole[:, :2] @ np.array([[c, s], [-s, c]])
-        places[start:end, :, :2] = lying + np.median(points[frames][:, spheres, :2] - lying[spheres], axis=(0, 1))
+        places[start:end] = _lying(points[frames], sole, float(np.median(yaw[frames])), spheres)
+
+
+def _heading(turned: Array) -> Array:
+    """Of a foot's own forward axis about the vertical [rad]."""
+    x = 1.0 - 2.0 * (turned[..., 2] ** 2 + turned[..., 3] ** 2)
+    y = 2.0 * (turned[..., 1] * turned[..., 2] + turned[..., 0] * turned[..., 3])
+    return np.arctan2(y, x)
+
+
+def _lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
+    """A sole flat on the floor, its spheres where they are in the median of frames, shape (4, 3)."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    level = sole[:, :2] @ np.array([[c, s], [-s, c]])
+    place = np.median(points[:, spheres, :2] - level[spheres], axis=(0, 1))
+    return np.column_stack((level + place, np.full(4, CONTACT_RADIUS)))
 
 
 def _load(poses: Array, fps: float) -> Array:

@@ -8,7 +8,8 @@ from models.mocap.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.library import embedded, load
 from models.mocap.preparation.looping import looped, mirrored
 from models.mocap.preparation.poses import resampled, sole_points
-from models.mocap.preparation.stances import stances
+from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation.stances import rested, stances
 from models.mocap.preparation.well_formed import outliers, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 
@@ -69,6 +70,25 @@ def test_what_ends_in_the_air_comes_down_to_rest():
     flying = np.flatnonzero(sole_points(jump.poses)[:, :, 2].min(axis=1) > CONTACT_RADIUS + 0.05)
     found = looped(Clip(jump.poses[: int(np.median(flying))], 120.0, "up"), "open")
     assert sole_points(found.clip.poses[[0, -1]])[:, :, 2].min(axis=1) == pytest.approx(CONTACT_RADIUS, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_an_upright_motion_that_ends_rests_on_both_feet(walks, tmp_path):
+    """A stride cut out of a walk, one foot in the air at both ends."""
+    walk = walks[0]
+    write_bvh(Clip(walk.poses[: walk.n_frames // 2], 120.0, "part"), tmp_path / "part.bvh")
+    made = prepared(tmp_path / "part.bvh", "open")
+    ends = sole_points(made.looped.clip.poses)[[0, -1], :, 2]
+    assert ends.reshape(2, 2, 4).min(axis=2).max(axis=1).min() > CONTACT_RADIUS + 0.03
+    assert made.near
+    np.testing.assert_allclose(sole_points(made.clip.poses)[[0, -1], :, 2], CONTACT_RADIUS, atol=5e-3)
+    assert made.feasible.residual < 0.05
+
+
+def test_who_lies_at_the_end_is_not_stood_on_his_feet():
+    dance = resampled(embedded("cheer"), 120.0)
+    low = Clip(dance.poses[:60] - np.eye(dance.poses.shape[1])[2] * 0.6, 120.0, "low")
+    np.testing.assert_array_equal(rested(stances(low, low), low).standing, stances(low, low).standing)
 
 
 def test_half_a_stride_goes_on_in_the_mirror(walks):
