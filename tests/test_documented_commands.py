@@ -31,6 +31,8 @@ NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [[
 SHOWN = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
 SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried (`row_spread`)
+CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # what a machine that pauses is told
+TRIES = 12  # of these: where a host takes processors away for milliseconds, devices rightly let go
 HOUR = 3600.0  # [s] that a command may take at most: user studies and tunings do on a busy machine
 
 
@@ -42,6 +44,15 @@ def lines(page: Path) -> list[str]:
         found = [line for block in blocks(page, "") for line in block.splitlines() if line.startswith("hvf ")]
     typed = dict.fromkeys(shlex.join(shlex.split(line, comments=True)) for line in found)
     return [line for line in typed if not any(words in line for words in ELSEWHERE)]
+
+
+def typed(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """A line, in a folder."""
+    return subprocess.run(
+        [sys.executable, "-m", "experiments.cli", *arguments],
+        cwd=folder, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
+        capture_output=True, text=True, timeout=HOUR, check=False,
+    )  # fmt: skip
 
 
 def test_every_row_of_the_readme_whose_figure_stands_says_its_residual() -> None:
@@ -60,11 +71,11 @@ def test_the_commands_of_a_page_do_what_it_says(page: Path, tmp_path: Path) -> N
     for line in EARLIER.get(name(page), []) + lines(page):
         arguments = shlex.split(line)[1:]
         shutil.rmtree(tmp_path / "runs" / "run", ignore_errors=True)  # the folder of a run that names none
-        done = subprocess.run(
-            [sys.executable, "-m", "experiments.cli", *arguments],
-            cwd=tmp_path, env={"MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT), **os.environ},
-            capture_output=True, text=True, timeout=HOUR, check=False,
-        )  # fmt: skip
+        done = typed(arguments, tmp_path)
+        for _ in range(TRIES - 1):
+            if not line.startswith(CLOCKED) or not any(words in done.stdout for words in PAUSED):
+                break
+            done = typed([*arguments, "--overwrite"], tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
         fell = " fell at " in done.stdout
         assert fell == any(line.startswith(words) for words in FALLS), f"{line}\n{done.stdout}"
