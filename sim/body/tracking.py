@@ -12,7 +12,7 @@ from numba import typeof, types
 from controllers.kernel_call import call_as_given, lend
 from controllers.state import Array
 from models.floor import add_floor
-from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
+from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, N_JOINTS, figure_model, figure_spec, standing_com
 from models.mocap.clip import Clip, pose_difference
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
@@ -274,7 +274,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
         without_ground_force=residual(~bears),
         grounded=float(np.mean(bears[stands])) if stands.any() else 1.0,
         slide=_slide(motion.contacts, touches),
-        saturation=float(motion.reports[up, REPORT_SATURATED].mean()) / 51.0 if up.any() else 0.0,
+        saturation=float(motion.reports[up, REPORT_SATURATED].mean()) / (3 * N_JOINTS) if up.any() else 0.0,
         warnings=motion.warnings,
     )
 
