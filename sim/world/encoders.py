@@ -4,6 +4,7 @@ The simulated device and a real one differ in where the angles come from and whe
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -55,11 +56,12 @@ def top_rates() -> Angles:
     the tip there (10 m/s and more) neither.
     """
     ranges = PREMIUM_1_5.limit
-    angles = np.stack(np.meshgrid(*(np.linspace(*ranges[i], 61) for i in (1, 2))), axis=-1).reshape(-1, 2)
-    least = np.min([np.diag(mass_matrix.py_func((0.0, *theta))) for theta in angles], axis=0)
+    of_arrays: Any = mass_matrix.py_func
+    inertia = of_arrays((0.0, *np.meshgrid(*(np.linspace(*ranges[i], 61) for i in (1, 2)))))
+    least = [np.min(inertia[i][i]) for i in range(3)]
     first, second, third = (
-        math.sqrt(2.0 * peak * (high - low) / inertia)
-        for peak, (low, high), inertia in zip(PEAK_TORQUE, ranges, least, strict=True)
+        math.sqrt(2.0 * peak * (high - low) / lightest)
+        for peak, (low, high), lightest in zip(PEAK_TORQUE, ranges, least, strict=True)
     )
     return first, second, third
 

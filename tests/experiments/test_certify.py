@@ -139,6 +139,7 @@ def test_what_is_no_certificate_is_refused(tmp_path, text):
             read_certificate(tmp_path / CERTIFICATE)
 
 
+@pytest.mark.slow
 def test_a_held_file_that_is_no_certificate_is_replaced(folder, tmp_path):
     (tmp_path / CERTIFICATE).write_text("not json")
     (tmp_path / PAGE).write_text("")

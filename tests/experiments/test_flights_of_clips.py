@@ -111,6 +111,7 @@ def test_a_refuted_flight_is_shown_false_by_a_body_that_falls():
     assert farthest > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pace", [0.75, 1.6])
 def test_a_jump_at_the_wrong_pace_is_repaired(pace):
     clip = embedded("jump")

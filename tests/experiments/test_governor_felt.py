@@ -54,6 +54,7 @@ def test_a_hand_that_slows_down_in_mid_flight_meets_a_force(bench):
     assert passage.along[slow].min() > 0.2
 
 
+@pytest.mark.slow
 def test_a_run_governs_its_field_by_its_own_animation():
     config = run_config(clips=("backflip",), governor=True, seconds=1.0)
     session = wire(config)

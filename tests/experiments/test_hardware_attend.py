@@ -75,6 +75,7 @@ def _interrupt(stand: Stand) -> None:
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_enter_arms_and_another_lets_go(keys) -> None:
     assert asked({3: lambda _: keys(b"\n")}) == [ARM, DISARM]
     assert asked({3: lambda _: keys(b"\n"), 6: lambda _: keys(b"\n")}) == [ARM, DISARM, DISARM]

@@ -1,5 +1,7 @@
 """Blends of the embedded clips: feet that stand do not slide nor sink, and the floor can give what they ask for."""
 
+from functools import cache
+
 import mujoco
 import numpy as np
 import pytest
@@ -20,23 +22,20 @@ TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides,
 CONFIG = run_config(seconds=1.0)
 FIGURE_CLIPS = Cylindrical().clips
 STANDING = ("walk", "cheer", "angry", "squat_dance")
-STEPPING = (
-    ("walk", "run"),
-    ("ginga", "walk"),
-    ("ginga", "cheer", "walk", "angry"),
-    ("ginga", "walk", "run", "spin"),
-)
+STEPPING = (("walk", "run"), ("ginga", "walk"))
+SLOWER = (("ginga", "cheer", "walk", "angry"), ("ginga", "walk", "run", "spin"))
 ROWS = 160
 MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
 MANY = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
 
 
-@pytest.fixture(scope="module")
-def maps():
-    return {
-        clips: wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
-        for clips in (FIGURE_CLIPS, STANDING, *STEPPING)
-    }
+@cache
+def map_of(clips):
+    return wire(run_config(clips=clips, seconds=1.0), load_clips(clips)[0]).haptic_map
+
+
+def slower(values):
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 def laps(h_map, r, z, rows=ROWS, count=1.0):
@@ -76,15 +75,17 @@ def slide(places):
     return worst
 
 
-@pytest.mark.parametrize("clips", [FIGURE_CLIPS, STANDING, *STEPPING])
-def test_feet_of_in_betweens_do_not_slide_nor_sink(maps, clips):
+@pytest.mark.parametrize("clips", [FIGURE_CLIPS, STANDING, *STEPPING, *slower(SLOWER)])
+def test_feet_of_in_betweens_do_not_slide_nor_sink(clips):
     for r, z in MANY:
-        places = soles(laps(maps[clips], r, z, count=1.5))
+        places = soles(laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.03, (r, z)
         assert places[..., 2].min() > -0.007, (r, z)
 
 
-@pytest.mark.parametrize("clips", [("walk", "angry", "cheer"), ("ginga", "angry", "walk"), ("run", "walk", "cheer")])
+@pytest.mark.parametrize(
+    "clips", [("walk", "angry", "cheer"), *slower([("ginga", "angry", "walk"), ("run", "walk", "cheer")])]
+)
 def test_feet_of_a_composite_are_the_lower_clip_s_and_do_not_slide(clips):
     h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
     places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
@@ -115,10 +116,10 @@ def test_feet_of_clips_with_flights_do_not_slide_between_nodes_nor_beside_a_clip
 
 # The walk's legs carry the arms of the other three: at its own pace their mean would lack up to 0.14, 0.04 on average.
 @pytest.mark.parametrize(("clips", "most", "usual"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
-def test_the_floor_gives_in_betweens_what_they_ask_for(maps, clips, most, usual):
+def test_the_floor_gives_in_betweens_what_they_ask_for(clips, most, usual):
     floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
     for r, z in MIXTURES:
-        poses = laps(maps[clips], r, z, count=1.0 + 4 / ROWS)
+        poses = laps(map_of(clips), r, z, count=1.0 + 4 / ROWS)
         change = pose_difference(poses[:-1], poses[1:]) / step
         v, a, q = (change[1:] + change[:-1]) / 2, np.diff(change, axis=0) / step, poses[1:-1]
         demand = floor.demand(q, v, a)

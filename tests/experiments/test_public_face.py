@@ -81,6 +81,7 @@ def test_a_run_that_is_too_short_is_refused_before_anything_is_made() -> None:
         simulation(hvf.Follow(CURVE, k_r=300, b_d=8)).run(0.001)
 
 
+@pytest.mark.slow
 def test_a_certificate_is_of_the_very_field() -> None:
     alone = hvf.certify(simulation(hvf.Follow(CURVE, k_r=300, b_d=8)))
     both = hvf.certify(simulation((hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)))

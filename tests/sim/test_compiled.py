@@ -24,6 +24,7 @@ def test_the_hash_stays_the_same_while_the_sources_do(sources: Path) -> None:
     assert compiled.source_hash() == compiled.source_hash()
 
 
+@pytest.mark.slow
 def test_a_change_in_any_source_is_another_hash(sources: Path) -> None:
     """Every file that holds a kernel, and every other file beside it, is part of the key."""
     seen = {compiled.source_hash()}

@@ -86,6 +86,7 @@ print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values())
 """
 
 
+@pytest.mark.slow
 def test_the_next_process_finds_a_unit_compiled_also_that_of_another_copy_of_these_sources(tmp_path):
     here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
     for package in ("models", "controllers", "sim"):

@@ -112,6 +112,7 @@ def _held_in_flight(clip_seconds: float) -> np.ndarray:
     return shown
 
 
+@pytest.mark.slow
 def test_a_jump_that_is_held_comes_down_and_without_it_hovers() -> None:
     shown, hovering = _held_in_flight(LAP), _held_in_flight(0.0)
     assert _lowest(hovering)[-1] > 0.2

@@ -56,6 +56,7 @@ def test_an_axis_is_the_sampled_mass_on_its_spring(z):
     np.testing.assert_allclose(found, np.vstack([after, filtered]), rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_form_decreases_between_the_corners_where_its_cells_say_so():
     cell = Cell(np.array([0.15, 2.0, 0.0, 0.99]), np.array([0.3, 4.0, 100.0, 1.0]), 0.15, 0.03)
     form = find_form(AXIS, cell, Limits(5.5, 0.01, 0.5, (0.15, 0.1)), 6.0)
@@ -156,6 +157,7 @@ def test_the_demos_river_in_a_firm_hand_has_a_region(lap):
     assert good.figures["remainder_rate"] < good.figures["rate"]
 
 
+@pytest.mark.slow
 def test_what_is_too_much_to_be_certain_is_told_with_the_hand_it_is_of():
     bare = region(RIVER, NO_HANDS, 8.5, STABLE)
     assert bare.verdict == "unknown"

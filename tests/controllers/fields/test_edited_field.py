@@ -27,6 +27,7 @@ def _pushed(rng, peak):
     return path, push
 
 
+@pytest.mark.slow
 def test_integrating_v_plus_u_gives_the_performed_curve_for_twenty_random_pushes():
     rng = np.random.default_rng(0)
     for _ in range(20):

@@ -94,7 +94,7 @@ def write_run(folder: Path, told: Told) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("kind", ["physical", "kinematic", "none"])
+@pytest.mark.parametrize("kind", [pytest.param("physical", marks=pytest.mark.slow), "kinematic", "none"])
 def test_every_kind_of_run_gives_a_film_that_plays(kind: str, tmp_path: Path, backend: str) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     run, target = write_run(tmp_path / "run", Told(kind)), tmp_path / "film.mp4"
@@ -155,6 +155,7 @@ def test_a_ghost_is_seen_when_there_is_to_be_one_and_a_force_when_there_is_one(t
     )  # green
 
 
+@pytest.mark.slow
 def test_a_run_that_was_cut_short_says_so_and_shows_the_edited_animation(
     tmp_path: Path, backend: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

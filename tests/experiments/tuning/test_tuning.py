@@ -71,6 +71,7 @@ def test_a_search_that_is_stopped_goes_on_as_it_would_have(tmp_path: Path, sampl
     assert searched(tuning(), tmp_path / "stopped", sampler) == whole
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("certificates")
 def test_objectives_of_several_tasks_are_each_of_the_trials_that_have_them(tmp_path: Path) -> None:
     trade = {"objectives": ["tracking_error", "expressiveness"], "run": {"figure": "kinematic"}, "candidates": 1}
@@ -185,6 +186,7 @@ def test_leading_is_certified_elsewhere_and_unknown_here() -> None:
     assert kept_stability(run_config(mode="lead")).verdict == "unknown"
 
 
+@pytest.mark.slow
 def test_a_verdict_that_is_kept_is_the_one_that_was_found_and_follows_the_gain() -> None:
     soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
     assert (soft.verdict, stiff.verdict) == ("certified", "refuted")

@@ -119,6 +119,7 @@ def test_torques_agree_with_mujocos_contact_jacobian(figure):
         np.testing.assert_allclose(at_com[:3], wanted[:3], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_gauss_newton_gradient_agrees_with_differences():
     motion = Motion(gait.task(gait.WALK))
     motion.solve(6)
