@@ -20,6 +20,7 @@ from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import GatedServo
+from sim.world.encoders import SILENT_PERIODS
 from sim.world.linkage import Linkage
 from sim.world.world import World
 
@@ -33,8 +34,8 @@ def served(config: RunConfig) -> RunConfig:
     return replace(config, figure=replace(config.figure, kind="none"), clock=clock)
 
 
-def session_of(config: RunConfig, ready: Ready = lambda units: None) -> Session:
-    """A run of a field on a device behind two arrays, wired up.
+def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: float = SILENT_PERIODS) -> Session:
+    """A run of a field on a device behind two arrays, which may be silent for so many periods, wired up.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def session_of(config: RunConfig, ready: Ready = lambda units: None) -> Session:
     """
 
     def device(world: World) -> DeviceState:
-        return exchange(world, config.device.cutoff)
+        return exchange(world, config.device.cutoff, silent=silent)
 
     return wire(config, ready=ready, device=device)
 
@@ -73,6 +74,8 @@ class MakeServo:
         Of an emulated device, instead.
     calibrated : bool
         Whether that one knows its zero.
+    silent : float
+        Periods without a new reading that are a fault.
     """
 
     config: RunConfig
@@ -82,6 +85,7 @@ class MakeServo:
     calibration: Calibration | None = None
     packets: socket.socket | None = None
     calibrated: bool = True
+    silent: float = SILENT_PERIODS
 
     def __call__(self) -> GatedServo:
         """Make it.
@@ -91,7 +95,7 @@ class MakeServo:
         SimError
             If there is no such device, or it may not be armed.
         """
-        session = session_of(self.config)
+        session = session_of(self.config, silent=self.silent)
         driver = self._driver()
         try:
             check_device(driver.identity, self.calibration)

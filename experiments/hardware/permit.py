@@ -75,7 +75,10 @@ def check_limits(options: RunHardware) -> None:
     SimError
         With the option, and how far it goes.
     """
-    for name, most, unit in (("force", 8.5, "N, the Premium's peak"), ("speed", 2.0, "m/s"), ("small", 2.0, "N")):
+    for name, most, unit in (
+        ("force", 8.5, "N, the Premium's peak"), ("speed", 2.0, "m/s"), ("small", 2.0, "N"),
+        ("silence", 5.0, "periods"),
+    ):  # fmt: skip
         value = getattr(options, name)
         if value > most:
             raise SimError(

@@ -75,7 +75,12 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     _begin_folder(config, content, options)
     job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
-        served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content)
+        served(config),
+        options.name,
+        _gate(config, options),
+        linkage_from(content).offset,
+        calibration_from(content),
+        silent=options.silence,
     )
     with contextlib.ExitStack() as stack:
         if options.name == EMULATED:

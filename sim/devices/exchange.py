@@ -14,7 +14,7 @@ from numba import njit
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
 from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
 from sim.errors import SimError
-from sim.world.encoders import MEMORY_SIZE, motor_torques, plausibility, take_reading
+from sim.world.encoders import MEMORY_SIZE, SILENT_PERIODS, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
 from sim.world.plant import Plant, step
 from sim.world.shown_phantom import ShownPhantom, show_angles, shown_phantom
@@ -63,7 +63,13 @@ class Exchange(NamedTuple):
         return 3
 
 
-def exchange(world: World, cutoff: float, reading: Array | None = None, command: Array | None = None) -> Exchange:
+def exchange(
+    world: World,
+    cutoff: float,
+    reading: Array | None = None,
+    command: Array | None = None,
+    silent: float = SILENT_PERIODS,
+) -> Exchange:
     """A device behind two arrays, which begins with no force and ramps it in.
 
     Parameters
@@ -74,6 +80,8 @@ def exchange(world: World, cutoff: float, reading: Array | None = None, command:
         Corner frequency of the velocity filter [Hz].
     reading, command : Array, optional
         Memory to share, such as a view of a mapped file; by default new arrays.
+    silent : float
+        Periods without a reading or a command after which the device lets go.
 
     Raises
     ------
@@ -86,7 +94,7 @@ def exchange(world: World, cutoff: float, reading: Array | None = None, command:
         if array.shape != (size,) or array.dtype != np.float64 or not array.flags.c_contiguous:
             raise SimError(f"the {name} is {array.dtype} of shape {array.shape}; expected ({size},) of float64")
     period = world.config.servo_period
-    limits, hand = plausibility(period), np.zeros(HAND_SIZE)
+    limits, hand = plausibility(period, silent), np.zeros(HAND_SIZE)
     hand[HAND_QUATERNION] = 1.0
     return Exchange(
         reading, command, velocity_smoothing(cutoff, period), limits.silence, np.zeros(MEMORY_SIZE), np.zeros(3),

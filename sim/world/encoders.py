@@ -69,9 +69,9 @@ def top_rates() -> Angles:
 TOP_RATES = top_rates()
 
 
-def plausibility(period: float) -> Plausibility:
-    """What a Phantom's readings may be at a servo period [s]."""
-    return Plausibility(period, TOP_RATES, ENCODER_STEP, SILENT_PERIODS * period)
+def plausibility(period: float, silent: float = SILENT_PERIODS) -> Plausibility:
+    """What a Phantom's readings may be at a servo period [s], silent for so many of them."""
+    return Plausibility(period, TOP_RATES, ENCODER_STEP, silent * period)
 
 
 @njit

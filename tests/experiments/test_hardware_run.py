@@ -68,7 +68,9 @@ def test_a_device_with_motors_needs_a_certificate(tmp_path: Path, capsys, monkey
     assert "expected --certificate" in said
 
 
-@pytest.mark.parametrize("limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--ramp", "0.01")])
+@pytest.mark.parametrize(
+    "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
+)
 def test_limits_that_are_none_to_a_hand_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
     said = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
     assert limit[0] in said

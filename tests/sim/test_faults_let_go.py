@@ -43,11 +43,16 @@ ACTS = 0.02  # [N] more than this is a force that is there
 class Line:
     """A servo, the device behind two arrays, and the driver, tick by tick, with what it commanded."""
 
-    def __init__(self, arm: Arm | None = None, damping: float = 4.0, tank: EnergyTank | None = None):
-        self.device = exchange(device_world(), CUTOFF)
+    def __init__(
+        self,
+        arm: Arm | None = None,
+        damping: float = 4.0,
+        tank: EnergyTank | None = None,
+        silent: float = SILENT_PERIODS,
+    ):
         self.world = device_world()
         self.program = follow_program(damping=damping)
-        self.device = exchange(self.world, CUTOFF)
+        self.device = exchange(self.world, CUTOFF, silent=silent)
         self.servo = bare_servo(self.world, self.device, self.program, tank=tank)
         self.driver = Driver(self.device, arm)
         self.tick = 0
@@ -150,9 +155,10 @@ def test_an_encoder_that_jumps_is_an_impossible_rate(joint: int, jump: float) ->
     assert_comes_back(line)
 
 
-def test_readings_that_stop_are_stale_by_their_number() -> None:
+@pytest.mark.parametrize("silent", [SILENT_PERIODS, 40])
+def test_readings_that_stop_are_stale_by_their_number(silent: int) -> None:
     """The hand lets go before it is pushed anywhere: the driver's motors are off a silence later."""
-    line = Line()
+    line = Line(silent=silent)
     line.run(300)
     last = line.device.reading.copy()
 
@@ -160,11 +166,12 @@ def test_readings_that_stop_are_stale_by_their_number() -> None:
         line.device.reading[:] = last
 
     line.run(3000, spoil)
-    assert_let_go(line, 300 + SILENT_PERIODS + 1)
+    assert_let_go(line, 300 + silent + 1)
+    assert line.fault[300 + silent - 2] == 0.0
     found = latched(line.device.faults)
     assert found is not None
     assert found.fault is Fault.READING_STALE
-    assert not np.any(line.applied[300 + SILENT_PERIODS + 1 :])
+    assert not np.any(line.applied[300 + silent + 1 :])
 
 
 def frozen(line: Line, ticks: int) -> np.ndarray:
