@@ -20,7 +20,7 @@ EARLIER = {  # what a page takes for granted: another page's result
     "docs/how-to/blender.md": ["hvf run --seconds 1 --out runs/demo"],
     "docs/how-to/certify.md": ["hvf run --seconds 1 --out runs/demo", "hvf lift walk run --out runs/map.npz"],
 }
-ELSEWHERE = ["--cluster tcp://head", "hvf live "]  # needs other machines; serves until it is stopped (tests/live)
+ELSEWHERE = ["--cluster tcp://head", "--device NAME", "hvf live "]  # other machines and devices; serves until stopped (tests/live)
 GIVEN = {
     "mine.bvh": "models/mocap/clips/walk.bvh",
     "back.bvh": "models/mocap/clips/walk.bvh",

@@ -45,7 +45,7 @@ class RunHardware:
     late: Annotated[float, above(0.0, unit="s")] = 0.04
     """Lateness of the servo that is a fault [s]."""
     silence: Annotated[float, at_least(2.0, unit="periods")] = 5.0
-    """Without a new reading that is a fault, in periods of the servo; the emulated device may have more than five."""
+    """Without a new reading that is a fault; the emulated device may have more than five [periods of the servo]."""
     realtime: bool = True
     """Ask the system to run the servo before everything else."""
     view: bool = False
