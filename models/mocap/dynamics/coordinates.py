@@ -6,11 +6,11 @@ the singularity at a full turn; the root may (a backflip), if it turns about one
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
+from models.mocap import quaternions
 
 _DELTA = 1e-3  # [s] of the difference quotients that turn rotation vectors into angular velocity
 
@@ -55,15 +55,15 @@ def poses(coordinates: Array) -> Array:
     half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
     pose = np.empty((*shape, N_POSE))
     pose[..., :3] = coordinates[..., :3]
-    quaternions = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
-    pose[..., 3:] = quaternions.reshape(*shape, 72)
+    turns = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
+    pose[..., 3:] = turns.reshape(*shape, 72)
     return pose
 
 
 def _turns(a: Array, b: Array) -> Array:
     """log(a⁻¹ b) of the rotations in two arrays of poses, shape (m, 54)."""
-    first, second = (Rotation.from_quat(p[:, 3:].reshape(-1, 4), scalar_first=True) for p in (a, b))
-    return (first.inv() * second).as_rotvec().reshape(len(a), 54)
+    first, second = (p[:, 3:].reshape(-1, 4) for p in (a, b))
+    return quaternions.logarithm(quaternions.product(quaternions.conjugate(first), second)).reshape(len(a), 54)
 
 
 def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:

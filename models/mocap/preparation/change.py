@@ -183,8 +183,8 @@ class Normal:
         if not change.closed:
             interval, shares = change.free(interval)
             if not np.array_equal(shares, np.eye(DEGREE + 1)):
-                fold = np.kron(shares, np.eye(n))
-                block = fold.T @ block @ fold
+                parts = block.reshape(DEGREE + 1, n, DEGREE + 1, n)
+                block = np.einsum("ia,imjn,jb->ambn", shares, parts, shares, optimize=True).reshape(block.shape)
         if not change.closed or interval + DEGREE < change.n_points - DEGREE:
             for column in range(self._width):
                 self.band[: self._width - column, interval * n + column] += block[column, column:]
