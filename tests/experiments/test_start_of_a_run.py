@@ -1,7 +1,5 @@
 """A run begins soon: it imports nothing that it does not need, and compiles nothing in its own process."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ from experiments.files.map_files import save_map
 from experiments.setups.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
+from tests.experiments.own_process import RUNS, TELLS, compiled, process
 
 HEAVY = ("matplotlib", "casadi", "viser", "trimesh", "scipy.stats", "scipy.signal", "scipy.integrate")
 
@@ -21,43 +20,21 @@ import experiments.cli, experiments.run
 print(*(name for name in {HEAVY} if name in sys.modules))
 """
 
-_TELLS = """
-import sys
-from numba.core import event
-
-class Compilations(event.Listener):
-    def on_start(self, compilation):
-        print("compiles", compilation.data["dispatcher"].py_func.__qualname__, file=sys.stderr)
-
-    def on_end(self, compilation):
-        pass
-
-event.register("numba:compile", Compilations())
-"""
-_RUNS = "from experiments.cli import main; sys.exit(main(sys.argv[1:]))"
 _COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
 
 
-def _process(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
-
-
-def _compiled(process: subprocess.CompletedProcess[str]) -> list[str]:
-    return [line for line in process.stderr.splitlines() if line.startswith("compiles")]
-
-
 def test_what_a_run_does_not_need_is_not_imported_before_it() -> None:
-    assert not _process(_IMPORTS).stdout.split()
+    assert not process(_IMPORTS).stdout.split()
 
 
 def test_a_command_that_is_named_is_the_only_one_imported() -> None:
     code = "import sys; from experiments.cli import parsed; parsed(['track', 'walk']); print(*sys.modules)"
-    found = {name for name in _process(code).stdout.split() if name.startswith("experiments.commands.")}
+    found = {name for name in process(code).stdout.split() if name.startswith("experiments.commands.")}
     assert found == {"experiments.commands.track"}
 
 
 def test_what_a_process_compiles_is_told() -> None:
-    assert "compiles smooth_step" in _compiled(_process(_TELLS + _COMPILES))
+    assert "compiles smooth_step" in compiled(process(TELLS + _COMPILES))
 
 
 @pytest.fixture(scope="module")
@@ -73,21 +50,21 @@ def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_robot_arm_compiles_nothing_in_the_process_of_its_run(tmp_path: Path) -> None:
-    process = _process(_TELLS + _RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
-    assert "The stylus ran" in process.stdout
-    assert _compiled(process) == []
+    ran = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    assert "The stylus ran" in ran.stdout
+    assert compiled(ran) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
-    [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls"), ("--mode", "rivers", "--map", "rivers")],
-    ids=["cylinder", "lifted", "expressive", "rivers"],
+    [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls")],
+    ids=["cylinder", "lifted", "expressive"],
 )
 def test_a_run_compiles_nothing_in_its_own_process(
     arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path
 ) -> None:
     given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
-    process = _process(_TELLS + _RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
-    assert "The stylus ran" in process.stdout
-    assert _compiled(process) == []
+    ran = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
+    assert "The stylus ran" in ran.stdout
+    assert compiled(ran) == []

@@ -1,6 +1,7 @@
 """Changes that are known before a run: they begin at a gate, end in the other clip, and nothing jumps meanwhile."""
 
 from pathlib import Path
+from subprocess import CompletedProcess
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,22 +10,26 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import CHANGE, COURSE, RIVER, RiverClips
+from experiments.config.words import run_config
 from experiments.setups import river_changes, river_tour
 from experiments.setups.clips import load_clips
 from experiments.setups.figure_legs import figure_legs, packed_legs
 from experiments.setups.rests import with_rests
 from experiments.setups.rivers import river_bundle
+from experiments.setups.setups import map_parts
 from experiments.setups.stylus import stylus_path
 from experiments.setups.verdict import Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.clip import Clip, pose_difference
 from sim.reference.reference import make_reference, poses_along, reference_along
+from tests.experiments.own_process import RUNS, TELLS, compiled, process
 from tests.sim.gliding_hand import gliding_hand
 
 LAP, PERIOD = 3.4, 2e-3
 FIGURE = figure_model()
 CURVES = [river.curve for river in river_bundle(Trajectory.circle(0.0477, LAP), 0.025, 0.02, 4.0, 0.015).rivers]
 NAMES = ("squat_dance", "walk", "angry")
+APART = ("walk", "squat_dance", "angry")
 
 
 @pytest.fixture(scope="module")
@@ -139,14 +144,28 @@ def test_what_is_not_followed_is_said_with_the_change_before(
     assert river_tour.not_followed(plain, NAMES, Figure(), FIGURE) == said
 
 
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> CompletedProcess[str]:
+    """A run of three clips in a process of its own, which finds the changes and keeps them."""
+    words = ("run", "--mode", "rivers", "--map", "rivers", "--clips", *APART, "--lap", f"{LAP}", "--seconds", "0.1")
+    return process(TELLS + RUNS, *words, "--out", str(tmp_path_factory.mktemp("rivers") / "run"))
+
+
 @pytest.mark.slow
+def test_a_run_over_changes_compiles_nothing_in_its_own_process(ran: CompletedProcess[str]) -> None:
+    assert "The stylus ran" in ran.stdout
+    assert compiled(ran) == []
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("ran")
 def test_the_figure_follows_over_all_changes_of_three_clips_that_it_loses_by_offsets() -> None:
     from experiments.config.run_config import Figure
     from experiments.preparation.followed import followed
 
-    clips = [(clip.poses, clip.fps) for clip in load_clips(("walk", "squat_dance", "angry"))[0]]
-    plain = with_rests(RiverClips(CURVES, clips, 0.015, figure_legs(FIGURE), LAP), FIGURE)
-    found = river_changes.with_changes(plain, 0.4, FIGURE)
+    made = map_parts(run_config("rivers", "rivers", clips=APART, lap=LAP), FIGURE).haptic_map
+    plain = with_rests(made, FIGURE)
+    found = river_changes.with_changes(plain, Figure().blend, FIGURE)
     assert {(change.first, change.second) for change in found.changes} == {
         (a, b) for a in range(3) for b in range(3) if a != b
     }
