@@ -21,6 +21,7 @@ from models.mocap.preparation.poses import inverse, plus, sole_points
 from models.mocap.preparation.stances import stances
 
 _GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]; walkers have 0.1 to 0.3
+_DIGITS = 1e-3  # by which the ends of a lap that was written with few digits differ [rad], [m]
 _WRAPS = 0.45  # d that is still closed where the file says that it wraps
 _COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
 _LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it
@@ -93,8 +94,10 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
     if wish != "auto":
         start, end = _wished(clip, wish)
         return _closed(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
-    if clip.closes(1e-3):
+    if clip.closes():
         return Looped(clip, "cycle", 0.0, clip.duration, 0.0)
+    if clip.closes(_DIGITS):
+        return _closed(clip, *whole, 0.0)
     gap = float(_distances(clip, np.array(whole))[0, 1])
     if wraps and gap < _WRAPS:
         return _closed(clip, *whole, gap)
