@@ -38,23 +38,37 @@ def kept_array(
     find : callable
         What makes it.
     """
-    path = folder / f"{name}-{_digest(made_of).hex()}.kept"
-    try:
-        content = path.read_bytes()
-    except OSError:
-        content = b""
-    rows, rest = divmod(len(content) - _SIZE, 8 * int(np.prod(shape[1:])))
-    if rest == 0 and rows >= 0 and shape[0] in (-1, rows):
-        kept = np.frombuffer(content[_SIZE:])
-        if _digest([kept]) == content[:_SIZE]:
-            return kept.reshape(shape).copy()
+    path = _path(folder, name, made_of)
+    if (kept := _read(path, shape)) is not None:
+        return kept
     found = np.ascontiguousarray(find(), dtype=np.float64)
     with suppress(OSError):
         _write(path, _digest([found.ravel()]) + found.tobytes())
     return found
 
 
+def is_kept(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
+    """Whether `kept_array` would find nothing anew."""
+    return _read(_path(folder, name, made_of), shape) is not None
+
+
 _SIZE = hashlib.sha256().digest_size
+
+
+def _path(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
+    return folder / f"{name}-{_digest(made_of).hex()}.kept"
+
+
+def _read(path: Path, shape: tuple[int, ...]) -> Array | None:
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    rows, rest = divmod(len(content) - _SIZE, 8 * int(np.prod(shape[1:])))
+    if rest or rows < 0 or shape[0] not in (-1, rows):
+        return None
+    kept = np.frombuffer(content[_SIZE:])
+    return kept.reshape(shape).copy() if _digest([kept]) == content[:_SIZE] else None
 
 
 def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:

@@ -1,16 +1,20 @@
-"""The door for runs: a foreign motion file as a well-formed clip, prepared once and kept."""
+"""The door for runs: foreign motion files as well-formed clips, prepared once and kept."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from experiments.files.kept import kept_array
+from controllers.state import Array
+from experiments.files.kept import is_kept, kept_array
 from experiments.working import working
 from models.mocap.clip import Clip
-from models.mocap.library import load
+from models.mocap.library import Loaded, load
+from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
+
+_CODE = "models.mocap.preparation.prepare"  # what prepares: by it, and all that it reaches, clips are kept
 
 
 class PreparedClip(NamedTuple):
@@ -28,32 +32,65 @@ class PreparedClip(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def prepared_clip(path: Path, raw: bool = False) -> PreparedClip:
-    """The motion in a file, prepared; what `write_bvh` wrote is taken as it is, and so is everything if `raw`.
+def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedClip]:
+    """The motions in files, prepared side by side; what `write_bvh` wrote is taken as it is, and so is all if `raw`.
 
     Prepared clips are kept under a hash of the captured poses and of the code that prepares them.
 
     Raises
     ------
     ModelError
-        If the file cannot be read, or contradicts itself.
+        If a file cannot be read, or contradicts itself.
     """
-    loaded = load(path)
-    if raw or loaded.report is None:
-        return PreparedClip(loaded.clip, () if loaded.report is None else loaded.report.lines())
-    from models.mocap.preparation.prepare import prepared  # brings signal processing with it
+    captures = [_Capture(path, load(path)) for path in paths]
+    missing = {} if raw else {capture.path: capture for capture in captures if capture.foreign and not capture.is_kept}
+    if len(missing) > 1:
+        with working(f"preparing {len(missing)} captures", sum(one.loaded.clip.duration for one in missing.values())):
+            side_by_side([(prepared_clips, ([path],)) for path in missing])
+    return [capture.prepared(raw) for capture in captures]
 
-    def find() -> npt.NDArray[np.float64]:
-        with working(f"preparing {path.name}"):
-            made = prepared(path)
+
+class _Capture(NamedTuple):
+    """A motion file as it was read."""
+
+    path: Path
+    loaded: Loaded
+
+    @property
+    def foreign(self) -> bool:
+        return self.loaded.report is not None
+
+    @property
+    def is_kept(self) -> bool:
+        return is_kept(kept_folder(_CODE), "prepared", self._made_of, self._shape)
+
+    @property
+    def _made_of(self) -> tuple[Array, Array]:
+        clip, loops = self.loaded.clip, self.loaded.loops
+        return clip.poses, np.array([clip.fps, -1.0 if loops is None else float(loops)])
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return -1, self.loaded.clip.poses.shape[1]
+
+    def prepared(self, raw: bool) -> PreparedClip:
+        clip, report = self.loaded.clip, self.loaded.report
+        if raw or report is None:
+            return PreparedClip(clip, () if report is None else report.lines())
+        rows = kept_array(kept_folder(_CODE), "prepared", self._made_of, self._shape, self._found)
+        done = (
+            "prepared"
+            if rows[0, 1]
+            else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
+        )
+        remarks = (*report.lines(), f"{self.path.name}: {done}; --raw takes the capture as it is")
+        return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks)
+
+    def _found(self) -> Array:
+        from models.mocap.preparation.prepare import prepared  # brings signal processing with it
+
+        with working(f"preparing {self.path.name}"):
+            made = prepared(self.path)
         told = np.zeros((1, made.clip.poses.shape[1]))
         told[0, :2] = made.clip.fps, made.near
         return np.vstack((told, made.clip.poses))
-
-    made_of = (loaded.clip.poses, np.array([loaded.clip.fps, -1.0 if loaded.loops is None else float(loaded.loops)]))
-    rows = kept_array(kept_folder(prepared.__module__), "prepared", made_of, (-1, loaded.clip.poses.shape[1]), find)
-    clip = Clip(rows[1:], float(rows[0, 0]), loaded.clip.name)
-    done = (
-        "prepared" if rows[0, 1] else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
-    )
-    return PreparedClip(clip, (*loaded.report.lines(), f"{path.name}: {done}; --raw takes the capture as it is"))

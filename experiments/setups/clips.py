@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from controllers.errors import ParameterError
-from experiments.preparation.prepared_clip import prepared_clip
+from experiments.preparation.prepared_clip import PreparedClip, prepared_clips
 from models.errors import ModelError
 from models.mocap.clip import Clip
 from models.mocap.library import embedded, embedded_names
@@ -25,18 +25,12 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
     ModelError
         If there is no such clip, or a file cannot be read.
     """
-    clips: list[Clip] = []
-    remarks: list[str] = []
     for name in names:
-        if name in embedded_names():
-            clips.append(embedded(name))
-        elif not Path(name).suffix:
+        if name not in embedded_names() and not Path(name).suffix:
             raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}, or give a file")
-        else:
-            prepared = prepared_clip(Path(name), raw)
-            clips.append(prepared.clip)
-            remarks += prepared.remarks
-    return tuple(clips), tuple(remarks)
+    files = iter(prepared_clips([Path(name) for name in names if name not in embedded_names()], raw))
+    clips = [PreparedClip(embedded(name), ()) if name in embedded_names() else next(files) for name in names]
+    return tuple(each.clip for each in clips), tuple(remark for each in clips for remark in each.remarks)
 
 
 def only(clips: tuple[Clip, ...]) -> Clip:

@@ -16,7 +16,7 @@ from controllers.fields.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, MARGIN, ClipChange
 from controllers.haptic_map.river_clips import LONGEST, RIVER, RiverClips
 from controllers.state import Array
-from experiments.files.kept import kept_array
+from experiments.files.kept import is_kept, kept_array
 from experiments.setups.figure_legs import packed_legs
 from experiments.setups.stylus import stylus_path
 from experiments.working import working
@@ -24,6 +24,7 @@ from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.preparation.feasible import Feasible, contact_residual, feasible
 from models.mocap.preparation.stances import Stances, stances
+from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import make_reference, poses_along, reference_along
 
@@ -75,6 +76,20 @@ class _Passage(NamedTuple):
         return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own])
 
 
+class _Gate(NamedTuple):
+    """Where a change is sought: from river to river, in a part of one of a lap's strides, at moments of it [s]."""
+
+    first: int
+    second: int
+    part: int
+    strides: int
+    moments: Array
+
+    @property
+    def name(self) -> str:
+        return f"change-{self.first}-{self.second}-{self.part}"
+
+
 def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> RiverClips:
     """The same map, whose clips go over into each other by feasible changes; needs compiled code, and they are kept.
 
@@ -88,27 +103,33 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
         The figure alone.
     """
     rivers, alike = range(len(made.curves)), made.on_one_river()
-    pairs = [(first, second) for first in rivers for second in rivers if first != second]
     made_of = (made.compiled().params, np.array([blend]))
-    changes: list[ClipChange] = []
-    for first, second in pairs:
+    gates: list[_Gate] = []
+    for first, second in ((a, b) for a in rivers for b in rivers if a != b):
         lap, strides = made.curves[first].duration, _strides(alike, first, second)
         parts = min(int(np.ceil(lap / strides / _WAITS)), _GATES)
-        for k in range(parts):
-
-            def find(
-                first: int = first, second: int = second, span: float = lap / strides / parts, k: int = k
-            ) -> Array:
-                moments = span * (k + np.arange(_MOMENTS) / _MOMENTS)
-                with working("making rivers' changes feasible"):
-                    return _found(alike, blend, figure, first, second, moments)
-
-            name = f"change-{first}-{second}-{k}"
-            rows = kept_array(kept_folder(__name__), name, made_of, (-1, 57), find)
-            if len(rows):
-                gates = (rows[0, 0] + lap / strides * np.arange(strides)) % lap
-                changes.append(ClipChange(first, second, gates, rows[1:]))
+        span = lap / strides / parts
+        gates += [_Gate(first, second, k, strides, span * (k + np.arange(_MOMENTS) / _MOMENTS)) for k in range(parts)]
+    missing = [gate for gate in gates if not is_kept(kept_folder(__name__), gate.name, made_of, (-1, 57))]
+    if missing:
+        with working("making rivers' changes feasible", len(missing)):
+            side_by_side([(_kept, (alike, made_of, blend, figure, gate)) for gate in missing])
+    changes: list[ClipChange] = []
+    for gate in gates:
+        rows, lap = _kept(alike, made_of, blend, figure, gate), made.curves[gate.first].duration
+        if len(rows):
+            phases = (rows[0, 0] + lap / gate.strides * np.arange(gate.strides)) % lap
+            changes.append(ClipChange(gate.first, gate.second, phases, rows[1:]))
     return made.with_changes(changes)
+
+
+def _kept(made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate) -> Array:
+    """What `_found` gives, kept under what the rivers are made of."""
+
+    def find() -> Array:
+        return _found(made, blend, figure, gate.first, gate.second, gate.moments)
+
+    return kept_array(kept_folder(__name__), gate.name, made_of, (-1, 57), find)
 
 
 def _strides(made: RiverClips, first: int, second: int) -> int:

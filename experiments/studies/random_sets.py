@@ -26,7 +26,7 @@ from experiments.config.words import run_config
 from experiments.files.map_files import save_map
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
-from experiments.preparation.prepared_clip import prepared_clip
+from experiments.preparation.prepared_clip import prepared_clips
 from experiments.setups.alike import motion_of
 from experiments.setups.blendable import grounded, led_by, not_blendable, off_pace
 from experiments.setups.wiring import wire
@@ -79,7 +79,7 @@ class Captured(NamedTuple):
 def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
     """Prepare a file and follow it alone."""
     try:
-        clip = _named(prepared_clip(Path(folder) / name).clip, name)
+        clip = _named(prepared_clips([Path(folder) / name])[0].clip, name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
     residual, fell, *_ = followed(clip)

@@ -13,7 +13,7 @@ from experiments.config.run_config import ArmConfig, RunConfig
 from experiments.config.words import run_config
 from experiments.setups.robot_arm import wire_arm
 from experiments.setups.wiring import wire
-from sim.compilation import unit_workers
+from sim.compilation import side_by_side
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit, unit_function
 from sim.errors import SimError
@@ -78,7 +78,7 @@ def test_what_cannot_be_compiled_is_left_to_the_run(toys):
 def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
     for unit in toys:
         unit.load()
-    monkeypatch.setattr(unit_workers.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
+    monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
     compile_units(toys)
 
 

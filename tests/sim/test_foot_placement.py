@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.preparation.prepared_clip import prepared_clip
+from experiments.preparation.prepared_clip import prepared_clips
 from models.humanoid.skeleton import JOINTS, figure_model, rest_pose
 from sim.body.figure import Figure, FigureGains
 from sim.body.tracking import TrackingConfig, floor_world, track
@@ -111,7 +111,7 @@ def test_a_somersault_is_not_disturbed():
     file = MOCAP / "snu" / "backflip.bvh"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
-    report = track(prepared_clip(file).clip, 8.0)
+    report = track(prepared_clips([file])[0].clip, 8.0)
     assert not report.falls
     assert report.residual_force < 0.12  # 8 %; 27 % with falls where feet beside and above the root were placed, too
 
@@ -121,7 +121,7 @@ def test_a_capture_that_jumps_again_and_again_does_not_fall():
     file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
     if not file.is_file():
         pytest.skip(f"needs motion capture in {MOCAP}")
-    clip = prepared_clip(file).clip
+    clip = prepared_clips([file])[0].clip
     placed, left = (
         track(clip, 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))
         for reach in (FigureGains().placement_reach, 0.0)
