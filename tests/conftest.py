@@ -12,12 +12,17 @@ from typing import Any
 from experiments import started  # noqa: F401 - before NumPy is imported
 
 # isort: split
+from hypothesis import settings
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache
 from sim.compilation.unit_key import UnknownIngredient, UnknownName
+
+# The same examples in every run.
+settings.register_profile("the same", derandomize=True)
+settings.load_profile("the same")
 
 
 class _BesideUnits(UnitCache):

@@ -18,7 +18,7 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
     names : sequence of str
         Of embedded clips, or motion files.
     raw : bool
-        Take motion files as captured; else they are prepared, once for each content (`prepared_clip`).
+        Take motion files as captured; else they are prepared, once for each content (`prepared_clips`).
 
     Raises
     ------

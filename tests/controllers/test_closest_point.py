@@ -100,7 +100,8 @@ def test_degenerate_samples_neither_hang_nor_mislead(samples, point, squeeze):
     curve = Trajectory(np.arange(len(positions), dtype=float), positions)
     _, distance = closest_phase(curve.packed(), 0, *point, np.nan)
     dense = np.linalg.norm(curve.point(np.linspace(curve.start, curve.end, 4001)) - np.array(point), axis=1).min()
-    assert distance <= dense + 1e-12
+    # What `closest_phase` says of itself; a curve of a micrometre was found on which it uses half of it.
+    assert distance <= dense + 1e-11
     assert distance >= dense - 0.01 * curve.length - 1e-12
 
 

@@ -151,10 +151,10 @@ def test_what_flies_when_it_is_prepared_is_led_as_captured(monkeypatch: pytest.M
     captured = {name: Clip(clip.poses[1:], clip.fps, name) for name, clip in (("a", flying), ("b", walking))}
     prepared = {"a": flying, "b": walking}
 
-    def loaded(path: Path, raw: bool = False) -> PreparedClip:
-        return PreparedClip((captured if raw else prepared)[path.stem], (f"raw {raw}",))
+    def loaded(paths: list[Path], raw: bool = False) -> list[PreparedClip]:
+        return [PreparedClip((captured if raw else prepared)[path.stem], (f"raw {raw}",)) for path in paths]
 
-    monkeypatch.setattr(clips, "prepared_clip", loaded)
+    monkeypatch.setattr(clips, "prepared_clips", loaded)
     (clip,), remarks = led_clips(LedMap(clips=("a.bvh",)))
     assert clip is captured["a"]
     assert remarks == ("raw True", "a: flies when prepared, and is led as captured, by steps")
