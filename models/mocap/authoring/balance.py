@@ -119,12 +119,6 @@ def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
     return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
 
 
-def outside_support(motion: Dynamics) -> Array:
-    """How far the zero-moment point lies outside the support [m], shape (n,)."""
-    nearest = [supported(point, contacts) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)]
-    return np.linalg.norm(motion.zmp - np.array(nearest), axis=1)
-
-
 def balanced_clip(
     choreography: Choreography, fps: float, cutoff: float = 8.0, rounds: int = 12, share: float = 0.7
 ) -> Clip:

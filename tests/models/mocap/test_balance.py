@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at
-from models.mocap.authoring.balance import balanced_clip, dynamics, outside_support, supported
+from models.mocap.authoring.balance import balanced_clip, dynamics, supported
 from models.mocap.clip import Clip
+from tests.models.mocap.support import outside_support
 
 FLOOR = [[x, y, CONTACT_RADIUS] for x, y in ((-0.05, 0.1), (0.16, 0.1), (-0.05, -0.1), (0.16, -0.1))]
 

@@ -8,10 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, joint_range
 from models.mocap import __main__ as everything
-from models.mocap.authoring.balance import dynamics, outside_support
+from models.mocap.authoring.balance import dynamics
 from models.mocap.authoring.choreography import CLIPS
 from models.mocap.clip import pose_difference
 from models.mocap.library import embedded, embedded_names
+from tests.models.mocap.support import outside_support
 
 MODEL = figure_model()
 IN_PLACE = ("angry", "cheer", "spin", "squat_dance")
