@@ -132,6 +132,7 @@ def test_what_flies_is_left_alone():
     assert repaired.plan is None
 
 
+@pytest.mark.slow
 @shared
 def test_the_impossible_backflip_falls_with_g_after_repair(tmp_path):
     target = tmp_path / "mended.bvh"

@@ -10,7 +10,8 @@ from models.mocap.clip import Clip
 from models.mocap.library import embedded
 
 
-@pytest.mark.parametrize(("name", "pace"), [("run", 1.5), pytest.param("ginga", 2.3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "pace"), [("run", 1.5), ("ginga", 2.3)])
 def test_what_the_floor_cannot_give_is_missed_and_what_it_can_is_followed(name, pace):
     clip = embedded(name)
     played = clip_ballistics(Clip(clip.poses, pace * clip.fps, name))

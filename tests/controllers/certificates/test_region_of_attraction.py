@@ -147,7 +147,8 @@ def test_the_tubes_bounds_hold_at_its_points():
 FIRM = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 
 
-@pytest.mark.parametrize("lap", [4.0, pytest.param(12.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("lap", [4.0, 12.0])
 def test_the_demos_river_in_a_firm_hand_has_a_region(lap):
     good = region(RIVER._replace(curve=Trajectory.circle(0.0477, lap)), FIRM, 8.5, STABLE)
     assert good.verdict == "certified"

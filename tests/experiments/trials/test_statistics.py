@@ -42,6 +42,7 @@ def test_an_effect_that_is_there_is_found_with_its_size_and_one_that_is_not_is_n
     assert found.of("effort", "guidance")[0].p_holm > 0.05
 
 
+@pytest.mark.slow
 def test_holm_s_correction_is_over_all_contrasts_and_never_makes_one_smaller() -> None:
     found = statistics(frame(-0.1), FACTORS, (), ["tracking_error", "effort"], seed=3)
     ps = sorted((c.p, c.p_holm) for c in found.contrasts)
@@ -82,6 +83,7 @@ def test_effect_sizes_are_the_published_ones() -> None:
     assert hedges_g(one, other) == pytest.approx(0.5 * (1.0 - 3.0 / 15.0))
 
 
+@pytest.mark.slow
 def test_failed_trials_are_left_out_and_told() -> None:
     made = frame(-1.0)
     made.loc[0, ["state", "tracking_error"]] = ["failed", np.nan]
@@ -139,6 +141,7 @@ def test_repetitions_of_a_user_do_not_count_as_users() -> None:
     assert (river.low, river.high) == pytest.approx((low, high), abs=0.15)  # the bootstrap's, over the same users
 
 
+@pytest.mark.slow
 def test_an_interaction_is_found_where_it_is_and_not_where_it_is_not() -> None:
     made = frame(-1.0)
     made["tracking_error"] += ((made["guidance"] == "river") & (made["map"] == "b")) * 0.8
