@@ -80,6 +80,7 @@ def test_nothing_is_started_when_nothing_is_missing(toys, monkeypatch):
         unit.load()
     monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
     compile_units(toys)
+    assert missing_units(toys) == ()
 
 
 def test_a_unit_is_a_function_of_a_module():

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from experiments.preparation import prepared_clip
 from experiments.preparation.command import changes, prepare_file, summary
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS
@@ -196,6 +197,10 @@ def test_a_file_of_few_frames_a_second_is_doubted(fps, doubted, tmp_path):
     doubts = [line for line in changes(prepared(tmp_path / "cheer.bvh", "open")) if "a frame lasts" in line]
     assert bool(doubts) == doubted
     assert all("0.5 s" in line for line in doubts)
+
+
+def test_prepared_clips_are_kept_by_the_code_that_prepares_them():
+    assert prepared.__module__ == prepared_clip._CODE
 
 
 def test_a_target_that_exists_is_left(tmp_path):
