@@ -1,1 +1,1 @@
-"""Models: the Phantom, the figure, motion capture, and the world they share. No control, no loop."""
+"""Models: the Phantom, the figure, motion capture, a robot arm, and the MuJoCo world. No control, no loop."""

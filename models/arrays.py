@@ -1,4 +1,4 @@
-"""The type of arrays of numbers."""
+"""Type alias of float64 arrays."""
 
 from typing import TypeAlias
 

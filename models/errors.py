@@ -1,4 +1,4 @@
-"""What goes wrong with a model or a motion file."""
+"""Errors of models and motion files."""
 
 
 class ModelError(ValueError):

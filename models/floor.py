@@ -1,20 +1,20 @@
-"""The floor on which figures stand, and how MuJoCo solves their contacts with it."""
+"""The floor on which figures stand, and MuJoCo's contact parameters for it."""
 
 import mujoco
 
 FRICTION = 0.9  # μ of a sole on the floor
-_TORSION, _ROLLING = 0.005, 0.0001  # [m], MuJoCo's own, which contacts of three dimensions do not use
+_TORSION, _ROLLING = 0.005, 0.0001  # [m], MuJoCo's defaults; contacts with condim 3 do not use them
 
-# Times by which friction is harder than what carries. MuJoCo's contacts are soft: at 1 a loaded point creeps over the
-# floor by some centimetres a second, well within its friction.
+# impratio: ratio of frictional to normal constraint impedance. MuJoCo's contacts are soft: at 1 a loaded point creeps
+# over the floor by some centimetres a second, although its force is well within the friction cone.
 _HARDNESS = 10.0
 
 
 def add_floor(spec: mujoco.MjSpec, material: str = "") -> None:
-    """Add the plane z = 0, named ``floor``, and have contacts obey the law that the figure plans with.
+    """Add the plane z = 0, named ``floor``, with the friction law that the figure's controller assumes.
 
-    The law is Coulomb's, ‖f_t‖ ≤ μ f_n: a round cone (MuJoCo's default is a pyramid, on which friction along the
-    diagonals is 1/√2 of that along the axes).
+    The law is Coulomb's, ‖f_t‖ ≤ μ f_n, an elliptic cone. (MuJoCo's default is a pyramid, with a friction along the
+    diagonals of 1/√2 of that along the axes.)
     """
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = _HARDNESS

@@ -1,4 +1,4 @@
-"""The MuJoCo world: the Phantom on its table and the figure on the floor, one model, stepped together."""
+"""The MuJoCo world: one model of the Phantom on its table and the figure (or a robot arm) on the floor."""
 
 from dataclasses import dataclass
 
@@ -17,21 +17,21 @@ FIGURE = "figure/"
 ROBOT = "robot/"
 PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Device frame to world: the user faces the way the figure does, so right, up and towards the user are −y, z and −x."""
+"""Rotation from device frame to world: the user faces +x, so right, up and towards the user are −y, z and −x."""
 P_WH: npt.NDArray[np.float64] = np.array([0.2, -1.0, 1.0])
 """Origin of the hand frame H in the world [m]; its axes are the world's."""
 
 
 @dataclass(frozen=True)
 class SceneConfig:
-    """What the world is made of.
+    """Parameters of the world.
 
     Parameters
     ----------
     stature : float
-        Of the figure [m].
+        Stature of the figure [m].
     mass : float
-        Of the figure [kg].
+        Mass of the figure [kg].
     servo_period : float
         Time between two servo ticks [s].
     physics_step : float
@@ -66,7 +66,7 @@ class SceneConfig:
 
 
 def _add_table(world: mujoco.MjsBody) -> None:
-    """A table under the Phantom's base, whose feet stand 0.25 m below the origin of H and 0.23 m beyond it."""
+    """A table under the Phantom's base; its top is 0.25 m below the origin of H, and its centre 0.16 m beyond it."""
     top = (P_WH + np.array([0.16, 0.0, -0.265])).tolist()
     wood = [0.6, 0.48, 0.36, 1.0]
     box = mujoco.mjtGeom.mjGEOM_BOX
@@ -116,7 +116,7 @@ def world_spec(config: SceneConfig) -> mujoco.MjSpec:
 
 
 def world_model(config: SceneConfig) -> mujoco.MjModel:
-    """The compiled world: 65 degrees of freedom of one `mj_step`.
+    """The compiled world, of 65 degrees of freedom.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def world_model(config: SceneConfig) -> mujoco.MjModel:
 
 
 def device_world_model(config: SceneConfig) -> mujoco.MjModel:
-    """The compiled world without a figure: its configuration is the first part of that of `world_model`.
+    """The compiled world without a figure; its qpos and qvel are the first parts of those of `world_model`.
 
     Raises
     ------

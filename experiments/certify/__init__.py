@@ -1,1 +1,1 @@
-"""Certificates of fields, runs and clips, kept in folders."""
+"""Certificates of the fields of runs, of simulations and of clips, written to folders."""

@@ -1,4 +1,4 @@
-"""Drawings of flights: a clip against free fall, and what the physical figure makes of it at many rates.
+"""Figures of flights: a clip compared with free fall, and trials of the physical figure at many playback rates.
 
 ``python -m experiments.certify.ballistic_figures docs/pictures ../shared/mocap`` flies the embedded jump and backflip
 and two captured jumps, draws the picture of the docs and prints its table.
@@ -20,11 +20,11 @@ from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_bal
 from models.mocap.library import embedded, load_clip
 
 _COLORS = {"certified": "#2a7f4f", "refuted": "#c2473b", "unknown": "#b98a1d"}
-_RATES = 13  # flown by the physical figure
+_RATES = 13  # number of rates flown by the physical figure
 
 
 def flights_figure(ballistics: ClipBallistics) -> Figure:
-    """Height of the centre of mass with the nearest free fall of each flight, and every frame's admissible rates."""
+    """Height of the centre of mass with the best-fitting free fall of each flight, and admissible rates by frame."""
     motion = ballistics.motion
     times = np.arange(len(ballistics.bounds.low)) / motion.fps
     drawing = Figure(figsize=(7.2, 4.8), layout="constrained")
@@ -53,9 +53,9 @@ class FlownClip(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the clip.
+        Name of the clip.
     ballistics : ClipBallistics
-        What is certified.
+        Its ballistics and certificate.
     flight : FlightJudgement
         The flight.
     trials : list of FlightTrial
@@ -69,7 +69,7 @@ class FlownClip(NamedTuple):
 
 
 def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
-    """Fly the longest flight of a clip at rates inside and outside of those at which it can be done."""
+    """Fly the longest flight of a clip at rates inside and outside the interval at which it is feasible."""
     flight = max(ballistics.flights, key=lambda flight: flight.fit.duration)
     low, high = flight.done or flight.seen
     rates = np.geomspace(0.8 * low, 1.25 * min(high, 2.0), _RATES)
@@ -77,7 +77,7 @@ def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
 
 
 def rates_table(cases: Sequence[FlownClip]) -> str:
-    """Distance of the centres of mass over σ as Markdown: a row a clip and rate, found and predicted."""
+    """Measured and predicted distance of the centres of mass by clip and rate σ, as a Markdown table."""
     lines = ["| clip | σ | can be done | strays [cm] | predicted [cm] |", "|---|---|---|---|---|"]
     for case in cases:
         low, high = case.flight.done or (np.inf, 0.0)
@@ -89,7 +89,7 @@ def rates_table(cases: Sequence[FlownClip]) -> str:
 
 
 def rates_figure(cases: Sequence[FlownClip]) -> Figure:
-    """How far the physical figure strays from the longest flight of each clip, over the rate at which it is played."""
+    """Distance of the physical figure from the longest flight of each clip, over the playback rate."""
     drawing = Figure(figsize=(3.6 * len(cases), 3.2), layout="constrained")
     for ax, case in zip(drawing.subplots(1, len(cases), squeeze=False)[0], cases, strict=True):
         _draw_rates(ax, *case)
@@ -123,7 +123,7 @@ def _once(ax: Axes) -> tuple[list[object], list[str]]:
 
 
 def main(folder: Path, mocap: Path) -> None:
-    """Draw the picture of the docs into a folder, and print its table; `mocap` holds the captured jumps."""
+    """Draw the figure of the docs into a folder, and print its table; `mocap` is the folder of captures."""
     clips = {
         "jump (embedded)": embedded("jump"),
         "backflip (embedded)": embedded("backflip"),

@@ -1,4 +1,4 @@
-"""What people see of a certificate: the boundary of the gains, the region, a clip's flights, and a readable page."""
+"""Presentation of certificates: figures of stability boundary, region of attraction and flights, and the HTML page."""
 
 from collections.abc import Mapping
 from html import escape
@@ -16,12 +16,12 @@ from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
 
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
-_SHORT = 12  # numbers of an array that are told
-_RATES = (0.25, 4.0)  # that the picture of admissible rates shows
+_SHORT = 12  # largest size of an array that the page shows
+_RATES = (0.25, 4.0)  # range of the figure of admissible rates
 
 
 def stability_figure(river: River, verdict: Verdict) -> Figure:
-    """Boundary of the gains with the river's own, and the critical stiffness along the curve."""
+    """Stability boundary of the gains with the river's own gains, and the critical stiffness along the curve."""
     damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
     critical = boundary(river, damping)
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
@@ -42,7 +42,7 @@ def stability_figure(river: River, verdict: Verdict) -> Figure:
 
 
 def region_figure(verdict: Verdict) -> Figure:
-    """Edge of the region and of the ball over offset and wrong speed, for the lightest and the heaviest hand."""
+    """Region of attraction and the ball reached, over offset and error of speed, for the lightest and heaviest hand."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
     masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
@@ -58,7 +58,7 @@ def region_figure(verdict: Verdict) -> Figure:
 
 
 def flights_figure(found: ClipBallistics) -> Figure:
-    """Height of the centre of mass with the free fall nearest to each flight, and the admissible rates of a lap."""
+    """Height of the centre of mass with free fall between the ends of each flight, and admissible rates of a lap."""
     motion, lap = found.motion, len(found.bounds.low)
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     height, rates = figure.subplots(1, 2)
@@ -93,7 +93,7 @@ def flights_figure(found: ClipBallistics) -> Figure:
 
 
 def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
-    """A readable page of a certificate; `plots` are files beside it, with what they show."""
+    """The HTML page of a certificate; `plots` maps picture files beside it to their captions."""
     parts = [
         "<!doctype html><meta charset='utf-8'><title>Certificate</title>",
         "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#222}"
@@ -114,7 +114,7 @@ def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
 
 
 def _table(numbers: Mapping[str, object]) -> str:
-    """Numbers by what they are, with units; arrays that are long are in certificate.json only."""
+    """HTML table of numbers with names and units; long arrays are left to certificate.json."""
     rows: list[str] = []
     for key, value in numbers.items():
         name, unit = WORDS.get(key, (key.replace("_", " "), ""))
@@ -125,7 +125,7 @@ def _table(numbers: Mapping[str, object]) -> str:
 
 
 def _told(value: object) -> str:
-    """A number, a short array or a hand in words; nothing of what is too long to read."""
+    """A number, a short array or a hand as text; empty for anything longer."""
     if isinstance(value, bool | str | int):
         return str(value)
     if isinstance(value, float | np.floating):

@@ -1,4 +1,4 @@
-"""What the numbers of certificates are called on their page, and their units."""
+"""Names and units of the numbers of certificates, as shown on their page."""
 
 WORDS: dict[str, tuple[str, str]] = {
     # stability
@@ -95,4 +95,4 @@ WORDS: dict[str, tuple[str, str]] = {
     "unheld": ("longest stretch without a foot at rest", "s"),
     "jump": ("largest acceleration of the centre of mass", "m/s²"),
 }
-"""Of each number: words and unit."""
+"""Name and unit of each number, by its key."""

@@ -1,4 +1,4 @@
-"""What a run or a map's file brings to its certificate besides gains: its clips, and the verdicts on their flights."""
+"""Clips of a run or of a map's file for its certificate, and verdicts on their flights."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,15 +18,15 @@ from sim.recording.recording import Recording
 
 PLAYED = "as played"
 _PACE = "clips are judged at their own pace, what a run played as it was played, its first second left out"
-_FPS = 125.0  # of an animation that was played, as it is judged [1/s]
-_LONGEST = 120.0  # [s] of it
+_FPS = 125.0  # frame rate at which a played animation is judged [1/s]
+_LONGEST = 120.0  # longest part of it that is judged [s]
 _ORDER = ("refuted", "unknown", "certified")
 
 
 def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tuple[Clip, ...]]:
-    """Configuration and clips of a recorded run, its animation as it was played the last of them.
+    """Configuration and clips of a recorded run, of which the last is its animation as it was played.
 
-    Else this configuration, and the clips of its map's file or those that it names.
+    Without a recording: the given configuration, and the clips of its map's file or those that it names.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def run_and_clips(folder: Path | None, config: RunConfig) -> tuple[RunConfig, tu
 
 
 def played(recording: Recording) -> tuple[Clip, ...]:
-    """The animation of a recorded run, at the pace at which it was played and with all that the hand did; if any."""
+    """The animation of a recorded run as it was played, after the first second; empty without a reference."""
     if "reference" not in recording.groups["frames"]:
         return ()
     rate = recording.rates["frames"]
@@ -52,7 +52,7 @@ def played(recording: Recording) -> tuple[Clip, ...]:
 
 
 def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING) -> dict[str, Verdict]:
-    """Verdicts ``ballistic`` and ``turns`` on clips together: the worst of them, and that of each by its name."""
+    """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with those of all clips listed."""
     found = [(clip.name, clip_ballistics(clip, judging).certificate.verdicts) for clip in clips]
     told: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):

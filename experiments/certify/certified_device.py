@@ -1,4 +1,4 @@
-"""The Phantom as certificates know it."""
+"""The Phantom's kinematics and dynamics in the form that certificates take."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from sim.world.world import phantom_angles
 
 
 def phantom_device(linkage: Linkage | None = None) -> Device:
-    """Its own kernels, on symbols, in the hand frame; friction and added inertia are the linkage's."""
+    """The Phantom's own kernels, on CasADi symbols, in H; friction and added joint inertia are those of a linkage."""
 
     def jacobian_H(theta: Any) -> Any:
         columns = zip(*jacobian.py_func(theta), strict=True)

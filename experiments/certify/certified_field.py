@@ -1,6 +1,7 @@
-"""What a certificate is of, and whether it still is: laws, gains, curve, clock, device, hands, clips and code.
+"""Inputs of a certificate, by whose hash it is checked: laws, gains, curves, clock, device, hands, clips and code.
 
-Nothing that a check needs brings CasADi or splines: curves enter as they are given, not as they are led along.
+A check must be fast, so nothing here imports CasADi or splines at the top: the inputs hold curves as the map has them,
+not as the field leads along them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,11 +26,11 @@ from models.mocap.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
 _Timed = Callable[[Trajectory], Trajectory]
-"""From a curve to how a field leads along it."""
+"""Maps a curve to the curve along which a field leads."""
 
 
 def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
-    """The curve along which a run leads by "", and those of the other curves of a lifted map's file by clips' names.
+    """Curves along which a run leads: by "" that of its start, by "_NAME" the other curves of a lifted map.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
 
 
 def given_curves(config: RunConfig) -> dict[str, Trajectory]:
-    """The curves of `certified_curves` as the map has them: with gains and device, all that those depend on.
+    """The curves of `certified_curves` as the map has them; with gains and device they determine those.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def _as_given(curve: Trajectory) -> Trajectory:
 
 
 def _lead_curve(config: RunConfig, part: Led, timed: _Timed) -> dict[str, Trajectory]:
-    from experiments.setups.lead import s_curve  # brings splines with it, which a check of gains does not need
+    from experiments.setups.lead import s_curve  # imported late: loads splines, which a check of gains does not need
 
     return {"": s_curve()}
 
@@ -84,21 +85,21 @@ def _curves_of_file(config: RunConfig, part: MapFile, timed: _Timed) -> dict[str
 MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
     "cylindrical": _circle, "composite": _circle, "rivers": _circle, "file": _curves_of_file, "led": _lead_curve,
 }  # fmt: skip
-"""Curves of a run by kind of map."""
+"""Functions that give the curves of a run, by kind of map."""
 
 
 def certified_sampling(config: RunConfig, delay: float) -> Sampling:
-    """The clock of a run, with a delay of the torques [s]."""
+    """Sampling of a run: servo period, delay of the torques [s] and cut-off of the velocity filter."""
     return Sampling(config.clock.servo_period, delay, config.device.cutoff)
 
 
 def certified_options(config: RunConfig, delay: float, hands: HandRange, push: float) -> dict[str, object]:
-    """The numbers that a certificate is of as a person gives them, by option: to say which of them differs.
+    """The options on which a certificate depends, by name, to say which of them differ from those of a run.
 
     Parameters
     ----------
     config, delay, hands, push
-        Of `certificate_inputs`.
+        As in `certificate_inputs`.
     """
     found = linkage_of(config.device)
     told: dict[str, object] = {"coulomb": found.coulomb, "viscous": found.viscous, "inertia": found.inertia}
@@ -125,26 +126,26 @@ def certificate_inputs(
     clips: Sequence[Clip] = (),
     judging: Judging = JUDGING,
 ) -> dict[str, object]:
-    """All that the verdicts on a run's field depend on, by name, for `hash_of`.
+    """All data on which the verdicts on a run's field depend, by name, for `hash_of`.
 
     Parameters
     ----------
     config : RunConfig
-        Of the run.
+        Configuration of the run.
     delay : float
-        Of the torques [s].
+        Delay of the torques [s].
     hands : HandRange
         Intervals of the hand's impedance.
     push : float
         Largest force of the hand [N].
     clips : sequence of Clip
-        Those that are judged besides, and that set the gait of a figure that is led.
+        Clips that are also judged; of a led figure, the clip that defines its gait.
     judging : Judging
-        By what clips are judged.
+        Tolerances by which clips are judged.
     """
     sampling, mode = certified_sampling(config, delay), config.mode
     return {
-        # Every parameter of every law, those that no certificate covers too.
+        # All parameters of all laws, including those that no certificate covers.
         "gains": (certified_laws(config), resolved(config).mode),
         "added": config.map if left_out(config) or governor_drag(config) else None,
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
@@ -155,7 +156,7 @@ def certificate_inputs(
         "period": sampling.period,
         "delay": sampling.delay,
         "filter": sampling.cutoff,
-        # Where the encoders' zero is changes with every calibration, and no verdict.
+        # The encoders' offsets change with every calibration and affect no verdict.
         "device": (PREMIUM_1_5, replace(linkage_of(config.device), offset=(0.0, 0.0, 0.0))),
         "hand": hands,
         "push": push,

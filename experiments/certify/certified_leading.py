@@ -1,4 +1,4 @@
-"""Certificate of LEADING: stability in every regime of its force, along the default S, in any direction of the path."""
+"""Certificate of LEADING: stability in every regime of its force along the default S, in all directions of the path."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -44,10 +44,13 @@ def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
-    """Regimes by what is added to the names of their verdicts, in directions of the path that stand for all.
+    """Regimes by the suffix of their verdicts' names, for headings of the path that represent all directions.
 
-    On its path, or ahead of it in the reach of an arc (the same with t for n): ""; held back on it: ``_back``; beside
-    what it reaches: ``_aside``; and too far ahead besides, as far as the limiter lets a hand pull: ``_beyond``.
+    - "": the stylus is on the path, and only the spring across it acts; if only the spring along it acts, the law is
+      the same with t for n, which the headings include.
+    - ``_back``: on the path, and both springs act: the figure is held back.
+    - ``_aside``: beyond the path's front, and the spring across acts: the stylus is beside what the figure can reach.
+    - ``_beyond``: likewise, and both act: the stylus is too far ahead as well, as far as the limiter lets a hand pull.
     """
     lead = 2.0 * field.gait.speed / field.rate
     drawn = field.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
@@ -62,7 +65,7 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
 
 
 def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling) -> River:
-    """LEADING in one regime as certificates know it."""
+    """LEADING in one regime, in the form that certificates take."""
     law_there = regime.law(field.scale, field.k_z / max(field.k_l, 1e-3))
     return River(law_there, field.k_l, field.b, float("inf"), curve, device, sampling)
 
@@ -70,14 +73,14 @@ def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Dev
 def certify_leading(
     field: Leading, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange
 ) -> dict[str, Verdict]:
-    """Stability in every regime, passivity, the power that the force can give, and why there is no region.
+    """Verdicts on stability in every regime, passivity and power; the region of attraction is unknown.
 
     Parameters
     ----------
     field : Leading
         The law.
     curve : Trajectory
-        Along which the loop is linearised.
+        Curve along which the loop is linearised.
     device, sampling, hands
         As in `stability`.
     """
@@ -104,12 +107,12 @@ _NO_REGION = Verdict(
 
 
 def leading_energy(field: Leading) -> Verdict:
-    r"""Verdict on the power that the force gives a hand, whatever the hand and the figure do.
+    r"""Verdict on the power that the force gives a hand, for any motion of hand and figure.
 
     .. math:: F \cdot v = f(p, t) \cdot v - b\,|v|^2 \le |f|^2 / 4 b
 
-    with f what the springs pull. It does not ask for a potential, which the force has none of ahead and aside. The
-    bound is told for springs that pull as much as the limiter lets through.
+    with f the force of the springs. The bound needs no potential, which the force does not have ahead and aside. It is
+    evaluated for springs that pull with the limiter's force.
     """
     force = ForceLimiter(1e-3).peak
     if field.b == 0.0:
@@ -130,7 +133,7 @@ _FOLLOWED = (Regime(True, True), *(Regime(True, False, True, heading=heading) fo
 def _walker_radius(
     field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling, hands: HandRange
 ) -> float:
-    """Largest spectral radius with the walker as state, over phases and hands."""
+    """Largest spectral radius, over phases and hands, with the walker as part of the state."""
     river = leading_river(field, regime, curve, device, sampling)
     radii = [
         np.abs(
@@ -144,7 +147,7 @@ def _walker_radius(
 
 
 def _least(verdicts: Sequence[Verdict]) -> Verdict:
-    """The worst verdict, and of equal ones that with the least margin."""
+    """The worst verdict; of equal verdicts, the one with the least margin."""
     order = ("refuted", "unknown", "certified")
     worst = min(verdicts, key=lambda found: (order.index(found.verdict), found.margin or 0.0))
     return replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))

@@ -1,4 +1,4 @@
-"""Certificates of the rivers of a run: stability of each, and the switching where they meet."""
+"""Certificates of the rivers of a run: stability of each, and of switching between them where they meet."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -31,14 +31,14 @@ from experiments.setups.rivers import default_choice, law_of
 
 
 class Meeting(NamedTuple):
-    """Where one river is nearest to another.
+    """The place at which one river is nearest to another.
 
     Attributes
     ----------
     own, other : int
-        Their numbers.
+        Indices of the two rivers.
     phase : float
-        Of the first [s].
+        Phase on the first [s].
     """
 
     own: int
@@ -47,12 +47,12 @@ class Meeting(NamedTuple):
 
 
 def certified_bundle(bundle: RiverBundle, device: Device, sampling: Sampling) -> tuple[River, ...]:
-    """The rivers of a bundle as certificates know them."""
+    """The rivers of a bundle, in the form that certificates take."""
     return tuple(River(FOLLOW_LAW, r.drag / r.tau, r.drag, r.epsilon, r.curve, device, sampling) for r in bundle.rivers)
 
 
 def meetings(rivers: Sequence[River]) -> list[Meeting]:
-    """Where tubes overlap, for every ordered pair: the phase at which the curves are nearest."""
+    """Meetings of all ordered pairs of rivers with overlapping tubes, at the phase where their curves are nearest."""
     found: list[Meeting] = []
     for i, j in permutations(range(len(rivers)), 2):
         distance = rival(rivers[i], rivers[j]).distance
@@ -62,9 +62,10 @@ def meetings(rivers: Sequence[River]) -> list[Meeting]:
 
 
 def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, crossing: str) -> Common | None:
-    """Common Lyapunov function where two rivers meet, in the middle hand of a range, which stays there.
+    """Common Lyapunov function where two rivers meet, for a hand in the middle of a range that holds on there.
 
-    Of each river, of none, and where rivers are summed of both; so any switching and any blending of them decays.
+    It is common to the loops with either river, with none and, if rivers are summed, with both; so the state decays
+    under any switching and any blending of them. None if there is none, or such a hand has no stiffness.
     """
     hand = HandImpedance(*(0.5 * (low + high) for low, high in (hands.mass, hands.damping, hands.stiffness)))
     if hand.stiffness == 0.0:
@@ -86,24 +87,24 @@ def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, cross
 def certify_rivers(
     config: RunConfig, mode: Rivers, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
 ) -> dict[str, Verdict]:
-    """Stability of the rivers of a run besides the first, and the switching between all of them.
+    """Verdicts on the stability of the rivers of a run besides the first, and on switching between all of them.
 
     Parameters
     ----------
     config, mode : RunConfig, Rivers
-        Of the run, in the mode of rivers.
+        Configuration of the run, and its mode.
     main : River
-        The one that the run begins on.
+        The river on which the run begins.
     hands : HandRange
         As in `stability`.
     push : float
         Largest force of the hand [N].
     curves : mapping of str to Trajectory
-        Of the rivers, the first one's first; one alone stands for the default rivers about it.
+        Curves of the rivers, beginning with that of `main`; a single one stands for the default rivers about it.
     """
     sampling, ceiling = main.sampling, ForceLimiter(main.sampling.period).peak
     if len(curves) > 1:
-        # The one that the run begins on comes first.
+        # The river on which the run begins comes first.
         names = tuple(name.removeprefix("_") or "first" for name in curves)
         bundle = RiverBundle(tuple(lifted_river(curve, mode) for curve in curves.values()), names)
         choice = side_by_side(bundle, tuple(curves.values()))
@@ -126,7 +127,7 @@ def certify_rivers(
 
 
 def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float) -> dict[str, object]:
-    """First counterexample: unpushed hands first, at every meeting; none is looked for where torques are late."""
+    """First counterexample to switching, at any meeting, first without a push; empty if torques are delayed."""
     if rivers[0].sampling.delay > 0.0:
         return {}
     simulate = partial(simulated_course, field, rivers[0].sampling)
@@ -143,7 +144,7 @@ def _search(field: HigherOrder, rivers: Sequence[River], places: Sequence[Meetin
 
 
 def _summed(common: Common | None) -> Verdict:
-    """Verdict on rivers that are summed: nothing switches, but windows come and go."""
+    """Verdict on summed rivers: nothing switches, but a hand enters and leaves their windows."""
     if common is None:
         return Verdict("unknown", "no common Lyapunov function of the rivers, of none and of both was found")
     said = f"a hand that holds on settles however rivers come and go: a common Lyapunov function, ρ = {common.rate:.4g}"

@@ -1,4 +1,4 @@
-"""Certificates of a run's field, before it is felt, and of a clip, before it is played; kept in a folder."""
+"""Certificates of a run's field and of a clip, made before a run and written to a folder."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -47,9 +47,9 @@ PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
 def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
-    """The laws of a run as they are certified, with a delay of the torques [s]; named as in `certified_laws`.
+    """The laws of a run in the form that is certified, with a delay of the torques [s]; named as in `certified_laws`.
 
-    A bunny is taken to run at the clock's pace.
+    A bunny is assumed to run at the clock's pace.
 
     Raises
     ------
@@ -65,9 +65,9 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
 
 
 def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:
-    """Stability and region with hands within intervals, passivity; and the bound for a push [N], FOLLOW's alone.
+    """Verdicts on stability and region of attraction for a range of hands, and on passivity; for FOLLOW also on energy.
 
-    `drag` [N s/m] is that of a governor beside the first law.
+    `push` [N] is the hand's force for the energy bound; `drag` [N s/m] is that of a governor beside the laws.
     """
     verdicts: dict[str, Verdict] = {}
     for name, river in rivers.items():
@@ -93,25 +93,25 @@ def certify_into(
     clips: Sequence[Clip] = (),
     judging: Judging = JUDGING,
 ) -> Certificate:
-    """Certify a run's field and clips, or take the certificate that the folder holds if it is of the same inputs.
+    """Certify a run's field and clips, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters
     ----------
     config : RunConfig
-        Of the run.
+        Configuration of the run.
     out : Path
-        Folder; written are ``certificate.json``, ``certificate.html``, ``certified.json`` (the options),
-        ``stability.png``, ``region.png``.
+        Folder to which ``certificate.json``, ``certificate.html``, ``certified.json`` (the options), ``stability.png``
+        and ``region.png`` are written.
     delay : float
-        Of the torques [s].
+        Delay of the torques [s].
     hands : HandRange, optional
         Intervals of the hand's impedance.
     push : float
-        U_max of the bound on the distance [N].
+        U_max, the hand's force in the bound on the distance [N].
     clips : sequence of Clip
-        Whose flights are judged besides; in the mode "lead" the first of them is led.
+        Clips whose flights are judged too; in the mode "lead" the first of them is led.
     judging : Judging
-        What passes for a flight, and the floor's friction.
+        Tolerances of flights, and the floor's friction.
 
     Raises
     ------
@@ -136,16 +136,16 @@ def certify_into(
 
 
 def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certificate:
-    """Certify flights and turns of a clip, or take the certificate that the folder holds if it is of the same inputs.
+    """Certify flights and turns of a clip, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters
     ----------
     name : str
         An embedded clip, or a motion file.
     out : Path
-        Folder; written are ``certificate.json``, ``certificate.html``, ``flights.png``.
+        Folder to which ``certificate.json``, ``certificate.html`` and ``flights.png`` are written.
     judging : Judging
-        What passes for a flight, and the floor's friction.
+        Tolerances of flights, and the floor's friction.
 
     Raises
     ------
@@ -163,14 +163,14 @@ def certify_clip_into(name: str, out: Path, judging: Judging = JUDGING) -> Certi
 
 
 def _held(out: Path, inputs: Mapping[str, object]) -> Certificate | None:
-    """The certificate that a folder holds with its page, if it is of these inputs."""
+    """The certificate in a folder, if its page is there and it has these inputs; else None."""
     if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
         return None
     try:
         held = read_certificate(out / CERTIFICATE)
         held.check(inputs)
     except CertificateError:
-        return None  # of something else, or none: certified anew
+        return None  # not a certificate, or of other inputs
     return held
 
 
@@ -187,7 +187,7 @@ def _write(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], ou
 def _field_verdicts(
     config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip]
 ) -> tuple[River, dict[str, Verdict]]:
-    """The river that is drawn, and all verdicts on the field."""
+    """The law that the stability figure shows, and all verdicts on the field."""
     if isinstance(config.mode, Lead):
         if not clips:
             raise ParameterError("a certificate of leading is of a clip that is led; give one")

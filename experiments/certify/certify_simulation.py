@@ -1,4 +1,4 @@
-"""Certificates of a simulation from Python: of its very field, laws of one's own included."""
+"""Certificates of a simulation made in Python: of its own field, including user-defined laws."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -29,16 +29,16 @@ from experiments.simulation import Simulation
 
 @dataclass(frozen=True)
 class SimulationCertificate:
-    """What is certain of a simulation's field.
+    """Verdicts on a simulation's field.
 
     Attributes
     ----------
     stability : Verdict
-        Of the sampled loop along the curve, with every hand of the range.
+        Stability of the sampled loop along the curve, with every hand of the range.
     passivity : Verdict
-        As the hand meets it, beside stability.
+        Passivity of the loop at the stylus.
     inputs_hash : str
-        Of all that they depend on.
+        Hash of all inputs of the verdicts.
     """
 
     stability: Verdict
@@ -47,7 +47,7 @@ class SimulationCertificate:
 
 
 class _Parts(NamedTuple):
-    """The law that drives along a curve, those whose forces are added, and the drag of a governor."""
+    """The law that leads along a curve, user-defined laws added to it, and the drag of a governor [N s/m]."""
 
     leading: Follow | Bunny
     added: tuple[FunctionLaw, ...]
@@ -55,20 +55,20 @@ class _Parts(NamedTuple):
 
 
 def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0) -> SimulationCertificate:
-    """Say what is certain of a simulation's field: certified, refuted with a counterexample, or unknown with why.
+    """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
-    The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and laws of one's own added,
-    and cut to a force. What else it is made of makes the verdicts unknown, by name; then the program itself is looked
-    at about the curve, and stability is refuted where it is unstable.
+    The field may be FOLLOW or a bunny, alone or with a governor, a moment on the stylus and user-defined laws, and with
+    a force limit. Any other law makes the verdicts unknown and is named; the executed program is then linearised at
+    states about the curve, and stability is refuted if one of them is unstable.
 
     Parameters
     ----------
     sim : Simulation
-        Whose field, clock and device they are.
+        The simulation, of which field, clock and device are used.
     hands : HandRange, optional
         Intervals of the hand's impedance.
     delay : float
-        Of the torques [s].
+        Delay of the torques [s].
     """
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
@@ -83,7 +83,7 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
 
 
 def _seen(sim: Simulation, delay: float, unknown: Verdict, hands: HandRange) -> Verdict:
-    """What the program does about the map's curve, where no certificate covers it."""
+    """An unknown verdict, checked with the executed program about the map's curve."""
     around, reach = (getattr(sim.haptic_map, name, None) for name in ("around", "reach"))
     if around is None or reach is None:
         return unknown
@@ -102,7 +102,7 @@ def _river(sim: Simulation, delay: float) -> tuple[River, float, tuple[str, ...]
     else:
         base, (k_r, b_d, width) = BUNNY_LAW, law.felt
         if law.attraction == "along":
-            # Near a bunny that pulls along the curve the field is FOLLOW's, to first order.
+            # Near a bunny that pulls along the curve, the field is that of FOLLOW to first order.
             base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, sim.device.cutoff)
     device = phantom_device(linkage_of(sim.device))

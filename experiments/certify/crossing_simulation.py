@@ -1,4 +1,4 @@
-"""A hand in crossing rivers on the whole linkage in MuJoCo, from any state and with any push."""
+"""Simulation of the Phantom's full linkage in crossing rivers, without a hand, from any state and with any push."""
 
 import mujoco
 import numpy as np
@@ -22,9 +22,9 @@ SUBSTEPS = 8
 def simulated_course(
     field: HigherOrder, sampling: Sampling, start: Array, velocity: Array, seconds: float, push: Push | None = None
 ) -> Course:
-    """`switching_search.course` on the whole linkage in MuJoCo, with Coulomb friction, weight and encoders.
+    """`switching_search.course` with the full linkage in MuJoCo, including Coulomb friction, weight and encoders.
 
-    Sensing, law and actuation are the servo's kernels, called tick by tick. The push acts as motor torques.
+    Sensing, law and actuation are the servo's kernels, called tick by tick. The push acts through the motors.
     """
     model = trial_model(HandImpedance(), sampling.period / SUBSTEPS, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
     data = mujoco.MjData(model)
@@ -36,7 +36,7 @@ def simulated_course(
         joint = data.joint(PHANTOM + name)
         joint.qpos[0], joint.qvel[0] = (CLOSURE @ theta)[i], (CLOSURE @ rate)[i]
     mujoco.mj_forward(model, data)
-    # The filter knows the velocity from before.
+    # The velocity filter begins settled at the initial velocity.
     sensed_before(port, theta, rate)
     program = field.program()
     memory, wrench = program.fresh_memory(), np.zeros(6)

@@ -1,4 +1,4 @@
-"""The program that a run executes, walls and all, looked at where no certificate covers it."""
+"""Stability checks by linearising the executed program, walls included, for fields that no certificate covers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,13 +17,13 @@ from experiments.setups.setups import map_parts, parts_of
 from models.mocap.clip import Clip
 from sim.world.world import World
 
-REACH = 0.025  # [m] where a map tells of none
-NEAR = 0.2  # of the map's reach: as far off the curve as pushes bring a hand
-FAST = 2.0  # times the curve's own pace: a hand that pushes on, at the edge of the map
+REACH = 0.025  # [m] for maps that define no reach
+NEAR = 0.2  # share of the map's reach: as far off the curve as pushes bring a hand
+FAST = 2.0  # ratio to the curve's own speed, of a hand that pushes forwards at the edge of the map
 
 
 def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
-    """The parts of a run, as it puts them together.
+    """The parts of a run, as `wire` makes them.
 
     Raises
     ------
@@ -34,14 +34,14 @@ def executed_parts(config: RunConfig, clips: Sequence[Clip] = ()) -> Parts:
 
 
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
-    """A verdict that leaves out walls, with what the executed program does at the states that were looked at."""
+    """A verdict that leaves out walls, complemented by a check of the executed program (`seen`)."""
     parts = executed_parts(config, clips)
     reach = float(getattr(parts.maps, "reach", REACH))
     return seen(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
 
 def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
-    """An unknown verdict on a program, refuted if it is unstable at some state about the curve of `main`."""
+    """A verdict on a program after a check: refuted if the program is unstable at a state about the curve of `main`."""
     found = looked_at(program, main, NEAR * reach, hands.hands())
     far = looked_at(program, main, reach, hands.hands(), FAST)
     figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": found.strongest}

@@ -1,4 +1,4 @@
-"""Whether a run's loop is stable, asked many times: verdicts are kept in files by all that they depend on."""
+"""Cached stability verdicts of runs: files named by a hash of all inputs, for callers that ask many times."""
 
 import json
 import os
@@ -22,16 +22,16 @@ _SEVERITY = ("certified", "unknown", "refuted")
 
 @dataclass(frozen=True)
 class Stability:
-    """What is certain of the stability of a run's loop, with every hand of the default range.
+    """Verdict on the stability of a run's loop, with every hand of the default range.
 
     Attributes
     ----------
     verdict : {"certified", "refuted", "unknown"}
-        The worst of the laws that it uses.
+        The worst verdict of the laws that the run uses.
     margin : float or None
-        (critical k_r)/k_r − 1, the least of them; None where there is no certificate.
+        Least margin (critical k_r)/k_r − 1 of these laws; None if there is no certificate.
     reason : str
-        Of that verdict.
+        Reason of the worst verdict.
     """
 
     verdict: Outcome
@@ -45,7 +45,7 @@ class Stability:
 
 
 def kept_stability(config: RunConfig) -> Stability:
-    """Certify the stability of a run, or take what was found before for the same inputs and code."""
+    """Certify the stability of a run, or return the cached verdict for the same inputs and code."""
     config, hands = resolved(config), HandRange()
     if config.mode.kind == "lead":
         return Stability("unknown", None, _LEAD)
@@ -63,7 +63,7 @@ def kept_stability(config: RunConfig) -> Stability:
 
 
 def _found(config: RunConfig, hands: HandRange) -> Stability:
-    from controllers.certificates.loop.governed import governed_stability  # brings CasADi
+    from controllers.certificates.loop.governed import governed_stability  # imported late: loads CasADi
     from experiments.certify.certify import certified_rivers
 
     try:

@@ -1,8 +1,8 @@
-"""Trials of a sampled river in MuJoCo: a place, a clock and a hand, and the linkage under the servo's kernels.
+"""Trials of the sampled loop of a river in MuJoCo, against which stability certificates are validated.
 
-The linkage stands alone in the world's frame; sensing, law and actuation are the functions that the servo runs, in its
-order. What the servo does not have is put around them: torques late by whole periods, encoders that do not round, no
-Coulomb friction, another integrator.
+The linkage stands alone, in the world's axes. Sensing, law and actuation are the servo's functions, in its order. A
+trial can also have what the servo does not: torques delayed by whole periods, encoders without quantisation, no Coulomb
+friction, another integrator.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from sim.world.world import phantom_angles
 
 IntArray = npt.NDArray[np.int64]
 
-LAP = 1e6  # [s] of a lap: the curve stands still, so a trial is about one configuration
+LAP = 1e6  # [s] of a lap: so slow that a trial is about one configuration
 START = 1e-6  # [m] distance from the curve at which a trial begins
 
 
@@ -44,7 +44,7 @@ def _exact_reading(theta: tuple[float, float, float]) -> tuple[float, float, flo
     return theta
 
 
-# The servo's own sensing with its encoders' rounding taken out: the same source, one name bound to another function.
+# The servo's sensing without quantisation: the same source, with `encoder_reading` bound to another function.
 _sense_exactly = njit(
     FunctionType(sense.py_func.__code__, sense.py_func.__globals__ | {"encoder_reading": _exact_reading})
 )
@@ -61,18 +61,18 @@ def run_late(
     rounded: bool,
     path: Array,
 ) -> None:
-    """The servo's loop over one device, without limiter and figure, its torques late by whole periods.
+    """The servo's loop with one device, without limiter and figure, with torques delayed by whole periods.
 
     Parameters
     ----------
     plant, port, hand, field, memory
         As in the servo.
     late : Array
-        Torques on their way, the next to act first, shape (m, 3); m is the delay in periods.
+        Delayed torques, the next to act first, shape (m, 3) [N m]; m is the delay in periods.
     rounded : bool
-        Whether the encoders round.
+        Whether encoders quantise.
     path : Array
-        Written: the hand as measured at each tick, shape (n, 3); NaN from where it is farther than 5 cm off.
+        Output: the measured position of the hand at each tick, shape (n, 3) [m]; NaN after it is more than 5 cm off.
     """
     path[:] = np.nan
     wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
@@ -96,27 +96,27 @@ def run_late(
 
 
 CLOSURE = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 1], [0, 1, -1]], dtype=np.float64)
-"""All five hinges of the linkage, by θ."""
+"""Maps θ to the angles of all five hinges of the closed linkage."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What is drawn.
+    """A randomly drawn trial.
 
     Attributes
     ----------
     curve : Trajectory
-        A circle somewhere in the workspace, so slow that it stands still.
+        A circle somewhere in the workspace, passed so slowly that its point practically rests.
     phase : float
-        Where on it [s].
+        Phase on it [s].
     b_d : float
         Damping [N s/m].
     sampling : Sampling
         The clock; its delay is a whole number of periods.
     hand : HandImpedance
-        On the stylus.
+        The hand on the stylus.
     direction : Array
-        Across the curve, of the first displacement, shape (3,).
+        Direction of the initial displacement, across the curve, shape (3,).
     """
 
     curve: Trajectory
@@ -136,14 +136,14 @@ class Trial:
         return Follow(self.curve, k_r, self.b_d, np.inf).program()
 
     def user(self, k_r: float) -> Arm:
-        """The hand that is simulated: it stays at the trial's place."""
+        """The simulated hand, which holds on at the trial's place if it has stiffness or damping."""
         held = self.hand.damping > 0.0 or self.hand.stiffness > 0.0
         path = self.curve.point(self.phase)[None] if held else np.zeros((0, 3))
         return Arm(self.hand.stiffness, self.hand.damping, path)
 
 
 def draw_trial(rng: np.random.Generator) -> Trial:
-    """A random trial: curve, phase, clock, hand, and a damping between 5 and 70 % of what is stable by itself."""
+    """A random trial: curve, phase, clock, hand, and a damping of 5 to 70 % of the critical damping."""
     while True:
         radius, centre = rng.uniform(0.02, 0.06), rng.uniform([-0.06, -0.08, -0.06], [0.06, 0.08, 0.1])
         axes = np.linalg.qr(rng.normal(size=(3, 3)))[0][:, :2]
@@ -173,7 +173,7 @@ def draw_trial(rng: np.random.Generator) -> Trial:
 
 
 def _critical_damping(loop: SampledLoop) -> float:
-    """Largest b_d [N s/m] that is stable with hardly any stiffness."""
+    """Largest stable b_d [N s/m] at a stiffness of 1 N/m."""
     gains = np.geomspace(0.05, 500.0, 60)
     stable = [bool(loop.radius(1.0, b)[0] < 1.0) for b in gains]
     first = int(np.argmin(stable)) if not all(stable) else len(gains) - 1
@@ -181,7 +181,7 @@ def _critical_damping(loop: SampledLoop) -> float:
 
 
 def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: mujoco.mjtIntegrator) -> mujoco.MjModel:
-    """The Phantom alone in the world's frame, with the hand's mass on its tip, which carries its own weight."""
+    """The Phantom alone in the world's axes, with the hand's mass, gravity-compensated, at its tip."""
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.integrator = integrator
@@ -200,20 +200,20 @@ def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: muj
 
 @dataclass(frozen=True)
 class Conditions:
-    """What is modelled beyond the linear loop, and how finely time is cut.
+    """Effects modelled beyond the linear loop, and the time step.
 
     Attributes
     ----------
     substeps : int
-        Physics steps a servo period.
+        Physics steps per servo period.
     integrator : mujoco.mjtIntegrator
-        Runge and Kutta's by default. The world's own is of first order: it leads by half a step, which stabilises.
+        Runge–Kutta by default. The world's own is of first order: it leads by half a step, which stabilises.
     rounded : bool
-        Encoders round.
+        Whether encoders quantise.
     coulomb : bool
-        Coulomb friction acts.
+        Whether Coulomb friction acts.
     start : float
-        Distance from the curve at the beginning [m].
+        Initial distance from the curve [m].
     """
 
     substeps: int = 32
@@ -224,7 +224,7 @@ class Conditions:
 
 
 def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
-    """Displacement from the trial's place across the curve at each tick [m], shape (n, 3); see `hand_path`."""
+    """Displacement across the curve from the trial's place at each tick [m], shape (n, 3); see `hand_path`."""
     tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))
     away = hand_path(trial, k_r, ticks, conditions, state) - trial.curve.point(trial.phase)
     return away - np.outer(away @ tangent, tangent)
@@ -238,20 +238,20 @@ def hand_path(
     state: Array | None = None,
     user: Arm | None = None,
 ) -> Array:
-    """Where the hand is at each tick in H [m], shape (n, 3), n ≤ ticks, after letting go beside the curve.
+    """Position of the hand in H at each tick [m], shape (n, 3), n ≤ ticks, after a release beside the curve.
 
     Parameters
     ----------
     trial, conditions
-        What is simulated, and how.
+        The trial and its conditions.
     k_r : float
-        [N/m].
+        Stiffness of FOLLOW [N/m].
     ticks : int
-        How long; shorter if the hand gets 5 cm off.
+        Largest number of ticks; there are fewer if the hand gets 5 cm off.
     state : Array, optional
-        State ξ of the linear loop to begin in; by default at rest, `conditions.start` off in the trial's direction.
+        Initial state ξ of the linear loop; by default at rest, `conditions.start` off in the trial's direction.
     user : Arm, optional
-        What pushes; by default the trial's own.
+        The hand; by default the trial's own.
     """
     sampling, period = trial.sampling, trial.sampling.period
     model = trial_model(trial.hand, period / conditions.substeps, conditions.coulomb, conditions.integrator)

@@ -1,1 +1,1 @@
-"""Flights of clips: judged, flown by the physical figure, repaired."""
+"""Flights of clips: certified, flown by the physical figure, and repaired."""

@@ -1,4 +1,4 @@
-"""Ballistics of clips: certify their flights, fly them with the physical figure, repair them."""
+"""Ballistics of clips: certificates of their flights, and trials in which the physical figure flies them."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -30,28 +30,28 @@ from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, tracked_motion
 
-_LIFT = 10.0  # flown so high that nothing but gravity acts [m]
-_FINE = 480.0  # frames per second at which a flight is flown [1/s]
-_ANY_RATE = 100.0  # nobody plays a flight so fast
-_AFTER = 8  # of them after the landing, which shape the reference's spline
+_LIFT = 10.0  # height at which a flight is flown, out of reach of the floor [m]
+_FINE = 480.0  # frame rate at which a flight is flown [1/s]
+_ANY_RATE = 100.0  # rate above which a bound counts as none
+_AFTER = 8  # frames after the landing that are added to shape the reference's spline
 
 
 @dataclass(frozen=True, eq=False)
 class ClipBallistics:
-    """What is known of the flights of a clip.
+    """Flights of a clip and their certificate.
 
     Attributes
     ----------
     seconds : float
-        How long the clip is [s].
+        Duration of the clip [s].
     clip : Clip
-        The clip; one that closes is followed by its next lap, so that a flight over the seam is whole.
+        The clip; a closed one is extended by a second lap, so that a flight over the seam is whole.
     motion : BodyMotion
         Its centre of mass, momentum and contacts.
     flights : tuple of FlightJudgement
-        Those that begin in the first lap.
+        Flights that begin in the first lap.
     bounds : RateBounds
-        Admissible rates of every frame of the first lap.
+        Admissible playback rates of every frame of the first lap.
     certificate : Certificate
         Verdicts ``ballistic`` and ``turns``.
     """
@@ -82,20 +82,20 @@ def _in_words(rates: tuple[float, float] | None) -> str:
 
 
 class FlightTrial(NamedTuple):
-    """A flight of the physical figure, with no force but gravity.
+    """A flight of the physical figure under gravity alone.
 
     Attributes
     ----------
     rate : float
-        σ at which the clip was played.
+        Playback rate σ of the clip.
     distance : float
-        Greatest distance between the centres of mass of figure and clip [m].
+        Largest distance between the centres of mass of figure and clip [m].
     predicted : float
-        The same as the certificate has it [m].
+        The same as predicted by the certificate [m].
     turn : float
-        Greatest angle between the pelvis of figure and clip [rad].
+        Largest angle between the pelvis of figure and clip [rad].
     residual : float
-        Greatest component of the residual wrench at the root [N, N m]: zero, or it was no flight.
+        Largest component of the residual wrench at the root [N, N m]; not zero only if it was no flight.
     """
 
     rate: float
@@ -106,13 +106,13 @@ class FlightTrial(NamedTuple):
 
 
 def body_motion(clip: Clip) -> BodyMotion:
-    """What the ballistic certificate needs to know of a clip on the default figure."""
+    """Centre of mass, momentum and contacts of a clip on the default figure, for the ballistic certificate."""
     moved, touched = momentum(clip), contacts(clip)
     return BodyMotion(clip.fps, *moved, touched.clearance, touched.supported)
 
 
 def body_contact(clip: Clip) -> BodyContact:
-    """What of a clip touches the floor, and how."""
+    """Floor contact and foot skate of a clip, for the certificate's checks of the capture."""
     touched, points = contacts(clip), sole_points(clip.poses)
     travelled = [0.0]
     for part in range(points.shape[1]):
@@ -132,14 +132,17 @@ def clip_ballistics(
     judging: Judging = JUDGING,
     assumptions: tuple[str, ...] = (),
 ) -> ClipBallistics:
-    """Judge all flights of a clip, and the turns between them; `assumptions` are added to those of the verdict."""
+    """Certify the flights of a clip, and that friction suffices for its turns outside flights.
+
+    `assumptions` are added to those of the verdict on the flights.
+    """
     laps = clip
     if clip.closes():
         laps = Clip(np.vstack([clip.poses, clip.displacement.moved(clip.poses[1:])]), clip.fps, clip.name)
     motion = body_motion(laps)
     flights = judge_flights(motion, judging.tolerance)
     if laps is not clip:
-        # A flight that a cut lap begins with is the second half of the one at its end.
+        # A flight at the beginning of a lap is the second half of the flight at its end.
         first, last = int(np.argmax(motion.supported)), clip.n_frames - 1
         flights = tuple(flight for flight in flights if first <= flight.fit.start < last)
     bounds = rate_bounds(motion, flights, judging.friction)
@@ -157,7 +160,7 @@ def clip_ballistics(
 
 
 def _with_initial_state(verdict: Verdict, clip: Clip, flights: tuple[FlightJudgement, ...]) -> Verdict:
-    """The counterexample with qpos and qvel of the best take-off, ready for a simulation."""
+    """The verdict with qpos and qvel of the best take-off added to its counterexample, for a simulation."""
     fit = next(flight.fit for flight in flights if flight.verdict == "refuted")
     take_off = _played(clip, fit, 1.0)
     state = {"qpos": take_off.flown.poses[0], "qvel": take_off.flown.velocities()[0]}
@@ -165,7 +168,7 @@ def _with_initial_state(verdict: Verdict, clip: Clip, flights: tuple[FlightJudge
 
 
 class _Played(NamedTuple):
-    """A flight as it is recorded, played at a rate, and as a body that really flies would do it."""
+    """A flight as recorded and played at a rate, and the same joint motion in free flight."""
 
     recorded: Clip
     com: Array
@@ -174,7 +177,7 @@ class _Played(NamedTuple):
 
 
 def _played(clip: Clip, fit: FlightFit, rate: float) -> _Played:
-    """Turn and move each pose of a flight as a whole: momentum is constant, and the body falls as best it can."""
+    """Rotate and move each pose of a flight as a whole: angular momentum is constant, and the fall the best-fitting."""
     n = round(fit.duration * _FINE) + 1
     times = np.arange(n + _AFTER) * fit.duration / (n - 1)
     recorded = Clip(clip_motion(clip, fit.time + times).poses, rate / float(times[1]), clip.name)
@@ -195,9 +198,9 @@ def _played(clip: Clip, fit: FlightFit, rate: float) -> _Played:
 
 
 def fly(clip: Clip, fit: FlightFit, rate: float) -> FlightTrial:
-    """Let the physical figure take off as the certificate says and fly a flight of a clip, played at a rate.
+    """Let the physical figure take off as the certificate predicts and fly a flight of a clip, played at a rate.
 
-    It follows the clip's joints by its own torques; nothing pushes its root.
+    It follows the clip's joint angles by its own torques; no force acts at its root.
     """
     played = _played(clip, fit, rate)
     lifted = Clip(played.flown.poses + np.eye(N_POSE)[2] * _LIFT, played.flown.fps, clip.name)

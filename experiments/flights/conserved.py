@@ -1,11 +1,11 @@
-r"""Poses of a flight turned about their centre of mass until angular momentum is constant.
+r"""Rotation of the poses of a flight about their centre of mass so that angular momentum is constant.
 
-Each pose is turned as a whole by R_k, R = 1 at take-off and landing. With L_k and I_k of the poses as they are,
+Each pose is rotated as a whole by R_k, R = 1 at take-off and landing. With L_k and I_k of the given poses,
 
 .. math:: R_k I_k R_k^T \omega_k = \bar L - R_k L_k, \qquad R_{k+1} = e^{[\omega_k \Delta t]} R_k
 
-and the constant momentum \bar L is the one for which the body lands as it was meant to: R = 1 at the last frame, three
-equations for three numbers, solved by Newton's method.
+and the constant momentum \bar L is that for which R = 1 at the last frame, so that the body lands as in the clip: three
+equations for three numbers, solved by `scipy.optimize.root`.
 """
 
 import numpy as np
@@ -17,13 +17,13 @@ from models.mocap import quaternions
 from models.mocap.clip import Clip
 from models.mocap.dynamics.momentum import Momentum, momentum
 
-ROUNDS = 4  # differences see the turn of neighbouring frames: once more with what is left
+ROUNDS = 4  # iterations: momentum by finite differences also changes with the rotation of neighbouring frames
 
 
 def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
-    """A clip whose flights, from frame to frame, keep their angular momentum; centres of mass stay where they are.
+    """The clip with constant angular momentum in flights (first frame, last frame), and unchanged centres of mass.
 
-    A flight for which there is no such turn stays as it is.
+    A flight for which there is no solution is left as it is.
     """
     poses = clip.poses.copy()
     for _ in range(ROUNDS):
@@ -39,8 +39,8 @@ def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
 
 
 def _turns(moved: Momentum, start: int, end: int, step: float) -> Rotation | None:
-    """R of each frame of a flight; None where no momentum brings the body back."""
-    # Between two frames: momentum and inertia of the middle.
+    """R of each frame of a flight; None if there is no momentum with R = 1 at the last frame."""
+    # Momentum and inertia at the midpoints between frames.
     own = 0.5 * (moved.angular[start:end] + moved.angular[start + 1 : end + 1])
     own[0], own[-1] = moved.angular[start + 1], moved.angular[end - 1]
     inertia = 0.5 * (moved.inertia[start:end] + moved.inertia[start + 1 : end + 1])

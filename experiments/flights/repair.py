@@ -1,4 +1,4 @@
-"""``hvf repair``: the nearest motion whose flights can be flown, as a clip."""
+"""``hvf repair``: the motion nearest to a clip whose flights are ballistic."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,10 +21,10 @@ from models.mocap.library import check_target, load_clip, writing
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 
-_AROUND = 1.0  # what may change before the first refuted flight and after the last one [s]
-_SINKS = 0.01  # [m] of the floor that captures miss
-_LIFTING = 0.1  # [s] in which a lift comes and goes
-_RELEASE = 0.1  # in which a foot that leaves the floor takes over the move of the body [s]
+_AROUND = 1.0  # time before the first refuted flight and after the last one that may be changed [s]
+_SINKS = 0.01  # floor penetration of captures that is tolerated [m]
+_LIFTING = 0.1  # half width of the filter that smooths a lift in time [s]
+_RELEASE = 0.1  # time in which a foot that leaves the floor takes over the displacement of the body [s]
 
 
 class Repaired(NamedTuple):
@@ -33,11 +33,11 @@ class Repaired(NamedTuple):
     Attributes
     ----------
     clip : Clip
-        The nearest feasible one; the same one where nothing had to be repaired.
+        The repaired clip; the given one if nothing had to be repaired.
     before, after : ClipBallistics
-        What is known of the flights of either.
+        Ballistics of the given and of the repaired clip.
     plan : RepairPlan or None
-        The changes; None where there are none.
+        Changes of timing and position; None if no flight was changed.
     """
 
     clip: Clip
@@ -46,7 +46,7 @@ class Repaired(NamedTuple):
     plan: RepairPlan | None
 
     def lines(self) -> tuple[str, ...]:
-        """What was done, a line each."""
+        """Report of the repair, a line each."""
         verdicts = [b.certificate.verdicts["ballistic"] for b in (self.before, self.after)]
         if self.plan is None and self.before is self.after:
             return (f"nothing to repair: {verdicts[0].verdict}; {verdicts[0].reason}",)
@@ -84,9 +84,9 @@ def repair_file(source: Path, target: Path, overwrite: bool = False) -> Repaired
 
 
 def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
-    """The nearest motion over the floor whose flights fall with g and keep their angular momentum, contacts kept.
+    """The nearest motion above the floor with the same contacts whose flights conserve momentum under gravity.
 
-    A clip without refuted flights that is nowhere below the floor stays as it is.
+    A clip without refuted flights that is nowhere below the floor is returned unchanged.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def repair_clip(clip: Clip, judging: Judging = JUDGING) -> Repaired:
 def _carried_out(
     clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[int, int]], standing: npt.NDArray[np.bool_]
 ) -> Clip:
-    """The clip with new timing, moved body and feet that stay, at the clip's own frame rate."""
+    """The clip with the plan's timing and displacement of the body, planted feet kept, at the clip's frame rate."""
     n, step = clip.n_frames, 1.0 / clip.fps
     times: Array = np.arange(n, dtype=np.float64) * step
     shift = np.zeros((n, 3))
@@ -131,7 +131,7 @@ def _carried_out(
     times[last + 1 :] += times[last] - last * step
     shift[first : last + 1] = plan.shift
     frames = np.arange(round(times[-1] * clip.fps) + 1) * step
-    # The last frame may lie half a step beyond the last recorded one.
+    # By rounding, the last frame may lie half a step beyond the end.
     frames = np.minimum(frames, times[-1])
     poses = clip_motion(clip, np.asarray(PchipInterpolator(times, np.arange(n) * step)(frames))).poses
     shifts = np.asarray(PchipInterpolator(times, shift)(frames))
@@ -153,18 +153,18 @@ def _carried_out(
 
 
 def over_the_floor(clip: Clip) -> Clip:
-    """The clip lifted as a whole, smoothly in time, by as much as its lowest point is below the floor.
+    """The clip lifted smoothly in time by at least the depth of its lowest point below the floor.
 
-    Penetration of less than `_SINKS` is left; what is lifted ends on the floor.
+    A clip whose penetration is nowhere larger than `_SINKS` is left unchanged.
     """
     below = np.maximum(0.0, -contacts(clip).clearance)
     if below.max() <= _SINKS:
         return clip
     if clip.closes():
-        # A lap goes on with the next one.
+        # Three laps, so that the filters are periodic.
         below = np.concatenate([below[:-1], below[:-1], below])
     width = max(1, round(_LIFTING * clip.fps))
-    # The greatest within twice the kernel's reach, so that the mean of it is nowhere below what is needed.
+    # The maximum over the reach of both mean filters, so that the smoothed lift is nowhere below what is needed.
     needed = maximum_filter1d(below, 4 * width + 1, mode="nearest")
     lift = uniform_filter1d(uniform_filter1d(needed, 2 * width + 1, mode="nearest"), 2 * width + 1, mode="nearest")
     if clip.closes():
@@ -175,13 +175,13 @@ def over_the_floor(clip: Clip) -> Clip:
 
 
 def _planted(times: Array, standing: npt.NDArray[np.bool_]) -> Array:
-    """1 while a foot stands, fading to 0 before and after, shape (n,)."""
+    """Weight of a planted foot: 1 while it stands, fading to 0 before and after, shape (n,)."""
     if not standing.any():
         return np.zeros(len(times))
     return _faded(np.abs(times[:, None] - times[standing]).min(axis=1))
 
 
 def _faded(age: Array) -> Array:
-    """1 at 0, 0 from `_RELEASE` on, C¹ between."""
+    """C¹ weight by time from a stance or flight [s]: 1 at 0, 0 from `_RELEASE` on."""
     x = np.clip(age / _RELEASE, 0.0, 1.0)
     return (1.0 - x) ** 2 * (1.0 + 2.0 * x)

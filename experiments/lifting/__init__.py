@@ -1,1 +1,1 @@
-"""``hvf lift``, and how good a map of clips is."""
+"""``hvf lift``: haptic maps lifted from clips, and measures of their quality."""

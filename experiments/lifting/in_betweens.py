@@ -1,4 +1,4 @@
-"""How well a motion moves that a map has made: joint limits, feet on the floor, flights."""
+"""Measures of a motion that a map has made: joint limits, foot skate, floor penetration, flights."""
 
 from typing import NamedTuple
 
@@ -19,22 +19,22 @@ from models.mocap.clip import Clip, pose_difference
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 
-TOUCH = 0.003  # [m] over the floor, at which a sole is taken to stand
+TOUCH = 0.003  # [m] height below which a contact point of a sole counts as standing
 
 
 class MotionMeasure(NamedTuple):
-    """What is wrong with a motion, each at its worst.
+    """Largest faults of a motion.
 
     Attributes
     ----------
     limits : float
-        How far a joint is beyond its limits [rad].
+        Excess of a joint over its limits [rad].
     slide : float
-        How far a contact point of a sole is from where it came down, while it is within 3 mm of the floor [m].
+        Distance of a contact point of a sole from where it touched down, while it is within 3 mm of the floor [m].
     penetration : float
-        How far the body is below the floor [m].
+        Depth of the body below the floor [m].
     ballistic : float
-        How far the centre of mass is from the nearest free fall in its flights [m]; 0 without a flight.
+        Distance of the centre of mass from the best-fitting free fall in flights [m]; 0 without a flight.
     """
 
     limits: float
@@ -44,7 +44,7 @@ class MotionMeasure(NamedTuple):
 
     @staticmethod
     def worst(measures: "list[MotionMeasure]") -> "MotionMeasure":
-        """The worst of each; all zero of none."""
+        """The largest of each measure; zeros for an empty list."""
         return MotionMeasure(*np.max([MotionMeasure(0.0, 0.0, 0.0, 0.0), *measures], axis=0).tolist())
 
 
@@ -78,7 +78,7 @@ def soles(poses: Array) -> Array:
 
 
 def largest_slide(points: Array) -> float:
-    """Largest distance over the floor of one of `soles` from where it came down, while it is within 3 mm of it [m]."""
+    """Largest horizontal distance of a point of `soles` from its touch-down while within 3 mm of the floor [m]."""
     came_down, worst = np.full((points.shape[1], 2), np.nan), 0.0
     for places in points:
         touches = places[:, 2] < TOUCH

@@ -1,7 +1,8 @@
-"""``hvf lift``: from clips alone to a haptic map, written to a file, and a report of what it is like.
+"""``hvf lift``: makes a haptic map from clips alone, writes it to a file, and reports its quality.
 
-A closed clip that takes less than a second goes round its curve several times: no hand is led evenly round in half a
-second, and a captured run of 0.55 s a stride lacked 21 % of weight on a curve of one, and lacks 11 % on one of two.
+A closed clip shorter than a second is repeated along its curve, since no hand can be led evenly round a lap in half a
+second: a captured run of 0.55 s a stride had a residual of 21 % of weight with one stride in a lap, and of 11 % with
+two.
 """
 
 import math
@@ -34,12 +35,32 @@ from models.mocap.preparation.poses import around
 from sim.errors import SimError
 from sim.world.world import phantom_angles
 
-_SHORTEST = 1.0  # [s] of a lap
+_SHORTEST = 1.0  # [s] least duration of a lap
 
 
 @dataclass(frozen=True, eq=False)
 class LiftedClips:
-    """Clips, which of them go there and back, how often each goes round, their lifting, and the map made of it."""
+    """A lifted map and the clips of which it was made.
+
+    Attributes
+    ----------
+    clips : tuple of Clip
+        The clips as lifted.
+    turned : tuple of bool
+        Whether each is continued by its reversal (`there_and_back`).
+    rounds : tuple of int
+        How often each is repeated in a lap.
+    names : tuple of str
+        A unique name for each.
+    remarks : tuple of str
+        Remarks from loading the clips.
+    lifting : Lifting
+        Curves and measures.
+    haptic_map : Lifted
+        The map.
+    seconds : float
+        Time of lifting [s].
+    """
 
     clips: tuple[Clip, ...]
     turned: tuple[bool, ...]
@@ -51,7 +72,7 @@ class LiftedClips:
     seconds: float
 
     def layout(self) -> Layout:
-        """Where the clips are, as `measure_map` takes it."""
+        """The places of the clips in the map, for `measure_map`."""
         steps = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
         sites = np.stack([self.haptic_map.site(i, steps) for i in range(len(self.clips))], axis=1)
         times = [lap_times(angles, clip.duration) for angles, clip in zip(self.lifting.angles, self.clips, strict=True)]
@@ -59,13 +80,13 @@ class LiftedClips:
 
 
 class LiftReport(NamedTuple):
-    """What `hvf lift` says."""
+    """Report of `hvf lift`."""
 
     lifted: LiftedClips
     quality: MapQuality
 
     def lines(self) -> list[str]:
-        """In words."""
+        """The report in words, a line each."""
         lifting, names = self.lifted.lifting, self.lifted.names
         after, before = lifting.after, lifting.before
         lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
@@ -105,7 +126,7 @@ class LiftReport(NamedTuple):
         quality = self.quality
         if len(names) > 1:
             on, between = quality.conditioning, quality.conditioning_between
-            # Within the core of a curve nothing but its clip plays.
+            # Within the core of a curve only its clip plays, so the map may be singular there.
             along = f"{on[0]:.1f} in the median, 9 of 10 below {on[1]:.0f}" if np.isfinite(on[1]) else "singular"
             lines += [
                 f"Condition number of h_* along the curves: {along}; half way between: {between[0]:.1f} in the median, "
@@ -120,7 +141,7 @@ class LiftReport(NamedTuple):
         return lines
 
     def to_json(self) -> dict[str, object]:
-        """As JSON takes it."""
+        """The report as data for JSON."""
         lifting = self.lifted.lifting
         return {
             "clips": list(self.lifted.names),
@@ -139,7 +160,7 @@ class LiftReport(NamedTuple):
 
 
 def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """Clips that are the same motion, together, by the first of them."""
+    """Groups of clips that are the same motion."""
     groups: dict[int, list[int]] = {}
     for first, second in sorted(pairs):
         if not any(first in others for others in groups.values()):
@@ -171,12 +192,12 @@ def _arrangement(measure: ArrangementMeasure) -> dict[str, object]:
 
 
 def check_workspace(room: Room) -> None:
-    """Whether the Phantom reaches the whole annulus of a room.
+    """Check that the Phantom reaches the whole hollow cylinder of a room.
 
     Raises
     ------
     SimError
-        If it does not; the message has the point.
+        If it does not; the message names the point.
     """
     for z in np.linspace(*room.z_range, 9):
         for angle in np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False):
@@ -193,18 +214,18 @@ def check_workspace(room: Room) -> None:
 def lift_clips(
     names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
 ) -> LiftedClips:
-    """Lift clips by name or file; an open one that about rests at both ends goes there and back (`there_and_back`).
+    """Lift clips by name or file; an open clip nearly at rest at both ends is continued back (`there_and_back`).
 
     Parameters
     ----------
     names : sequence of str
-        Of embedded clips, or files.
+        Names of embedded clips, or files.
     room : Room
-        Where the curves may be.
+        Where the curves may lie.
     cyclic : sequence of str
-        Of `names`, those that have to close; by default all those are closed that do.
+        Those of `names` that must be closed; of the others, clips that close are closed.
     seed : int
-        Of the places from which the arrangement begins.
+        Seed of the initial arrangement of the curves.
     raw : bool
         Take motion files as captured, not prepared.
 
@@ -240,13 +261,13 @@ def lift_clips(
 
 
 def _round(clip: Clip, times: int) -> Clip:
-    """A closed clip, several times."""
+    """A closed clip repeated several times."""
     poses, first = around(clip, (times - 1) * (clip.n_frames - 1))
     return replace(clip, poses=poses[first:])
 
 
 def _labels(names: Sequence[str]) -> tuple[str, ...]:
-    """A name of its own for every clip: the file's, and a number where that is there already."""
+    """A unique name for every clip: its name or file stem, with a number appended if it is taken."""
     labels: list[str] = []
     for name in names:
         stem = Path(name).stem if Path(name).suffix else name
@@ -274,12 +295,12 @@ def lift_into(
     overwrite: bool,
     raw: bool = False,
 ) -> LiftReport:
-    """Lift clips, write the map into a file, and measure it; arguments as in `lift_clips`.
+    """Lift clips, write the map to a file, and measure it; arguments as in `lift_clips`.
 
     Raises
     ------
     ModelError, ControllerError, SimError
-        As `lift_clips`; or if the file is no .npz, or exists and is not to be replaced.
+        As `lift_clips`; or if the file is not a .npz, or exists and is not to be replaced.
     OSError
         If it cannot be written.
     """

@@ -1,4 +1,4 @@
-"""How good a map of clips is: conditioning and smoothness of h_*, and the motions between its curves."""
+"""Quality of a map of clips: conditioning and smoothness of its derivative h_*, and the motions between its curves."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -13,17 +13,17 @@ from experiments.lifting.in_betweens import MotionMeasure, measure_motion
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.clip import Clip
 
-SAMPLES = 96  # of the lap
-_PROBES = 400
-_STEP = 1e-5  # [m] of the differences of h_*
-_FPS = 60.0
+SAMPLES = 96  # samples of the lap
+_PROBES = 400  # random places at which smoothness is measured
+_STEP = 1e-5  # [m] step of the differences of h_*
+_FPS = 60.0  # frame rate of in-betweens [1/s]
 
 
 def body_weights() -> Array:
-    """By how much a radian of root and joints moves the default figure, RMS over its mass [m], shape (18,).
+    """RMS displacement of the default figure's mass by a radian of root and joints [m/rad], shape (18,).
 
-    √(I_k / M), with I_k the mean moment of inertia of what the joint carries about it, in the rest pose; the root
-    turns the body about its centre of mass.
+    √(I_k / M), with I_k the mean moment of inertia, about joint k, of the segments that it carries in the rest pose;
+    the root rotates the body about its centre of mass.
     """
     model = figure_model()
     data = mujoco.MjData(model)
@@ -51,12 +51,14 @@ def _carries(model: mujoco.MjModel, body: int, other: int) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A map and where its clips are in it.
+    """A map and the places of its clips.
 
     Attributes
     ----------
     haptic_map : ClipMap
+        The map.
     names : tuple of str
+        Names of its n clips.
     sites : Array, shape (SAMPLES, n, 2)
         (r, z) of each clip [m], at equal steps of θ.
     times : Array, shape (SAMPLES + 1, n)
@@ -70,22 +72,22 @@ class Layout:
 
 
 class MapQuality(NamedTuple):
-    """Of a map of clips.
+    """Measures of a map of clips.
 
     Attributes
     ----------
     separation : float
         Least distance of two clips' curves at one angle [m].
     conditioning : (float, float)
-        Condition number of h_* along the curves, poses in metres of the body: median, and 9 of 10 are below.
+        Condition number of h_* along the curves, with poses in metres (`body_weights`): median and 90th percentile.
     conditioning_between : (float, float)
         The same half way between neighbours.
     roughness : (float, float)
-        By which share of itself h_* changes in a millimetre, between neighbours: median, and 9 of 10 are below [1/mm].
+        Relative change of h_* per millimetre between neighbours: median and 90th percentile [1/mm].
     between : dict of MotionMeasure
-        In-betweens half way between neighbours, by their names.
+        Measures of in-betweens half way between neighbours, by their names.
     clips : MotionMeasure
-        The worst of the clips themselves.
+        The largest measures of the clips themselves.
     """
 
     separation: float
@@ -97,7 +99,7 @@ class MapQuality(NamedTuple):
 
 
 def neighbours(sites: Array) -> list[tuple[int, int]]:
-    """Pairs whose middle is nearer to them than to any other for half of the lap or more (Gabriel & Sokal 1969)."""
+    """Pairs of clips whose midpoint is nearer to them than to others over half of the lap (Gabriel & Sokal 1969)."""
     n = sites.shape[1]
     found: list[tuple[int, int]] = []
     for j in range(n):
@@ -130,7 +132,7 @@ def measure_map(layout: Layout, clips: tuple[Clip, ...], rng: np.random.Generato
 
 
 def _spread(values: Array) -> tuple[float, float]:
-    # Not interpolated: a map may be singular in some places.
+    # No interpolation, since a map may be singular in some places, where the value is infinite.
     middle, high = np.quantile(values, [0.5, 0.9], method="higher")
     return float(middle), float(high)
 
@@ -166,10 +168,10 @@ def _roughness(
 
 
 def in_between(layout: Layout, i: int, j: int) -> Clip:
-    """A lap half way between two clips, at the mean of their paces."""
+    """The animation of a lap half way between two clips, with the mean of their timings."""
     lap = 0.5 * (layout.times[:, i] + layout.times[:, j])
     frames = max(8, round(float(lap[-1]) * _FPS))
-    # The seam itself belongs to the next lap.
+    # Without the end point, which is the first frame of the next lap.
     at = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(SAMPLES + 1))
     closed = np.concatenate([layout.sites, layout.sites[:1]])
     middle = 0.5 * (closed[:, i] + closed[:, j])
@@ -183,11 +185,14 @@ def in_between(layout: Layout, i: int, j: int) -> Clip:
 
 
 def lap_times(angles: Array, duration: float) -> Array:
-    """Time in a clip since θ = 0, at SAMPLES + 1 equal steps of θ to 2π, of its frames' angles; even in a gap."""
+    """Time in a clip since θ = 0 [s] at SAMPLES + 1 equal steps of θ to 2π, from its frames' angles [rad].
+
+    Where the clip leaves a gap in the lap, time is linear in θ.
+    """
     share = np.linspace(0.0, 1.0, len(angles))
     step = 2.0 * np.pi * np.arange(SAMPLES + 1) / SAMPLES
     lap = duration * 2.0 * np.pi / (angles[-1] - angles[0])
-    # Two laps, so that any frame may be the first.
+    # Two laps, since the first frame may be at any angle.
     knots = np.concatenate([angles - 2.0 * np.pi, angles])
     times = np.concatenate([share * duration - lap, share * duration])
     keep = np.concatenate([[True], np.diff(knots) > 0.0])

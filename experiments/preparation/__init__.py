@@ -1,1 +1,1 @@
-"""Captures made well-formed: the command, its report, and the door for runs."""
+"""Preparation of captures: ``hvf prepare``, its report, and cached prepared clips for runs."""

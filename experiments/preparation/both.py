@@ -1,4 +1,4 @@
-"""A capture and what was made of it, side by side in 3D: one HTML page that plays without a network or a server."""
+"""3D replay of a capture beside the prepared clip: one HTML page that plays without a network or a server."""
 
 import contextlib
 import io
@@ -16,23 +16,22 @@ from sim.viewer.framing import followed
 from sim.viewer.shapes import body_shapes
 
 _FPS = 30.0
-_SECONDS = 12.0  # that are shown at least of what goes on lap after lap, and at most of everything
+_SECONDS = 12.0  # longest replay; cyclic clips are repeated for as long
 # The only notification a replay can give is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
-_APART = 0.6  # of each figure from the middle [m]
+_APART = 0.6  # distance of each figure from the middle [m]
 
 
 def both_html(captured: Clip, prepared: Clip) -> str:
     """The page: the capture at the back, translucent, and the prepared clip in front, each from its beginning.
 
-    A clip that closes goes on lap after lap, another one holds its last pose; both travel over the floor, which moves
-    under them.
+    A closed clip is repeated, an open one holds its last pose. Both are kept in view, and the floor moves under them.
     """
     longest = max(captured.duration, prepared.duration, _SECONDS if prepared.closes(1e-3) else 0.0)
     times = np.arange(int(min(longest, _SECONDS) * _FPS) + 1) / _FPS
     model = figure_model()
     data = mujoco.MjData(model)
-    quiet = io.StringIO()  # viser announces its address and its end, which mean nothing here
+    quiet = io.StringIO()  # viser prints its address and its end, which have no meaning here
     with contextlib.redirect_stdout(quiet):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:

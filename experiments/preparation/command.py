@@ -1,4 +1,4 @@
-"""``hvf prepare``: a capture made well-formed, with a line in the terminal and a page that shows what was done."""
+"""``hvf prepare``: makes a capture well-formed, and reports what was changed in a line and on a page."""
 
 from html import escape
 from pathlib import Path
@@ -16,18 +16,18 @@ from models.mocap.preparation.well_formed import WellFormed, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.retarget import Hints
 
-_COARSE = 10.0  # [1/s]: motion is captured at 24 frames a second and more
+_COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
 
 
 class PreparedFile(NamedTuple):
-    """A prepared file, and what became of it.
+    """A prepared clip with its measures.
 
     Attributes
     ----------
     made : Prepared
-        The clip and how it was made.
+        The clip and the steps of its preparation.
     measures : WellFormed
-        Of the clip.
+        Measures of the clip.
     followed : Followed
         How the physical figure follows it.
     """
@@ -37,7 +37,7 @@ class PreparedFile(NamedTuple):
     followed: Followed
 
     def faults(self) -> tuple[str, ...]:
-        """What is not within bounds, a line each."""
+        """Measures that exceed their bounds, a line each."""
         return (*self.measures.faults(), *self.followed.faults(self.measures.flights > 0))
 
 
@@ -54,9 +54,9 @@ def prepare_file(
     loop : str
         ``auto``, ``open``, or ``START:END`` of the cycle in seconds.
     mirror : bool
-        Go on with the mirror image of half a stride, or of START:END.
+        Continue half a stride, or START:END, by its mirror image.
     hints : Hints or None
-        What a person knows of the file.
+        Facts about the file that the user states.
     report : Path or None
         Folder for the page ``prepare-NAME.html``.
     overwrite : bool
@@ -94,7 +94,7 @@ def summary(outcome: PreparedFile) -> str:
 
 
 def changes(made: Prepared) -> tuple[str, ...]:
-    """What was done to the capture, a line each."""
+    """Changes made to the capture, a line each."""
     part, pace, change = made.looped, made.paced, made.feasible
     words = {
         "cycle": f"cycle {part.start:.2f} to {part.end:.2f} s",
@@ -120,7 +120,7 @@ def changes(made: Prepared) -> tuple[str, ...]:
 
 
 def advice(made: Prepared) -> tuple[str, ...]:
-    """Where no feasible motion is near: by how much not, and what may help."""
+    """Advice, if no feasible motion is near the capture: how far the nearest one found is, and what may help."""
     change = made.feasible
     if made.near:
         return ()

@@ -10,11 +10,11 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGM
 from models.mocap.clip import Clip
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
-_APART = 1.0  # between two pictures [m]
+_APART = 1.0  # distance between two pictures [m]
 
 
 def filmstrip(clips: dict[str, Clip], pictures: int = 14) -> Figure:
-    """A row for every clip, seen across the way that it travels, or faces at first."""
+    """A row for every clip, seen from the side of its direction of travel, or along y if it stays in place."""
     figure = Figure(figsize=(0.9 * pictures, 1.9 * len(clips)), layout="constrained")
     for axes, (title, clip) in zip(np.atleast_1d(figure.subplots(len(clips), 1)), clips.items(), strict=True):
         _row(axes, clip, pictures)

@@ -1,4 +1,4 @@
-"""How the physical figure follows a clip alone: what preparing it is for."""
+"""Trial of a clip: how the physical figure follows it, without a hand or a map."""
 
 from collections.abc import Callable
 from time import process_time
@@ -10,9 +10,9 @@ from models.mocap.clip import Clip, pose_difference
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
-SECONDS = 20.0  # followed
-FALLEN = 1.0  # m between the root and its reference
-FEASIBLE, LEAPING = 0.05, 0.12  # body weights RMS that are bearable, of gaits and gestures, and of jumps and fights
+SECONDS = 20.0  # default duration of a trial
+FALLEN = 1.0  # distance of the root from its reference that counts as a fall [m]
+FEASIBLE, LEAPING = 0.05, 0.12  # acceptable RMS residual [body weights] of gaits and gestures; of jumps and fights
 
 
 class Followed(NamedTuple):
@@ -23,11 +23,11 @@ class Followed(NamedTuple):
     residual : float
         RMS of the residual force while the reference stands [body weights].
     fell : float or None
-        When it first fell, or its root was `FALLEN` from its reference [s].
+        Time at which it first fell, or its root was `FALLEN` from its reference [s]; None if it did not fall.
     seconds : float
-        For how long it was to follow [s].
+        Duration of the trial [s].
     cost : float
-        Processor time of simulating a second [s].
+        Processor time per simulated second [s/s].
     """
 
     residual: float
@@ -37,22 +37,22 @@ class Followed(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not fall, with a residual that is bearable."""
+        """Whether it did not fall and its residual is at most `LEAPING`."""
         return self.fell is None and self.residual <= LEAPING
 
     def __str__(self) -> str:
-        """In percent, with the time of the fall in brackets."""
+        """Residual in percent, with the time of a fall in brackets."""
         return f"{100 * self.residual:.1f}" + ("" if self.fell is None else f" [{self.fell:.1f} s]")
 
     def line(self) -> str:
-        """In words."""
+        """The result in words."""
         lacks = f"{100 * self.residual:.1f} % of weight"
         if self.fell is not None:
             return f"the physical figure falls at {self.fell:.1f} s, with a residual of {lacks} up to then"
         return f"the physical figure follows it for {self.seconds:.0f} s with a residual of {lacks}"
 
     def faults(self, leaps: bool) -> tuple[str, ...]:
-        """What is not within bounds, of a clip that leaves the floor or does not."""
+        """Faults, a line each; `leaps` says whether the clip has flights, which raises the bound of the residual."""
         bound = LEAPING if leaps else FEASIBLE
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
@@ -64,7 +64,7 @@ class Followed(NamedTuple):
 def followed(
     clip: Clip, seconds: float = SECONDS, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> Followed:
-    """Let the physical figure follow a clip; `ready` is called with what is to be compiled for it."""
+    """Let the physical figure follow a clip; `ready` is called with the compilation units that this needs."""
     began = process_time()
     motion = tracked_motion(clip, seconds, TrackingConfig(), ready)
     cost = (process_time() - began) / seconds

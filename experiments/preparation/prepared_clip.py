@@ -1,4 +1,4 @@
-"""The door for runs: foreign motion files as well-formed clips, prepared once and kept."""
+"""Prepared clips for runs: foreign motion files are prepared once and cached."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from models.mocap.library import Loaded, load
 from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 
-_CODE = "models.mocap.preparation.prepare"  # what prepares: by it, and all that it reaches, clips are kept
+_CODE = "models.mocap.preparation.prepare"  # a change of this module, or of any that it imports, invalidates the cache
 
 
 class PreparedClip(NamedTuple):
@@ -23,9 +23,9 @@ class PreparedClip(NamedTuple):
     Attributes
     ----------
     clip : Clip
-        Well-formed, or as the file has it where it is on the figure's own skeleton.
+        The prepared clip; unchanged if the file is on the figure's own skeleton.
     remarks : tuple of str
-        What the file was taken for and what was done with it, a line each.
+        How the file was interpreted and what was done with it, a line each.
     """
 
     clip: Clip
@@ -33,9 +33,9 @@ class PreparedClip(NamedTuple):
 
 
 def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedClip]:
-    """The motions in files, prepared side by side; what `write_bvh` wrote is taken as it is, and so is all if `raw`.
+    """The motions in files, prepared in parallel; files of `write_bvh` are taken unchanged, and all files if `raw`.
 
-    Prepared clips are kept under a hash of the captured poses and of the code that prepares them.
+    Prepared clips are cached under a hash of the captured poses and of the code that prepares them.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class _Capture(NamedTuple):
         return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks)
 
     def _found(self) -> Array:
-        from models.mocap.preparation.prepare import prepared  # brings signal processing with it
+        from models.mocap.preparation.prepare import prepared  # imported late: loads signal processing
 
         with working(f"preparing {self.path.name}"):
             made = prepared(self.path)

@@ -1,1 +1,1 @@
-"""From a configuration to the parts of a run."""
+"""Set-ups (composition root): make the parts of a run from its configuration."""

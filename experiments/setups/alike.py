@@ -1,9 +1,8 @@
-"""Whether clips move alike, so that a mean of them is a motion: if not, a blend has the legs and trunk of one.
+"""Test whether clips are similar enough to be blended as a whole; otherwise a map plays the legs and trunk of one clip.
 
-A mean of a walk, a kick and a dance plants a foot where one of them stands while another one steps: corrected feet
-skate, and no floor gives the forces that the mean asks for. So the middle of a map is held against its clips, as it
-would be played: what floor contact lacks of its forces by inverse dynamics, and how far points of its soles move in a
-stance.
+The mean of a walk, a kick and a dance plants a foot where one clip stands while another one steps: corrected feet
+skate, and floor contact cannot give the forces that the mean needs. So the animation in the middle of a map is compared
+with its clips in two measures: the residual force by inverse dynamics, and the foot skate during stance.
 """
 
 from collections.abc import Sequence
@@ -21,24 +20,24 @@ from models.mocap.clip import Clip
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
-LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] more than the clips' median: from there on they do not move alike
-_ON_FLOOR = 0.015  # [m]: what is higher does not rub, as in `well_formed`
+LACKS, SKATES = 0.06, 0.02  # [body weights] RMS, [m] above the clips' median: from there on clips count as different
+_ON_FLOOR = 0.015  # [m]: a higher contact point does not skate, as in `well_formed`
 _FPS = 60.0
 _TRUNK = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
 
 
 class Motion(NamedTuple):
-    """What a motion lacks.
+    """Measures of a motion's faults.
 
     Attributes
     ----------
     residual : float
         RMS of the force that floor contact cannot give, by inverse dynamics [body weights].
     lowest : float
-        Lowest point of the soles [m].
+        Height of the lowest point of the soles [m].
     skate, furthest : float
-        How far a point of a sole moves in a stance: 95th percentile and largest [m].
+        Distance by which a point of a sole moves in a stance: 95th percentile and largest [m].
     """
 
     residual: float
@@ -48,13 +47,13 @@ class Motion(NamedTuple):
 
 
 def upper_joints(legs: Sequence[Limb]) -> list[int]:
-    """Joints of the figure that are not its legs', counted from 1."""
+    """Joints of the figure that do not belong to its legs, counted from 1."""
     return sorted(set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs)))
 
 
 def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
     """Measure a motion (n, 75); its residual is 0 without `dynamics`."""
-    # They bring signal processing with them, which a run whose map is known does not need.
+    # Imported here: they load signal processing, which a run with cached results does not need.
     from models.mocap.preparation.feasible import contact_residual
     from models.mocap.preparation.poses import smoothed, sole_points
     from models.mocap.preparation.stances import stances
@@ -73,9 +72,9 @@ def motion_of(poses: Array, fps: float, dynamics: bool = True) -> Motion:
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:
-    """Whether the middle of a map lacks little more than its clips do at the median; needs compiled code.
+    """Whether residual and foot skate in the middle of a map are little above the median at its corners.
 
-    What was found once is kept beside the compiled code.
+    Needs compiled code; the measures are cached beside it.
     """
 
     def find() -> Array:
@@ -87,7 +86,7 @@ def moves_alike(made: Cylindrical, lap: float) -> bool:
 
 
 def carries_alike(made: Composite, lap: float) -> bool:
-    """Whether legs of a composite map lack little more under the upper bodies of other clips than under their own."""
+    """Whether the legs of a composite map need little more residual under other clips' upper bodies than their own."""
     lower = made.clips[0]
     own = Composite(lower, lower, lower, made.upper_joints, made.r_range, made.limbs, made.lap)
 
@@ -102,7 +101,7 @@ def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: fl
     """Measure a lap [s] of a map round a circle, at shares `place` of its domain in r and z; needs compiled code."""
     (r_low, r_high), (z_low, z_high) = made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)
     rows = max(64, round(_FPS * lap))
-    # A lap ends where it began, as a closed clip does: without its last pose it would be taken for one that stops.
+    # The last pose repeats the first, as in a closed clip: without it the motion would be taken for one that stops.
     angles, r = 2.0 * np.pi * np.arange(rows + 1) / rows, r_low + place[0] * (r_high - r_low)
     stylus, poses = np.zeros((rows + 1, 7)), np.empty((rows + 1, made.nq))
     stylus[:, 0], stylus[:, 1] = r * np.cos(angles), r * np.sin(angles)

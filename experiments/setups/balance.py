@@ -1,13 +1,13 @@
-r"""Blends that stand on their feet: the root of a map's in-betweens sways so that the zero-moment point is supported.
+r"""Balanced blends: the root of a map's in-betweens sways so that the zero-moment point lies within the support.
 
-A mean of motions that are each balanced is not: its weight is where the clips' weights are on average, and so are its
-feet, but not the foot that happens to stand. At every mixture of the clips the zero-moment point p of a lap is held
-against the nearest supported point p* of the floor (`models.mocap.authoring.balance`), and the root is moved by the
-sway δ of the cart-table model (Kajita et al. 2003), which for a lap is solved harmonic by harmonic:
+A mean of balanced motions is not balanced: its centre of mass and its feet are at the means of the clips', but the
+stance foot need not be under the zero-moment point. For every mixture of the clips the zero-moment point p of a lap is
+compared with the nearest supported point p* of the floor (`models.mocap.authoring.balance`), and the root is moved by
+the sway δ of the cart-table model (Kajita et al. 2003), solved for a periodic lap harmonic by harmonic:
 
 .. math:: \hat\delta = \widehat{(p^* - p)} / (1 + h \omega^2 / g)
 
-What the clips themselves are out of balance is left to their blends: a clip alone does not sway.
+The clips' own imbalance, interpolated by the weights of the mixture, is not corrected: a clip alone does not sway.
 """
 
 from typing import NamedTuple
@@ -26,16 +26,28 @@ from sim.reference.reference import poses_along
 
 Mask = npt.NDArray[np.bool_]
 
-_ROWS = 96  # of a lap
+_ROWS = 96  # samples of a lap
 _ROUNDS = 3
 _CUTOFF = 6.0  # highest frequency of the sway [Hz]
-_TOUCH = 0.008  # a contact point so near the floor can push [m]
-_SHARE = 0.6  # of the support, about its middle, in which the zero-moment point is asked to lie
-_FARTHEST = 0.2  # sway at most [m]
+_TOUCH = 0.008  # height below which a contact point counts as support [m]
+_SHARE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
+_FARTHEST = 0.2  # largest sway [m]
 
 
 class Laps(NamedTuple):
-    """Laps of k motions: zero-moment points (k, n, 2), load (k, n), contact points (k, n, 8, 3), mean height."""
+    """Dynamics of laps of k motions.
+
+    Attributes
+    ----------
+    zmp : Array, shape (k, n, 2)
+        Zero-moment points on the floor [m].
+    load : Array, shape (k, n)
+        Vertical force in body weights.
+    contacts : Array, shape (k, n, 8, 3)
+        Lowest points of the feet's contact spheres [m].
+    height : float
+        Mean height of the centre of mass [m].
+    """
 
     zmp: Array
     load: Array
@@ -44,16 +56,16 @@ class Laps(NamedTuple):
 
 
 def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
-    """The same map with a root that sways between the clips; what was found once is kept beside the compiled code.
+    """The same map with a root that sways between the clips; the result is cached beside the compiled code.
 
     Parameters
     ----------
     haptic_map : Cylindrical
-        With limbs.
+        Map with limbs.
     figure : mujoco.MjModel
-        Whose poses they are, alone.
+        Model of the figure alone.
     lap : float
-        Time of a lap [s].
+        Duration of a lap [s].
     """
     shape = (_ROWS, len(haptic_map.mixtures), 2)
     model = np.empty(mujoco.mj_sizeModel(figure), dtype=np.uint8)
@@ -67,7 +79,7 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
 def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
     weights = haptic_map.mixtures
     corners = weights.argmax(axis=0)
-    # The laps begin a row before the seam, so they are measured in the second one.
+    # The poses begin one row before the seam, so the rows measured lie in the map's second lap.
     turn = -np.outer(weights @ haptic_map.drifts[:, 2], 1.0 + np.arange(_ROWS) / _ROWS)
     sway = np.zeros((_ROWS, len(weights), 2))
     for k in range(_ROUNDS):
@@ -85,16 +97,16 @@ def _sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Array:
 
 
 def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
-    """Points of the support nearest to points on the floor.
+    """Points of the support polygon nearest to points on the floor.
 
     Parameters
     ----------
     point : Array, shape (..., 2)
-        [m].
+        Points on the floor [m].
     contacts : Array, shape (..., c, 3)
-        Lowest points of the contact spheres [m]; those near the floor span the support.
+        Lowest points of the contact spheres [m]; those near the floor span the support polygon.
     share : float
-        How far the support is shrunk towards its middle.
+        Factor by which the polygon is scaled about its middle.
 
     Returns
     -------
@@ -104,13 +116,13 @@ def nearest_supported(point: Array, contacts: Array, share: float) -> Array:
     touching = contacts[..., 2] < _TOUCH
     count = touching.sum(axis=-1)[..., None]
     middle = (contacts[..., :2] * touching[..., None]).sum(axis=-2) / np.maximum(count, 1)
-    # What does not touch is put where the middle is, so that every point has as many corners.
+    # Points that do not touch are put at the middle, so that every polygon has the same number of corners.
     corners = np.where(touching[..., None], share * (contacts[..., :2] - middle[..., None, :]), 0.0)
     corners += middle[..., None, :] - point[..., None, :]
     angles = np.sort(np.arctan2(corners[..., 1], corners[..., 0]), axis=-1)
     gaps = np.diff(angles, axis=-1, append=angles[..., :1] + 2.0 * np.pi)
     free = (gaps.max(axis=-1) < np.pi) | (count[..., 0] == 0)
-    # Outside a convex hull, the nearest of the segments between any two of its points is an edge.
+    # From outside a convex hull, the nearest of all segments between two of its points is an edge.
     first, second = np.triu_indices(contacts.shape[-2], 1)
     start, along = corners[..., first, :], corners[..., second, :] - corners[..., first, :]
     length = np.maximum((along**2).sum(axis=-1), 1e-12)
@@ -129,7 +141,7 @@ def _laps(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
 
 
 def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
-    """Dynamics of laps of poses (k, n + 2, 75) at equal steps of time [s], with one before and one after each lap."""
+    """Dynamics of laps of poses (k, n + 2, 75) a time `step` [s] apart, with one pose before and one after each lap."""
     data = mujoco.MjData(figure)
     feet = [figure.geom(name).id for name in FOOT_CONTACTS]
     k, n = poses.shape[:2]
@@ -159,7 +171,7 @@ def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
 
 
 def sway_of(error: Array, height: float, lap: float) -> Array:
-    """Sway (n, …) that moves the zero-moment point of a lap by `error` (n, …), of a body so high [m]: cart-table."""
+    """Sway (n, …) that moves the zero-moment point of a lap by `error` (n, …): cart-table model of `height` [m]."""
     frequency = np.arange(len(error) // 2 + 1) / lap
     spectrum = np.fft.rfft(error, axis=0)
     spectrum[frequency > _CUTOFF] = 0.0

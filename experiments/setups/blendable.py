@@ -1,4 +1,4 @@
-"""What clips cannot be blended with others, or changed over to half way, and why: flights and somersaults."""
+"""Which clips cannot be blended with others, because of long flights or somersaults, and which laps suit clips."""
 
 from collections.abc import Sequence
 
@@ -10,11 +10,11 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.clip import Clip
 from models.mocap.preparation.poses import sole_points
 
-FLIES = 0.02  # [m] over the floor: a figure whose soles are all higher flies
-LONGEST_FLIGHT = 0.3  # [s], 11 cm high: a mean with a motion on the floor is neither a flight nor a step
-UPRIGHT = -0.5  # least vertical component of the pelvis axis: who kicks high leans by up to 97°, a cartwheel by 149°
-FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # of one that flies: it asks for 0.8 to 1.2 of gravity
-SLOWEST, FASTEST = 0.75, 1.33  # of a clip's own pace: forces of what moves go with its square, 0.56 to 1.8
+FLIES = 0.02  # [m] over the floor: if both soles are higher, the figure is in flight
+LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
+UPRIGHT = -0.5  # least vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°
+FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same of clips with flights: these need 0.8 to 1.2 of gravity
+SLOWEST, FASTEST = 0.75, 1.33  # played pace over own: inertial forces go with its square, 0.56 to 1.8
 
 
 def longest_flight(clip: Clip) -> float:
@@ -35,7 +35,7 @@ def same(clips: Sequence[Clip]) -> bool:
 
 
 def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
-    """Which of different clips cannot be blended with the others, a line each; none if they are one and the same."""
+    """Remarks on clips that cannot be blended with the others, a line each; none if all clips are the same."""
     if same(clips):
         return ()
     found: list[str] = []
@@ -50,16 +50,16 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
 
 
 def grounded(clips: Sequence[Clip]) -> int:
-    """The clip by whose legs a lap is timed, counted from 0: the first that stays on the floor, or else the first.
+    """Index of the clip that times the lap: the first without a flight, or else the first.
 
-    Whose legs carry the arms of others is found with the physical figure (`carried`); arms move the centre of mass, so
-    flights of a clip are ballistic with its own arms alone.
+    Which clip's legs carry the arms of the others is found with the physical figure (`carried`): arms move the centre
+    of mass, so flights of a clip are ballistic only with its own arms.
     """
     return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
 
 
 def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
-    """Whether a lap [s] plays all clips near enough to their own pace for a mean of them; closer where one flies."""
+    """Whether a lap [s] plays all clips near enough to their own pace to be blended; nearer if one has flights."""
     paces = [loop.duration / lap for loop in loops]
     flies = any(longest_flight(clip) > 0.0 for clip in clips)
     slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if flies else (SLOWEST, FASTEST)
@@ -67,12 +67,12 @@ def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool
 
 
 def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
-    """Loops with one of them first."""
+    """The loops, reordered to begin with the one of index `first`."""
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> tuple[str, ...]:
-    """Which clips a lap [s] plays much faster or slower than they are, as loops that are played `in_step`."""
+    """Remark on clips that a lap [s] plays much faster or slower than their own pace, as loops made by `in_step`."""
     paces = {clip.name: loop.duration / lap for clip, loop in zip(clips, loops, strict=True)}
     off = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
     if not off:

@@ -1,13 +1,14 @@
-r"""The energy that the field of a run may inject: the certificate's power, and what its springs hold.
+r"""Energy tank of a run: the power and energy that its field may inject.
 
-A tank is such that a run as it is meant never empties it, and that a wrong or late law does.
+The tank is dimensioned so that a run as intended never empties it, and a wrong or late law does.
 
 .. math:: P = \tfrac14 b_d |\dot\varphi|^2_{max}
 
-is what the damper of a river injects at most (see `controllers.certificates.loop.energy`), the sum of it for several
-rivers. The tank holds at first what the springs give to a hand that begins at the edge of the map's domain, and at most
-what they hold with the limiter's force: that is what a hand that has drawn them gets back. Of a field that is not known
-here the limiter's force and the curve's pace bound the power, and its force across the workspace the store.
+is the largest power that the damper of a river injects (see `controllers.certificates.loop.energy`); for several rivers
+the powers add. Initially the tank holds the energy that the springs give to a hand that begins at the edge of the map's
+domain; its capacity is the energy of the springs drawn with the limiter's force, which a hand that has drawn them gets
+back. For an unknown field, the limiter's force times the curve's pace bounds the power, and the limiter's force across
+the workspace bounds the energy.
 """
 
 from collections.abc import Sequence
@@ -18,28 +19,28 @@ from controllers.curves.trajectory import Trajectory
 from controllers.safety.energy_tank import EnergyTank, spring_store
 from controllers.safety.limiter import ForceLimiter
 
-SPAN = 0.2  # [m] through which a spring can be drawn: across the workspace
-_LEAST = 1e-3  # [W], [J] for a field without springs or dampers, whose work is measured by encoders that round
-_SAMPLES = 512  # of a curve, in the search for its fastest place
+SPAN = 0.2  # [m] by which a spring can be drawn: the width of the workspace
+_LEAST = 1e-3  # [W], [J] for a field without springs or dampers: quantised encoders falsify the measured work
+_SAMPLES = 512  # samples of a curve in the search for its greatest speed
 
 
 def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float, limiter: ForceLimiter) -> EnergyTank:
-    """Tank of a power [W] and of springs.
+    """Energy tank for dampers of a given power and for springs.
 
     Parameters
     ----------
     power : float
-        What dampers inject [W].
+        Largest power that dampers inject [W].
     springs : sequence of (float, float)
-        Stiffness [N/m] and reach [m] of each.
+        Stiffness [N/m] and reach [m] of each spring.
     start : float
         Distance [m] from the curve within which hands begin.
     limiter : ForceLimiter
-        What the device may be asked for.
+        Bounds the force of the device.
     """
     stores = (sum(_store(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
     power, capacity, initial = (max(number, _LEAST) for number in (power, *stores))
-    # In this time a full tank may be emptied, at any servo period.
+    # The fourth argument is the time in which a full tank may be emptied [s]: two servo periods at least.
     return EnergyTank(limiter.period, power, capacity, max(0.05, 2.0 * limiter.period), initial)
 
 

@@ -14,13 +14,16 @@ from experiments.setups.parts import ClipMapParts, Notes, Parts
 
 
 def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:
-    """Parts of a run in the mode "bunny"; its spring is carried along, min(k_r δ e^{-1/2}, F_p) |φ̇| besides."""
+    """Parts of a run in the mode "bunny".
+
+    Besides its damper, the moving spring injects at most min(k_r δ e^{-1/2}, F_p) |φ̇|, with the limiter's peak F_p.
+    """
     course, width = maps.curve, mode.bunny_width
     bunny = BunnyLaw(course, mode.stiffness, mode.damping, width, mode.bunny_attraction, mode.bunny_pace)
     law, urged = governed(mode.governor, bunny, course, maps)
     pace, force = fastest(course), ForceLimiter(config.clock.servo_period).peak
     power = river_power(mode.damping, pace) + pace * min(mode.stiffness * width * np.exp(-0.5), force)
-    # ∫ k s exp(−s²/2δ²) ds = k δ² is what a spring of reach √2 δ holds.
+    # The attractor's potential, ∫ k s exp(−s²/2δ²) ds = k δ², is the energy of a linear spring of reach √2 δ.
     springs = ((mode.stiffness, np.sqrt(2.0) * width),)
     return fixed_curve_parts(
         config, mode, maps, FixedField(law, course, power, springs, Notes("BUNNY", maps.reach), urged)

@@ -1,11 +1,11 @@
-r"""Whose legs and trunk carry the arms of others where clips move differently, and how much of these they bear.
+r"""Choice of the clip whose legs and trunk the map plays where clips move too differently to be blended as a whole.
 
-A kick is balanced by the arms of its own clip, and a flight is ballistic with them alone. What legs bear is found by
-simulation: the physical figure follows what the map shows while a hand wanders through the whole of its
-domain and pushes, over the legs of each clip in turn. The first that carry them well are taken, for who names a walk
-first wants to walk, or else the best. Where the figure falls with the best of them, or lacks more than it may, the
-others' arms are blended into their own by a smaller share λ, down to none: then the clip goes alone. Legs that slide,
-sink or bend beyond their ranges are taken only where the others do not stand, and what none bears is said.
+Only arms and head are then blended. A kick is balanced by the arms of its own clip, and a flight is ballistic only with
+them, so simulation decides: for the legs of each clip in turn, the physical figure follows the map's animation while a
+hand wanders through the whole domain and pushes. The first clip in the user's order that is followed well is taken, or
+else the best one. If the figure falls with the best, or its residual is too large, the other clips' arms are blended in
+with a smaller share λ, down to 0, where the clip plays alone. Legs that skate, penetrate the floor or exceed joint
+ranges are tried last. If nothing is followed well enough, a remark says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,32 +26,32 @@ from sim.compilation.sources import kept_folder
 from sim.reference.reference import poses_along
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
-WELL = 0.06  # [body weights] RMS: half of that, with which the first clip that was named is not passed over
-SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # [m], [m], [rad]: what legs may do at most
+WELL = 0.06  # [body weights] RMS residual, half of `verdict.BEARABLE`: up to this the first clip is taken at once
+SINKS, SKATES, BEYOND = 0.01, 0.02, np.deg2rad(5.0)  # largest floor penetration [m], foot skate [m], excess angle [rad]
 _SECONDS, _FPS = 20.0, 120.0
-_PUSHED = 0.17  # of the domain: 2.5 N against 300 N/m, in 50 mm
-_EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and in which one has moved the hand
+_PUSHED = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, in 50 mm
+_EVERY, _WITHIN = 1.7, 0.15  # [s] between pushes, and time in which a push moves the hand
 
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
 def verdict_on(made: Cylindrical | Composite, lap: float) -> Verdict:
-    """Let the physical figure follow a map about a circle for 20 s, and keep how; needs compiled code."""
+    """How the physical figure follows a map about a circle for 20 s; cached, and needs compiled code."""
     made_of = (made.compiled().params, np.array([lap, *_domain(made).ravel()]))
     return tried(__name__, lambda: toured(made, lap), _SECONDS, made_of)
 
 
 def _domain(made: Cylindrical | Composite) -> Array:
-    """Intervals of r and z [m] that a hand goes through."""
+    """Intervals of r and z [m] that the hand passes through."""
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
 
 
 def toured(made: Cylindrical | Composite, lap: float) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, and is pushed out and in on its way.
 
-    It keeps its pace where it wanders. A push leaves the field's speed over the ground as it is, so that a hand that is
-    pushed from radius R to r goes round at R/r of its pace, as in FOLLOW.
+    The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
+    so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
     turn, pushed = 2.0 * np.pi * times / _SECONDS, _PUSHED * push_profile(times)
@@ -69,14 +69,17 @@ def toured(made: Cylindrical | Composite, lap: float) -> Clip:
 
 
 def push_profile(times: Array) -> Array:
-    """How a hand is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
+    """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
     phase = times / _EVERY % 2.0
     ramp = np.clip(np.minimum(phase, 2.0 - phase) * _EVERY / _WITHIN, 0.0, 1.0)
     return np.asarray(ramp**2 * (3.0 - 2.0 * ramp) * np.where(times // (2.0 * _EVERY) % 2.0 == 0.0, 1.0, -1.0))
 
 
 def sound(made: Cylindrical | Composite, lap: float) -> bool:
-    """Whether soles do not sink or skate, and joints stay about within their ranges; kept, and needs compiled code."""
+    """Whether soles neither penetrate the floor nor skate, and joints stay within ranges, all within tolerances.
+
+    The result is cached; needs compiled code.
+    """
 
     def find() -> Array:
         poses = toured(made, lap).poses
@@ -89,18 +92,18 @@ def sound(made: Cylindrical | Composite, lap: float) -> bool:
 
 
 def carried(make: Callable[[int], Carrying], names: Sequence[str], lap: float) -> tuple[Carrying, tuple[str, ...]]:
-    """The map whose legs carry the others' arms, and what is to be said of it; needs compiled code.
+    """The map with the legs that best carry the other clips' arms, and remarks; needs compiled code.
 
     Parameters
     ----------
     make : callable
-        Makes the map, a Cylindrical or Composite, that has the legs of the clip of a number.
+        Makes the map, a Cylindrical or Composite, with the legs of the clip of a given index.
     names : sequence of str
-        Of the clips whose legs it may have.
+        Names of the clips whose legs it may have.
     lap : float
-        [s].
+        Duration of a lap [s].
     """
-    owned = cache(make)  # made when they are asked for: most often the first carries well
+    owned = cache(make)  # made on demand: most often the first clip will do
 
     @cache
     def fit(i: int) -> bool:

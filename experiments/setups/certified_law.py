@@ -1,6 +1,6 @@
-"""Laws of force of a run as certificates take them, and how it leads along its curve, by mode.
+"""Laws of force and gains of a run in the form that certificates take, by mode.
 
-Light to import, as what certificates are checked by is.
+Imports only configurations, since certificates import it.
 """
 
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from experiments.setups.defaults import resolved, river_gains, tube_gains
 
 
 class CertifiedLaw(NamedTuple):
-    """A law of force that a run uses: its name among `controllers.certificates.loop.laws.LAWS`, and its gains.
+    """A law of force that a run uses, with its gains.
 
     Attributes
     ----------
     law : str
-        Name.
+        Name among `controllers.certificates.loop.laws.LAWS`.
     stiffness, damping : float
         [N/m], [N s/m].
     width : float
@@ -32,7 +32,7 @@ class CertifiedLaw(NamedTuple):
 
 
 Laws = dict[str, CertifiedLaw]
-"""By what is added to the names of their verdicts; that of the run's start by ""."""
+"""Laws by the suffix of their verdicts' names; the law of the run's start has the suffix ""."""
 _ANY = float("inf")
 
 
@@ -50,18 +50,18 @@ def leading_gains(config: RunConfig) -> tuple[float, float]:
 
 
 def governor_drag(config: RunConfig) -> float:
-    """Drag [N s/m] of the governor that a run's law is added to; 0 without one, and where rivers are gated instead."""
+    """Drag [N s/m] of the governor that is added to a run's law; 0 without one, and where rivers are gated instead."""
     governor = getattr(config.mode, "governor", None)
     return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
 
 
 def of_clips(config: RunConfig) -> bool:
-    """Whether the certificate of a field is of clips, too: a figure that is led, a map's file, a governor or walls."""
+    """Whether the certificate depends on clips too: a led figure, a map from a file, a governor, gates or walls."""
     return config.map.kind in ("led", "file") or governor_drag(config) > 0.0 or bool(left_out(config))
 
 
 def left_out(config: RunConfig) -> tuple[str, ...]:
-    """What a run executes besides its certified laws, and no certificate covers; in words."""
+    """Names of what a run executes besides its certified laws and no certificate covers."""
     mode = config.mode
     names: list[str] = []
     if getattr(mode, "walls", None) is not None:
@@ -76,7 +76,7 @@ def _follow(mode: Follow | StretchThenFollow) -> Laws:
 
 
 def _bunny(mode: Bunny) -> Laws:
-    """Near a bunny that pulls along the curve the field is FOLLOW's, to first order."""
+    """Near a bunny that pulls along the curve, the field is that of FOLLOW to first order."""
     along = mode.bunny_attraction == "along"
     k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
     return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _ANY if along else width)}
@@ -96,7 +96,7 @@ def _stretch(mode: Stretch | StretchThenFollow) -> Laws:
 
 
 def _stretch_then_follow(mode: StretchThenFollow) -> Laws:
-    """Likewise, and the performance of the curve as it was before it was bent."""
+    """As `_stretch`, and FOLLOW on the curve as it was before bending."""
     return _stretch(mode) | {"_then": _follow(mode)[""]}
 
 

@@ -1,4 +1,4 @@
-"""Clips of a run: embedded ones by name, others from files."""
+"""Loading the clips of a run: embedded clips by name, others from motion files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,14 +11,14 @@ from models.mocap.library import embedded, embedded_names
 
 
 def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
-    """Clips by name or file, and what has to be said about them.
+    """Load clips by name or file; returns them and remarks about them.
 
     Parameters
     ----------
     names : sequence of str
-        Of embedded clips, or motion files.
+        Names of embedded clips, or paths of motion files.
     raw : bool
-        Take motion files as captured; else they are prepared, once for each content (`prepared_clips`).
+        Take motion files as captured; otherwise they are prepared, once for each content (`prepared_clips`).
 
     Raises
     ------
@@ -34,7 +34,7 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
 
 
 def only(clips: tuple[Clip, ...]) -> Clip:
-    """The one clip of a run that takes one.
+    """The single clip of a run that takes exactly one.
 
     Raises
     ------

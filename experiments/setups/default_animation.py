@@ -1,4 +1,4 @@
-"""The animation of a run's curve as it was given, beside which the edited one is held."""
+"""The default animation: that of the unedited curve, with which the edited one is compared."""
 
 from collections.abc import Callable
 
@@ -13,9 +13,9 @@ from sim.reference.reference import make_reference, poses_along, reference_along
 
 
 def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
-    """The map at nearest points (k, 3) of phases (k,) on rivers (k,), as a function from these to poses.
+    """A function from nearest points (k, 3), phases (k,) and rivers (k,) to poses (k, 75) of the default animation.
 
-    Called with rows in the order of time, `stride` figure updates apart.
+    It is called with rows in the order of time, `stride` figure updates apart.
     """
     if session.parts.maps.plays_rivers:
         return _clips_of_rivers(session, stride)
@@ -32,7 +32,7 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
 
 
 def _clips_of_rivers(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
-    """Likewise where rivers play clips, which go over into each other as they did for the figure."""
+    """Likewise where each river plays a clip of its own, with the transitions between clips that the figure had."""
     period = stride * session.servo.figure_ticks * session.servo.plant.period
     compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.figure
     reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))

@@ -1,6 +1,6 @@
-"""What the parts of a configuration leave to each other: gains by the kind of map.
+"""Default gains of a mode that depend on the kind of map.
 
-Light to import, as what certificates are checked by is.
+Imports only configurations, since certificates import it too.
 """
 
 from dataclasses import replace
@@ -10,13 +10,13 @@ from experiments.config.run_config import RunConfig
 
 RIVER_GAINS = {"default": (150.0, 16.0), "file": (50.0, 20.0)}
 """k_r [N/m] and b_d [N s/m] of the rivers about a circle, and of a map from a file."""
-# Those of a map lie side by side: a hand that goes over from one to the other is drawn within τ = b_d/k_r, or the
-# figure would have to be at the other clip's speed at once.
+# Rivers of a map from a file lie side by side. A larger τ = b_d/k_r draws a hand over from one to the other more
+# slowly; otherwise the figure would have to reach the other clip's speed at once.
 SEARCH = {"default": (150.0, 14.0), "file": (50.0, 20.0)}
 """k_f [N/m] and damping [N s/m] of stretchy tubes."""
 # About a circle an edit that is undone takes the hand along in a tenth of a second, not in a fortieth. On a map from a
-# file the search is as soft as rivers there are: what the hand does, the figure has to do, and curves that are near
-# each other hold different motions.
+# file the seeking spring is as soft as the rivers there: the figure follows every movement of the hand, and
+# neighbouring curves hold different motions.
 _SEARCHED = ("seek", "tube_damping")
 _OPEN = {
     "rivers": (("stiffness", "damping"), RIVER_GAINS),
@@ -26,7 +26,7 @@ _OPEN = {
 
 
 def resolved(config: RunConfig) -> RunConfig:
-    """A configuration with all that its parts leave open written out."""
+    """A configuration with the gains that it leaves open filled in."""
     left: dict[str, float] = {}
     if config.mode.kind in _OPEN:
         names, values = _OPEN[config.mode.kind]
@@ -36,12 +36,12 @@ def resolved(config: RunConfig) -> RunConfig:
 
 
 def river_gains(mode: Rivers) -> tuple[float, float]:
-    """k_r [N/m] and b_d [N s/m], by default those of rivers about a circle."""
+    """k_r [N/m] and b_d [N s/m] of rivers; what is not set has the default about a circle."""
     stiffness, damping = RIVER_GAINS["default"]
     return mode.stiffness or stiffness, mode.damping or damping
 
 
 def tube_gains(mode: Stretch | StretchThenFollow) -> tuple[float, float]:
-    """k_f [N/m] and damping [N s/m] of a tube, by default those about a circle."""
+    """k_f [N/m] and damping [N s/m] of a tube; what is not set has the default about a circle."""
     seek, damping = SEARCH["default"]
     return seek if mode.seek is None else mode.seek, damping if mode.tube_damping is None else mode.tube_damping

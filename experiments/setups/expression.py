@@ -1,4 +1,4 @@
-"""What turning the stylus does: the figure looks where it points and leans as it leans."""
+"""Expressive map of the figure: gaze and lean follow the orientation of the stylus."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from controllers.haptic_map.expressive import Expressive, ExpressiveJoint
 from models.humanoid.skeleton import BODIES, JOINTS, joint_range
 from sim.users.intent import Turn
 
-# Turn of a joint for a turn of the stylus about x (roll), y (pitch), z (yaw): gaze follows one to one, and the trunk
-# leads it as a person's does; roll leans the trunk only.
+# Share of the stylus's rotation about x (roll), y (pitch) and z (yaw) that each joint takes. In pitch and yaw the
+# shares add up to 1, so gaze follows one to one, with a leading trunk as in people; roll leans the trunk only.
 GAINS = {
     "abdomen": (0.3, 0.2, 0.1),
     "chest": (0.3, 0.2, 0.2),
     "head": (0.0, 0.6, 0.7),
 }
-LAP_ANGLE = 0.7  # of the hand that turns the stylus twice a lap [rad]
-MARGIN = np.deg2rad(3.0)  # of the joints' ranges that is kept: turns about different axes do not quite add
+LAP_ANGLE = 0.7  # angle by which the default hand turns the stylus, twice a lap [rad]
+MARGIN = np.deg2rad(3.0)  # kept from the joints' limits, since rotations about different axes do not quite add
 
 
 def expressive_figure(base: HapticMap) -> Expressive:
@@ -30,9 +30,9 @@ def expressive_figure(base: HapticMap) -> Expressive:
 
 
 def lap_turns(start: float, lap: float, way: int, angle: float = LAP_ANGLE) -> tuple[Turn, Turn]:
-    """A turn one way and one the other, by an angle [rad], in the lap that begins at a time [s].
+    """A turn by `angle` [rad] and one by its negative, in the lap that begins at `start` [s].
 
-    Way 0 is to the left and right, 1 down and up, 2 over to the right and left.
+    `way` chooses the axis: 0 yaws left and right, 1 pitches down and up, 2 rolls right and left.
     """
     axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))[way % 3]
     return Turn(start, 0.5 * lap, angle, axis), Turn(start + 0.5 * lap, 0.5 * lap, -angle, axis)

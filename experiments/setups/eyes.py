@@ -1,4 +1,8 @@
-"""What a person has learned of a figure: the poses of the motion that she has in mind, and of others near it."""
+"""A simulated person's internal model of the figure: its poses along the intended motion, and inverse Jacobians.
+
+From the pose of the figure that the person sees and from what her hand feels, she estimates the stylus's place relative
+to the motion that she has in mind (`sim.users.eye`).
+"""
 
 import numpy as np
 
@@ -12,22 +16,22 @@ from sim.users.eye import Eye
 from sim.users.participant import Participant
 from sim.users.wishes import ENGAGED, PLACE
 
-POSES = 128  # along a motion: some 3 degrees of a lap apart
-_BESIDE = 2e-3  # [m] by which the stylus is moved to learn what the figure does
-_BLIND = 0.15  # λ over the strongest effect of a movement on the figure: what shows less is felt rather than seen
+POSES = 128  # poses along a motion: some 3 degrees of a lap apart
+_BESIDE = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
+_BLIND = 0.15  # damping of the inverse over the largest singular value: weaker effects are felt rather than seen
 
 
 def with_eyes(servo: Servo, user: Participant, curve: Array) -> Servo:
-    """A servo whose person sees the figure that it shows.
+    """The servo with a person who sees the figure.
 
     Parameters
     ----------
     servo : Servo
-        Linked, of a figure whose map's argument is the stylus.
+        Linked servo of a figure whose map's argument is the stylus.
     user : Participant
-        Whose wishes are what she has in mind; where they are none, `curve` is.
+        The person; the places of her wishes are those that she has in mind, or `curve` if there are none.
     curve : Array
-        Places of the map's curve in H [m], shape (n, 3).
+        Points of the map's curve in H [m], shape (n, 3).
     """
     assert isinstance(servo.device, SimulatedPhantom)
     wishes = user.wishes
@@ -42,7 +46,7 @@ def with_eyes(servo: Servo, user: Participant, curve: Array) -> Servo:
 
 
 def learned_eye(servo: Servo, places: Array) -> Eye:
-    """Poses at places (n, 3) of the stylus, and damped inverses of how they change with it."""
+    """Poses at places (n, 3) of the stylus in H [m], and damped inverses of the map's Jacobian there."""
     reference = servo.reference
 
     def poses(points: Array) -> Array:

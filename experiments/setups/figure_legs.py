@@ -1,4 +1,4 @@
-"""The figure's legs, as limbs whose ends stay where they are put."""
+"""The figure's legs as limbs for the inverse kinematics of blends and steps."""
 
 import mujoco
 import numpy as np
@@ -18,12 +18,12 @@ def figure_legs(figure: mujoco.MjModel) -> tuple[Limb, ...]:
         first, second, third = (BODIES.index(body) for body in bodies)
         offsets = np.array([figure.body(body).pos for body in bodies])
         sole = np.array([figure.geom(name).pos for name in FOOT_CONTACTS if name.startswith(side)])
-        # Where a joint that is held comes to rest is its limit.
+        # A joint comes to rest half a margin beyond its soft limit, hence on the limit of its range.
         limits = joint_range()[[first - 1, second - 1, third - 1]] + 0.5 * MARGIN * np.array([1.0, -1.0])
         legs.append(Limb((first, second, third), offsets, np.array([0.0, 1.0, 0.0]), sole, limits))
     return tuple(legs)
 
 
 def packed_legs(figure: mujoco.MjModel) -> Array:
-    """`figure_legs` as those that step (`packed_steppers`), shape (2, 48)."""
+    """`figure_legs` packed for kernels that step (`packed_steppers`), shape (2, 48)."""
     return packed_steppers(figure_legs(figure))

@@ -1,4 +1,4 @@
-"""Haptic maps of the figure that a run makes from its clips, by kind."""
+"""Map parts by kind of map: cylindrical, composite, rivers' clips, and maps from files."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -49,18 +49,18 @@ from sim.world.world import phantom_angles
 
 AnyMap = Cylindrical | Composite | RiverClips | MapFile
 
-LIFTED_CARRY = 0.3  # of the default hand's ways on a lifted map, whose curves are near each other
+LIFTED_CARRY = 0.3  # factor on the default hand's distances on a lifted map, whose curves are near each other
 
 
 class Place(NamedTuple):
-    """Where a map of clips lies about its curve.
+    """The curve of a map of clips, and the map's domain about it.
 
     Attributes
     ----------
     curve : Trajectory
-        A lap about the z axis, timed as the hand is to move.
+        A lap about the z axis, with the timing that the hand is to have.
     radius : float
-        Of the middle of the map's domain [m].
+        Radius of the middle of the domain [m].
     reach : float
         Half width of the domain in radius and in height [m].
     expressive : bool
@@ -74,7 +74,7 @@ class Place(NamedTuple):
 
 
 def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
-    """Four clips at the corners of a cylinder; fewer are repeated.
+    """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMo
 
 
 def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel) -> ClipMapParts:
-    """The lower body of the first clip, the upper body blended between two more; fewer are repeated.
+    """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
 
     Raises
     ------
@@ -124,12 +124,12 @@ def composite_parts(clips: tuple[Clip, ...], place: Place, figure: mujoco.MjMode
 
 
 def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
-    """A map of one's own about a curve, which has no clips.
+    """Map parts of a user-defined map about a curve, without clips.
 
     Raises
     ------
     ParameterError
-        If its poses are not the figure's.
+        If its poses are not poses of the figure.
     """
     if haptic_map.nq != N_POSE:
         name = type(haptic_map).__name__
@@ -202,7 +202,7 @@ MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
     "rivers": _river_clips_parts,
     "file": _file_parts,
 }
-"""What each kind of map gives a run."""
+"""Functions that make the map's parts, by kind of map."""
 
 
 def _about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...]) -> ClipMapParts:
@@ -234,14 +234,17 @@ def _on_lifted(part: MapFile, made: Lifted, clips: tuple[Clip, ...]) -> ClipMapP
 
 
 def _motions(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:
-    """As many motions as a map takes, of clips that may be fewer."""
+    """Poses and frame rates of as many motions as a map takes; if there are fewer clips, they are repeated."""
     if not 1 <= len(clips) <= most:
         raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; name them with --clips")
     return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
 
 
 def _out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
-    """Whether a lap [s] of so many clips, fewer repeated, plays some too far from their pace if all step together."""
+    """Whether a lap [s] with all clips in step would play some of them too far from their own pace.
+
+    `count` is the number of clips that the map takes; if there are fewer, they are repeated.
+    """
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
     played = [i % len(clips) for i in range(count)]
     in_time = in_step([loops[i] for i in played], lap)
@@ -255,12 +258,12 @@ def _place(part: AnyMap) -> Place:
 
 
 def reached(curve: Trajectory) -> Trajectory:
-    """The curve, if the Phantom reaches it.
+    """The same curve, checked to lie within the Phantom's reach.
 
     Raises
     ------
     SimError
-        If it does not.
+        If the Phantom does not reach it.
     """
     for phase in np.linspace(curve.start, curve.end, 64):
         phantom_angles(curve.point(phase))
@@ -271,12 +274,12 @@ def _cylinder(
     clips: list[tuple[Array, float]], radii: tuple[float, float], heights: tuple[float, float], legs: tuple[Limb, ...],
     lap: float,
 ) -> CylindricalMap:  # fmt: skip
-    """The map of four clips; its corrections, once found, are kept beside the compiled code."""
+    """The map of four clips; its corrections are cached beside the compiled code."""
 
     def find() -> Array:
         return CylindricalMap(clips, radii, heights, legs, None, lap).corrections
 
-    # Where the clips blend is not among what they depend on.
+    # The corrections do not depend on the radii and heights between which the clips blend.
     made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
     folder = kept_folder(CylindricalMap.__module__)
     corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)

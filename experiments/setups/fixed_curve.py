@@ -1,4 +1,4 @@
-"""What modes whose curve stays have in common: the hand on it, and the moment, governor and walls that are added."""
+"""Parts common to the modes whose curve is not bent: the hand, the orientation moment, the governor and the walls."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,30 +20,30 @@ from experiments.setups.stylus import stylus_path
 from experiments.setups.walls import figure_walls
 from sim.users.intent import Push
 
-TUBE = 0.25  # [m] within which a moment turns the stylus, where the field has no tube of its own
+TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
 
 
 class FixedField(NamedTuple):
-    """A field over a curve that stays.
+    """A field over a curve that is not bent.
 
     Attributes
     ----------
     law : Law
-        Law of force, governed if it is.
+        Law of force, with the governor if there is one.
     course : Trajectory
-        Along which it leads.
+        Curve along which it leads.
     power : float
-        What its dampers inject [W].
+        Largest power that its dampers inject [W].
     springs : sequence of (float, float)
-        Stiffness [N/m] and reach [m] of what it holds.
+        Stiffness [N/m] and reach [m] of each of its springs.
     notes : Notes
-        What is said of it.
+        Titles and labels.
     urged : float
-        Speed to which a governor urges the hand [m/s].
+        Largest speed to which a governor urges the hand [m/s]; 0 without one.
     tube : float
-        ε, in which the moment turns the stylus [m].
+        ε, radius of the tube in which the orientation moment acts [m].
     pushes : tuple of Push, optional
-        Default of a hand that pushes.
+        Default pushes of a hand that pushes.
     """
 
     law: Law
@@ -57,7 +57,7 @@ class FixedField(NamedTuple):
 
 
 def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: ClipMapParts, field: FixedField) -> Parts:
-    """Parts of a run whose curve stays.
+    """Parts of a run whose curve is not bent.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def _traced(summary: RunSummary, of: Measuring) -> RunSummary:
 
 
 def with_walls(program: Program, walls: JointWalls | None, maps: ClipMapParts) -> Program:
-    """A field, and the walls of the figure's joints if the run has them."""
+    """A field, plus the soft walls of the figure's joints if the run has them."""
     if walls is None:
         return program
     made = figure_walls(maps.whole_map, walls.wall_stiffness, walls.wall_margin, walls.joint_speed)
@@ -92,7 +92,7 @@ def with_walls(program: Program, walls: JointWalls | None, maps: ClipMapParts) -
 
 
 def with_moment(program: Program, moment: OrientationMoment | None, course: Trajectory, tube: float) -> Program:
-    """A field, and the moment to the curve's orientation if the run has one.
+    """A field, plus the moment towards the curve's orientation if the run has one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How fast a stylus may go along a curve for the flights of the animation under it, and a field that says so."""
+"""Speeds along a curve at which the flights of its animation are ballistic enough, and a field that governs them."""
 
 from dataclasses import dataclass
 
@@ -15,17 +15,17 @@ from experiments.setups.parts import ClipMapParts
 from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 
-_FPS = 120.0  # of the animation whose flights are judged [1/s]
-_FASTEST = 10.0  # [m/s], for where nothing bounds the speed: no hand is faster
+_FPS = 120.0  # [1/s] frame rate of the animation whose flights are judged
+_FASTEST = 10.0  # [m/s], where nothing bounds the speed: no hand is faster
 
 
 def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> Clip:
-    """The animation h∘φ of one pass of a curve at the pace of the map's clips, in a map of rivers at that of its own.
+    """The animation h∘φ of one pass of a curve at the pace of the map's clips; on a river, at that of its own clip.
 
     Parameters
     ----------
     haptic_map : ClipMap
-        h, of the figure.
+        h, from stylus poses to poses of the figure.
     curve : Trajectory
         φ, in the hand frame H.
     river : int
@@ -46,17 +46,16 @@ def animation_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0) -> C
 def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course: Trajectory | None = None) -> Array:
     """Least and greatest speed [m/s] of a stylus along a curve, as `River.speeds` and `Governor` take them.
 
-    What is judged is the animation h∘φ that the map makes of the curve: the clip itself where the curve is in a place
-    of one clip only, and the blend, in the map's own time alignment, where it is between several. A blend that
-    never leaves the floor has no flight, whatever its clips do.
+    The animation h∘φ along the curve is judged: the clip itself where only one clip plays, and between clips their
+    blend, in the map's own time alignment. A blend that never leaves the floor has no flight, even if its clips do.
 
     Parameters
     ----------
     haptic_map, curve, river
-        Of `animation_along`.
+        As in `animation_along`.
     course : Trajectory, optional
-        The curve as a field leads along it, through the same samples at other times (`pace.course_of`); by default
-        as it is.
+        The curve along which a field leads, with the same samples at other times (`pace.course_of`); by default
+        the curve itself.
 
     Returns
     -------
@@ -79,16 +78,16 @@ def speeds_along(haptic_map: ClipMap, curve: Trajectory, river: int = 0, course:
     # |φ̇| when a pass takes as long as the clips do.
     recorded = np.linalg.norm(curve.velocity(phases), axis=1) * curve.duration
     low, high = clip_ballistics(clip).bounds.stylus_speed(share, recorded / clip.duration)
-    # What rises for ever falls at no rate: nothing can be asked of the hand.
+    # Where the least speed is infinite, no speed makes the motion ballistic: none is demanded of the hand.
     low = np.where(np.isfinite(low), low, 0.0)
     return np.stack((np.minimum(low, _FASTEST), np.minimum(high, _FASTEST)), axis=1)
 
 
 def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps: ClipMapParts) -> tuple[Law, float]:
-    """A field over a course with the governor of the animation under it, and the speed [m/s] to which it urges a hand.
+    """A field with the governor for the animation along its course, and the largest speed [m/s] to which it urges.
 
-    What is judged is the animation at the pace of the map's own curve: to that the Phantom's friction brings a hand
-    which is led along the course.
+    The animation is judged at the pace of the map's own curve, which is the pace of a hand that is led along the course
+    against the Phantom's friction.
 
     Raises
     ------
@@ -104,7 +103,7 @@ def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps:
 
 @dataclass(frozen=True, eq=False)
 class Governed(Law):
-    """A field over a curve together with the governor of the animation under it."""
+    """Sum of a field along a curve and the governor for the animation along it."""
 
     field: Law
     governor: Governor

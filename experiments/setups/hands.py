@@ -1,4 +1,4 @@
-"""The hand of a run: what the simulated user does, and how the stylus is held."""
+"""The simulated hand of a run: where the stylus begins, and which pushes, grabs and turns the user makes."""
 
 from typing import NamedTuple
 
@@ -27,19 +27,19 @@ from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person import Person
 
-PUSH_FORCE = 2.5  # of the hand that pushes twice a lap [N]; the motors can answer that for ever
-RIVER_PUSH = 1.0  # over into another river: in the middle of what takes a hand there and does not throw it out [N]
-PAUSE = 0.5  # [s] between two doings of the default hand, and before a bent curve is performed
+PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' continuous limit
+RIVER_PUSH = 1.0  # [N] of a push into another river: midway between too weak to get there and thrown out of it
+PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 
-_CROSSING = 0.5  # of the lap, where the wave rises through the level river
-_LEAD, _OVER = 0.05, 0.3  # [s] before it, when a push across begins, and [s] that it lasts
-_PLACE = 3e-3  # [m] a hand this near the place where it means to begin does
-_AWAY = 1e-3  # [m] by which beginnings differ
-_SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] below which they differ less along a curve, share of a lap by which at most
+_CROSSING = 0.5  # share of the lap at which the wave rises through the level river
+_LEAD, _OVER = 0.05, 0.3  # [s] before the crossing at which a push across begins, and [s] that it lasts
+_PLACE = 3e-3  # [m] from its place within which a push begins
+_AWAY = 1e-3  # [m] standard deviation of the start position
+_SLOW, _FURTHEST = 1e-3, 0.05  # [m/s] least speed by which an offset is made a phase; largest phase as share of a lap
 
 
 class Beginning(NamedTuple):
-    """Where the stylus is when a run begins, and how it moves, in H.
+    """Position, velocity and acceleration of the stylus when a run begins, in H.
 
     Attributes
     ----------
@@ -53,17 +53,17 @@ class Beginning(NamedTuple):
 
 
 def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Beginning:
-    """Where a run begins: about a millimetre from the start of a curve.
+    """Start state of the stylus: about a millimetre from the start of a curve.
 
     Parameters
     ----------
     curve : Trajectory
-        Timed as the hand is to move.
+        φ, with the timing that the hand is to have.
     rng : numpy.random.Generator
-        Of where exactly.
+        Source of the random offset.
     moves : bool
-        Whether it begins in motion: then further along the curve, not beside it, for a hand is drawn back to its curve
-        within a fiftieth of a second, and a figure at full speed cannot follow it there.
+        Whether the run begins in motion. The offset is then along the curve, not beside it: the field pulls a hand back
+        to its curve within a fiftieth of a second, which a figure at full speed cannot follow.
     """
     away = rng.normal(scale=_AWAY, size=3)
     if not moves:
@@ -76,25 +76,25 @@ def beginning(curve: Trajectory, rng: np.random.Generator, moves: bool) -> Begin
 def resolved_user(
     user: User, curve: Trajectory, seconds: float, grabs: tuple[Grab, ...] = (), pushes: tuple[Push, ...] | None = None
 ) -> User:
-    """A user with all that it does by default written out.
+    """The user with default pushes, turns and grabs filled in.
 
     Parameters
     ----------
     user : User
-        As it was asked for.
+        The user as configured.
     curve : Trajectory
-        Timed as the hand is to move.
+        φ, with the timing that the hand is to have.
     seconds : float
-        Of the run [s].
+        Duration of the run [s].
     grabs : tuple of Grab
-        What it takes hold of by default.
+        Default grabs.
     pushes : tuple of Push, optional
-        What one that pushes does by default, where that is not outwards and inwards once a lap.
+        Default pushes of a hand that pushes; without them it pushes outwards and inwards once a lap.
 
     Raises
     ------
     ParameterError
-        If a hand that traces should grab.
+        If a hand that traces is also to grab.
     """
     grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
     if user.traces and grabs:
@@ -113,12 +113,12 @@ def resolved_user(
 
 
 def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
-    """Hand and intent of a user whose doings are written out, for a run of so long [s] and its seed.
+    """The hand of a resolved user, for a run of given duration [s] and seed.
 
     Raises
     ------
     SimError
-        If a push or a grab is none that a person can do.
+        If a push or a grab is one that a person cannot do.
     """
     if user.person is not None:
         return participant(user.person, intent_of(user), curve, seconds, seed)
@@ -129,18 +129,18 @@ def user_hand(user: User, curve: Trajectory, seconds: float, seed: int) -> Arm |
 
 
 def participant(person: Person, intent: PersonIntent, curve: Trajectory, seconds: float, seed: int) -> Participant:
-    """A person who means to do something about a curve, for a run of so long [s] and its seed."""
+    """A person with an intent about a curve, for a run of given duration [s] and seed."""
     own = intent if isinstance(intent, Own) else None
     return Participant(person, intent.wishes(curve, seconds, seed), seed, own)
 
 
 def intent_of(user: User) -> PersonIntent:
-    """What a person means to do, by what is asked for.
+    """The intent of a person, from the user's grabs, pushes or kind.
 
     Raises
     ------
     SimError
-        If a push or a grab is none that a person can do.
+        If a push or a grab is one that a person cannot do.
     """
     if user.grabs:
         return Bend(user.grabs)
@@ -154,31 +154,31 @@ _INTENTS: dict[str, PersonIntent] = {
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
-    """When the default hand that pushes begins to [s]: with the second lap, the first one after all grabs left out."""
+    """Time at which the default hand begins to push [s]: one lap after the start, or after all grabs."""
     return curve.duration + (edited_until(grabs) if grabs else 0.0)
 
 
 def handled(user: User) -> tuple[tuple[float, float], ...]:
-    """From and until when [s] a hand does something else than push: it grabs or traces."""
+    """Intervals of time [s] in which a hand grabs or traces."""
     if user.traces:
         return ((0.0, np.inf),)
     return tuple((grab.at, grab.end) for grab in user.grabs)
 
 
 def turning_remark(user: User, expressive: bool) -> tuple[str, ...]:
-    """What is said of a hand that turns a stylus whose orientation does nothing."""
+    """Remark, if the hand turns the stylus on a map that ignores its orientation."""
     if user.does == "turn" and not expressive:
         return ("the hand turns the stylus, and this map does not look at that; --expressive does",)
     return ()
 
 
 def edited_until(grabs: tuple[Grab, ...]) -> float:
-    """When a hand has done all its grabs, and a pause after them [s]."""
+    """End of all grabs and the pause after them [s]."""
     return max((grab.end for grab in grabs), default=0.0) + PAUSE
 
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
-    """A push outwards and one inwards [N] in the lap that begins at a time [s]."""
+    """A push outwards and one inwards, of peak `force` [N], in the lap that begins at `start` [s]."""
     return (
         Push(start + 0.1 * lap, 0.3 * lap, force),
         Push(start + 0.6 * lap, 0.3 * lap, -force),
@@ -186,14 +186,14 @@ def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Pus
 
 
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
-    """Pushes from one default river into another: up where the wave rises through the curve, if the hand is there.
+    """Upward pushes from one default river into another, where the wave rises through the curve, once a lap.
 
     Parameters
     ----------
     curve : Trajectory
         The default curve.
     seconds : float
-        Of the run [s].
+        Duration of the run [s].
     """
     lap = curve.duration
     x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING * lap - _LEAD))

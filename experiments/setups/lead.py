@@ -1,4 +1,4 @@
-"""LEADING as a run: gait, field, and the hand that leads forward along an S and then straight back."""
+"""LEADING as a run: map and gait of the led figure, the field, and a hand that leads along an S and straight back."""
 
 from dataclasses import dataclass, replace
 
@@ -34,26 +34,27 @@ from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
 FORTH = 5.0  # [s] along the S at the clip's own pace
-PAUSE, BACK_PACE = 0.8, 0.5
-_START = 0.025  # [m] from where it should be, within which a hand begins
-STIFFNESS = 150.0  # of the arm [N/m]: it lets itself be guided
+PAUSE, BACK_PACE = 0.8, 0.5  # [s] of each pause; pace of the way back over the clip's own
+_START = 0.025  # [m] from its place on the curve within which a hand begins
+STIFFNESS = 150.0  # of the arm [N/m]: compliant enough to be guided
 _BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
 _FROM, _TO = -0.06, 0.08  # x of its ends in H [m]
 _PHASES = 256
-_UNLIKE = np.deg2rad(15.0)  # apart, the ends of a lap are of two motions
-_BLINK, _SWING = 0.05, 0.15  # [s] a flight from foot to foot lasts longer, and a foot swings for longer, or hops
-# Largest lateral acceleration of a gait that flies [m/s²]: leaning more, a landing missed by a little is a fall.
+_UNLIKE = np.deg2rad(15.0)  # pose gap above which the ends of a lap do not belong to one cyclic motion
+_BLINK, _SWING = 0.05, 0.15  # [s] shortest flight between steps, and shortest swing phase or hop
+# Largest lateral acceleration of a gait with flights [m/s²]: leaning more, it falls if a landing is missed by a little.
 _FLYING_LATERAL = 1.2
-# And its largest pace: faster than its clip it lands late, for it falls no faster. So is that of a run that steps:
-# its limbs swing as fast as they do in the run, and if they swing faster, motors of the leg that stands give in.
+# Largest pace of a gait with flights, over the clip's own: played faster it lands late, since gravity stays the same.
+# The same holds for a run led by steps: its limbs already swing as fast as in the run; if they swing faster, motors of
+# the stance leg saturate.
 _RUNNING_FORWARD = 1.0
 
 
 def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
-    """The clip that is led, and what has to be said about it: prepared, but as captured if it then flies.
+    """The clip that is led, and remarks about it: prepared, or as captured if the prepared one has flights.
 
-    The flights of a prepared run are ballistic at the run's own pace, and a figure that is led goes at others: it
-    lands early or late. As captured it is led by steps (`gait_remark`). Embedded clips are the same either way.
+    The flights of a prepared run are ballistic at the run's own pace only; a led figure moves at other paces and would
+    land early or late. A clip as captured is led by steps (`gait_remark`). Embedded clips are the same either way.
 
     Raises
     ------
@@ -71,10 +72,10 @@ def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
 
 
 def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
-    """Map of a led figure, and its gait; it begins in the middle of its longest stance on both feet.
+    """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
-    What closes was made for the floor and is led as it is, unless it leaps too far to go without flights as well; then,
-    as what does not close, it is led as a capture is: its feet are held.
+    A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
+    stance feet held (`Capture`); so is one whose flights have no flightless form otherwise.
 
     Raises
     ------
@@ -93,7 +94,7 @@ def led_map(clip: Clip, legs: tuple[Limb, ...]) -> tuple[Led, Gait]:
 
 
 def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
-    """The same of a lap, in whose frames but the last feet stand as `stands` says."""
+    """Map and gait of one lap; `stands` marks the feet on the floor in each of its frames but the last."""
     phases, steps = np.linspace(0.0, 1.0, _PHASES, endpoint=False), clip.n_frames - 1
     sampled = stands[np.round(phases * steps).astype(int) % steps]
     support = sampled.sum(axis=1).astype(np.int64)
@@ -108,7 +109,7 @@ def _led(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | No
 
 
 def lap_remark(clip: Clip) -> tuple[str, ...]:
-    """What is said of a capture of which a part is led, or that does not repeat itself."""
+    """Remarks, if only a part of a clip is led, or if the clip does not repeat itself."""
     lap, remarks = lap_of(clip), list[str]()
     if lap.clip.n_frames < clip.n_frames:
         remarks.append(
@@ -123,10 +124,11 @@ def lap_remark(clip: Clip) -> tuple[str, ...]:
 
 
 def stances(marks: Contacts, fps: float) -> Mask:
-    """Which feet of a capture stand, shape (n − 1, 2), of n frames whose last is the first of the next lap.
+    """Stance of each foot of a capture, shape (n − 1, 2), for n frames of which the last begins the next lap.
 
-    A foot that is up for less than a swing lasts stood all the time, and so did one of two that are up for less than a
-    flight lasts. One that goes on to rest, when no foot has settled, has not left the floor: it had sunk into it.
+    Contact marks are cleaned in three steps. A foot that is up for less than `_SWING` stands throughout. Where no foot
+    is settled, one that stood and is still planted goes on standing: it has not left the floor, but sunk into it. A
+    flight shorter than `_BLINK` is none: the feet that stood before it go on standing.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
@@ -146,7 +148,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
 
 
 def gait_remark(name: str, led: Led) -> tuple[str, ...]:
-    """What is said of a clip that flies: a body in the air falls with g, at whatever pace it is led."""
+    """Remark on a clip with flights: a body in the air falls with g, whatever the pace at which it is led."""
     if led.flies and led.grounds:
         return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
     if led.grounds:
@@ -163,7 +165,7 @@ def gait_remark(name: str, led: Led) -> tuple[str, ...]:
 
 
 def _middle_of_longest(mask: Mask) -> int:
-    """Middle of the longest run of a mask that goes round."""
+    """Index of the middle of the longest run of True in a cyclic mask."""
     n = len(mask)
     if mask.all():
         return 0
@@ -174,7 +176,7 @@ def _middle_of_longest(mask: Mask) -> int:
 
 
 def s_curve() -> Trajectory:
-    """The S along which the default hand leads, in the plane z = 0 of H: two arcs, by arc length [m]."""
+    """The S along which the default hand leads, in the plane z = 0 of H: two arcs, parametrised by arc length [m]."""
     radius = (_TO - _FROM) / (4.0 * np.sin(_BEND))
     turn = np.linspace(-_BEND, _BEND, 65)
     headings = np.concatenate([turn, turn[-2::-1]])
@@ -187,13 +189,13 @@ def s_curve() -> Trajectory:
 
 @dataclass(frozen=True, kw_only=True)
 class LedParts(MapParts[Led]):
-    """What the clip of a led figure gives a run: its map, and its gait."""
+    """Map parts of a led figure, with its gait."""
 
     gait: Gait
 
 
 def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
-    """What the clip of a led figure gives a run.
+    """Map parts of a led figure.
 
     Raises
     ------
@@ -263,7 +265,7 @@ def leading_hand(field: Leading, period: float = 0.01) -> Arm:
 
 
 def _hand(config: RunConfig, field: Leading) -> Arm | Participant:
-    """The hand that leads: an arm's, or a person's along the same path."""
+    """The hand that leads: an arm's impedance, or a person along the same path."""
     arm, person = leading_hand(field), config.user.person
     if person is None:
         return arm
@@ -271,14 +273,14 @@ def _hand(config: RunConfig, field: Leading) -> Arm | Participant:
 
 
 def walker_argument(s: Array) -> Array:
-    """What the led figure's map is evaluated at, for arc lengths s (n,); shape (n, 7)."""
+    """Arguments (n, 7) of the led figure's map at arc lengths s (n,) [m]."""
     argument = np.zeros((len(s), 7))
     argument[:, 0], argument[:, 3] = s, 1.0
     return argument
 
 
 def _eased(seconds: float, period: float, ease: float = 0.8) -> Array:
-    """Progress from 0 to 1 at an even pace that sets in and dies down within `ease` seconds."""
+    """Progress from 0 to 1, sampled every `period` [s], at a constant rate with ramps of `ease` [s] at both ends."""
     t = np.arange(period, seconds + ease, period)
     pace = np.clip(np.minimum(t, seconds + ease - t) / ease, 0.0, 1.0)
     pace = pace * pace * (3.0 - 2.0 * pace)

@@ -1,4 +1,4 @@
-"""Runs on a lifted map: FOLLOW traces one of its curves, and all of them together are rivers."""
+"""Runs on a lifted map: FOLLOW along one of its curves, or rivers along all of them."""
 
 import numpy as np
 
@@ -18,20 +18,20 @@ from sim.body.figure import FigureGains
 from sim.users.intent import Push
 from sim.world.world import phantom_angles
 
-_SPEEDS = (0.5, 2.0)  # least and greatest that a river takes, of its own: a hand that comes over has its neighbour's
-_SECONDS = 0.6  # of a push from one curve to another
-_LEAD = 0.36  # [s] before the transition, when it begins
-_CROSSING = 3.6  # [1/s] a push of this much drag times the distance of the curves takes a hand just over
-_NEAR = 3e-3  # [m] a hand this near the place where it means to begin does
+_SPEEDS = (0.5, 2.0)  # admissible speeds over the river's own: a hand that comes over has the neighbour's speed
+_SECONDS = 0.6  # [s] duration of a push from one curve to another
+_LEAD = 0.36  # [s] before the transition at which the push begins
+_CROSSING = 3.6  # [1/s] push force over (drag × distance of the curves) that takes a hand just over
+_NEAR = 3e-3  # [m] from its place within which a push begins
 _STAY = 3  # laps on the other curve
 
-# A foot that gives way by 2 mm in mid-stance still bears: a runner was taken to fly, and fell.
+# A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
 HELD_GAINS = FigureGains(contact_reach=0.004)
-"""Of a figure on a lifted map, or on a curve that is bent."""
+"""Gains of the physical figure on a lifted map, or on a curve that is bent."""
 
 
 def curve_number(haptic_map: Lifted, curve: str) -> int:
-    """Which curve a name, or a number as text, means; the first for an empty one.
+    """Index of the curve of a given name or number as text; 0 for an empty string.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def curve_number(haptic_map: Lifted, curve: str) -> int:
 
 
 def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
-    """The curve that a run begins on, at its clip's pace.
+    """The curve on which a run begins, timed at its clip's pace.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
 
 
 def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
-    """A river for every clip, by its name, that leads the Phantom at the clip's pace (`paced`).
+    """A river for every clip, named like it, timed to lead the Phantom at the clip's pace (`paced`).
 
     Raises
     ------
@@ -80,18 +80,18 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
 
 
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
-    """Rivers that lie side by side, told apart by the greatest speed: a hand is taken at that, too."""
+    """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
     return RiverChoice(bundle, given, max(fastest(river.curve) for river in bundle.rivers), BESIDE)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:
-    """The river of a clip along its course; it takes a hand at half to twice the speed that it leads at."""
+    """The river of a clip along its course; it takes a hand at half to twice its own speed."""
     speeds = np.linalg.norm(course.velocity(np.linspace(course.start, course.end, 65)), axis=1)
     return River(course, mode.river_tube, river_time(mode), river_gains(mode)[1], np.outer(speeds, _SPEEDS))
 
 
 def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:
-    """What a hand on rivers does that pushes: over at its curve's best transition in the second lap, and back.
+    """Default pushes on rivers: over at the curve's best transition in the second lap, and back three laps later.
 
     Raises
     ------
@@ -116,16 +116,17 @@ def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, 
 
 
 def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start: float, drag: float) -> Push:
-    """A push by which a hand on one curve's river gets over to another's, about the transition between them.
+    """A push that takes a hand from one curve's river to another's about the transition between them.
 
-    It is towards the other curve, in the river's drag b as hard as takes the hand there within about a quarter of a
-    second: a figure cannot break into a run faster.
+    Its direction is towards the other curve. Its force, proportional to the rivers' drag b, takes the hand there within
+    about a quarter of a second: a figure cannot break into a run faster.
 
     Parameters
     ----------
     haptic_map : Lifted
+        The map.
     first, second : int
-        The curves.
+        Indices of the two curves.
     angle : float
         θ of the transition [rad].
     start : float
@@ -134,7 +135,7 @@ def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start
         b of the rivers [N s/m].
     """
     curve, angles = haptic_map.curve(first), haptic_map.angles[first]
-    # Frames of a closed clip may begin anywhere in the lap.
+    # A closed clip may begin at any angle of the lap.
     frame = float(np.interp(angle if angle >= angles[0] else angle + 2.0 * np.pi, angles, np.arange(len(angles))))
     at = frame / haptic_map.clips[first][1] - _LEAD
     place = curve.point(np.mod(at, curve.duration) if curve.periodic else max(at, 0.0))

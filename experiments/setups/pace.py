@@ -1,12 +1,11 @@
-r"""The pace of a hand that a field leads: what the Phantom takes off it, and a curve that makes up for that.
+r"""The pace of a hand that a field leads: the Phantom's friction and inertia slow it, and `paced` compensates for that.
 
-A field that draws a hand along with b (φ̇ − ṗ) leaves it behind by what the device holds: where the tip goes at v along
-a curve and the joints at q̇, b (φ̇ − v) v is the power of friction, Σ_k (f_k |q̇_k| + d_k q̇_k²) with Coulomb's f and the
-viscous d of `models.phantom`, and of what changes the kinetic energy T = ½ q̇ᵀ M q̇ of the linkage, whose M depends on
-where it is. A spring that keeps the linkage on a bend has to be stretched: the tip goes round outside the curve, on a
-longer way, and a map that takes the angle for the clip's phase is played the more slowly. A flight of a clip that is
-played at nine tenths of its speed asks for eight tenths of gravity, and one whose pace changes by a hundredth lands a
-centimetre from where its figure flew.
+A field that pulls the hand along with the force b (φ̇ − ṗ) lets it lag. Where the tip moves at speed v along the curve
+and the joints at q̇, the power b (φ̇ − v) v goes into friction, Σ_k (f_k |q̇_k| + d_k q̇_k²) with the Coulomb friction f
+and the viscous friction d of `models.phantom`, and into the kinetic energy T = ½ q̇ᵀ M(q) q̇ of the linkage. On a bend,
+the spring that holds the linkage to the curve is stretched: the tip runs outside the curve on a longer path, and a map
+that takes the angle for the clip's phase plays more slowly. Flights are sensitive to pace: a flight played at nine
+tenths of its speed needs eight tenths of gravity, and one whose pace changes by a hundredth lands a centimetre off.
 """
 
 import numpy as np
@@ -18,12 +17,12 @@ from models.phantom.kinematics import jacobian, vector_to_device_frame
 from models.phantom.parameters import PREMIUM_1_5
 from sim.world.world import phantom_angles
 
-_STEP = 1e-3  # [s] to both sides, of the derivative of the joints' rates
-_LONGER = 0.5  # of a way: beyond that a spring is none that keeps a tip on its curve
+_STEP = 1e-3  # [s] to either side, for the finite difference of joint rates
+_LONGER = 0.5  # largest relative lengthening of the path: beyond, the spring is too soft to keep the tip on the curve
 
 
 def friction_along(curve: Trajectory, phases: Array) -> Array:
-    """Force [N] against a tip that goes along a curve at its own pace, at phases (n,) [s]; 0 where it rests.
+    """Friction [N] against a tip that moves along a curve at the curve's pace, at phases (n,) [s]; 0 where it rests.
 
     Raises
     ------
@@ -41,7 +40,7 @@ def friction_along(curve: Trajectory, phases: Array) -> Array:
 
 
 def inertia_along(curve: Trajectory, phases: Array) -> tuple[Array, Array]:
-    r"""Force f = J⁻ᵀ (M q̈ + C q̇) that keeps the linkage on a curve at the curve's own pace, at phases (n,) [s].
+    r"""Inertial force f = J⁻ᵀ (M q̈ + C q̇) of the linkage on a curve at the curve's own pace, at phases (n,) [s].
 
     Parameters
     ----------
@@ -53,8 +52,8 @@ def inertia_along(curve: Trajectory, phases: Array) -> tuple[Array, Array]:
     Returns
     -------
     along, bending : Array
-        Shape (n,): the part along the curve, f·φ̇/\|φ̇\| [N], and what of it bends the way, f·κ with the vector κ of
-        curvature [N/m]; 0 where the curve rests.
+        Shape (n,): the component along the curve, f·φ̇/\|φ̇\| [N], and f·κ with the curvature vector κ [N/m]; 0 where
+        the curve rests.
 
     Raises
     ------
@@ -79,7 +78,7 @@ def inertia_along(curve: Trajectory, phases: Array) -> tuple[Array, Array]:
 
 
 def _rates(curve: Trajectory, phases: Array) -> Array:
-    """q̇ of the linkage on a curve at its own pace, shape (n, 3) [rad/s]."""
+    """Joint rates q̇ of the linkage on a curve at the curve's own pace, shape (n, 3) [rad/s]."""
     rates = [
         np.linalg.solve(jacobian.py_func(phantom_angles(p)), vector_to_device_frame.py_func(tuple(v)))
         for p, v in zip(curve.point(phases), curve.velocity(phases), strict=True)
@@ -93,9 +92,9 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     .. math:: |\dot\varphi'| = |\dot\varphi|\,(1 + f\cdot\kappa/k) + f_t/b, \qquad
               dt' = dt\,|\dot\varphi|\,/\,|\dot\varphi'|
 
-    with f_t of `friction_along` and `inertia_along`, and f·κ of the latter: the tip goes f/k outside. Where what the
-    linkage gives back would ask for less than half of the old speed, it is half of it, and a way that is longer by
-    more than half is taken for one that is. The curve goes through the same points; the stylus is upright.
+    with f_t the sum of `friction_along` and the tangential part of `inertia_along`, and f·κ of the latter: the tip runs
+    f/k outside the curve. The new speed is at least half of the old one, also where the decelerating linkage would need
+    less, and f·κ/k is limited to ±½. The curve goes through the same points; the stylus is upright.
 
     Parameters
     ----------
@@ -104,7 +103,7 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     drag : float
         b [N s/m], positive.
     stiffness : float
-        k [N/m]; a field without one does not keep the tip on a bend, and that is left out.
+        k [N/m]; with 0 the lengthening on bends is left out.
 
     Raises
     ------
@@ -118,13 +117,13 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     longer = np.clip(bending / stiffness, -_LONGER, _LONGER) if stiffness > 0.0 else 0.0
     needed = drag * speed * (1.0 + longer) + friction_along(curve, middles) + along
     pulled = np.maximum(needed, 0.5 * drag * speed)
-    # Where a curve rests it keeps its time.
+    # Where the curve rests, its timing is kept.
     steps = own * np.divide(drag * speed, pulled, out=np.ones_like(own), where=pulled > 0.0)
     return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)
 
 
 def course_of(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
-    """The curve along which a field leads that is to keep the pace of `curve`: paced, if its drag can be made up for.
+    """The curve along which a field leads so that the hand has the pace of `curve`: `paced`, or itself without drag.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a run is put together from: what a kind of map gives, and what a mode makes of it."""
+"""Types of the parts of a run: `MapParts`, made from a map, and `Parts`, which a mode makes from these."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,11 +28,11 @@ from sim.users.participant import Participant
 
 Map = TypeVar("Map", bound=HapticMap, covariant=True)
 Static = Mapping[str, npt.ArrayLike | str]
-"""What a recording keeps beside its channels."""
+"""Constant data that a recording keeps beside its channels."""
 
 
 class Settings(Protocol):
-    """What of a run is not its field, its map or its hand."""
+    """Settings of a run apart from field, map and hand: figure, device, rates, seed and scene."""
 
     @property
     def figure(self) -> Figure:
@@ -46,17 +46,17 @@ class Settings(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """The rates."""
+        """Rates of servo and physics."""
         ...
 
     @property
     def seed(self) -> int:
-        """Of where exactly the hand lets go."""
+        """Seed of the stylus's exact start position."""
         ...
 
     @property
     def scene(self) -> SceneConfig:
-        """Of the world."""
+        """Configuration of the simulated world."""
         ...
 
 
@@ -68,11 +68,11 @@ class RiverChoice(NamedTuple):
     bundle : RiverBundle
         The rivers, by name.
     given : tuple of Trajectory
-        Their curves as the map has them, timed as the hand is to move.
+        Their curves as the map has them, with the timing that the hand is to have.
     pace : float
-        Speed by which they are told apart [m/s].
+        Reference speed [m/s] that scales the thresholds by which the law tells them apart (`rivers.law_of`).
     hysteresis : float
-        By which the one that has the hand is preferred, in units of the pace.
+        Margin in favour of the river that already has the hand, in units of `pace`.
     """
 
     bundle: RiverBundle
@@ -83,22 +83,22 @@ class RiverChoice(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class MapParts(Generic[Map]):
-    """What a kind of map gives a run.
+    """Parts of a run that depend on the map alone.
 
     Attributes
     ----------
     haptic_map : HapticMap
-        h, of the figure.
+        h, from stylus poses to poses of the figure.
     clips : tuple of Clip
-        What it plays.
+        Clips that the map plays.
     curve : Trajectory
-        Timed as the hand is to move.
+        φ, with the timing that the hand is to have.
     refined : callable, optional
-        The map, improved by what takes compiled code to find, and what is then to be said.
+        Returns the map improved by what only compiled code can find, and remarks about that.
     gains : FigureGains
-        Of the physical figure.
+        Gains of the physical figure.
     lap_seconds : float, optional
-        Of the clips, on average [s], where a lap of the curve plays one.
+        Mean duration of the clips [s], where a lap of the curve plays one.
     moves : bool
         Whether a run begins in motion: a walk at full speed cannot begin from rest.
     expressive : bool
@@ -106,9 +106,9 @@ class MapParts(Generic[Map]):
     plays_rivers : bool
         Whether every river plays a clip of its own.
     remarks : tuple of str
-        What is to be said.
+        Remarks for the user, a line each.
     static : Static
-        What a recording keeps.
+        Constant data for the recording.
     """
 
     haptic_map: Map
@@ -129,11 +129,11 @@ class MapParts(Generic[Map]):
         return expressive_figure(self.haptic_map) if self.expressive else self.haptic_map
 
     def said(self, remarks: tuple[str, ...]) -> Self:
-        """The same with more to be said, first."""
+        """The same parts with more remarks, put before the present ones."""
         return replace(self, remarks=remarks + self.remarks)
 
     def refine(self) -> Self:
-        """The same with the improved map; needs compiled code."""
+        """The same parts with the improved map; needs compiled code."""
         if self.refined is None:
             return self
         made, told = self.refined()
@@ -142,22 +142,22 @@ class MapParts(Generic[Map]):
 
 @dataclass(frozen=True, kw_only=True)
 class ClipMapParts(MapParts[ClipMap]):
-    """What a map of clips along a curve gives a run.
+    """Parts of a run that depend on a map of clips along a curve.
 
     Attributes
     ----------
     reach : float
         Half width of the map's domain about the curve [m].
     rivers : callable
-        From the mode to its rivers.
+        Maps a mode to its rivers.
     river_pushes : callable
-        From the mode and the time of the run [s] to what a hand does that pushes over into another river.
+        Maps the mode and the duration of the run [s] to the pushes of a hand that changes over to another river.
     course : callable
-        From damping [N s/m] and stiffness [N/m] of a field to the curve along which it leads.
+        Maps damping [N s/m] and stiffness [N/m] of a field to the curve along which the field leads.
     carry : float
-        Share of the default ways by which a hand bends a curve.
+        Factor on the default distances by which a hand bends a curve.
     held_seconds : float
-        Time of the clips [s], whose flights are let down to the floor where a hand holds the figure.
+        Duration of the clips [s]; where a hand is slower than they are, their flights are lowered to the floor.
     """
 
     reach: float
@@ -170,22 +170,22 @@ class ClipMapParts(MapParts[ClipMap]):
 
 @dataclass(frozen=True)
 class Notes:
-    """What figures, replays and recordings say of a run.
+    """Titles and labels of a run in figures, replays and recordings.
 
     Attributes
     ----------
     title : str
-        Of the page: the mode.
+        Title of the page: the mode.
     tube_radius : float
-        Of what is drawn about the curve [m]; 0 for nothing.
+        Radius of the tube that is drawn about the curve [m]; 0 for none.
     tube_name : str
-        What that is.
+        What the tube is.
     distance_from : str
-        What the recorded distance is from.
+        What the recorded distance is measured from.
     hand_does : str
-        What a hand that exerts a force does.
+        What a hand that exerts a force does, as a verb.
     static : Static
-        What the recording keeps besides.
+        More constant data for the recording.
     """
 
     title: str
@@ -197,20 +197,20 @@ class Notes:
 
 
 class Measuring(NamedTuple):
-    """What a mode measures its run from.
+    """Data from which a mode's measures of a finished run are computed.
 
     Attributes
     ----------
     recording : Recording
-        Of the run.
+        Recording of the run.
     default_poses : callable
-        Gives the animation of the curve as it was given, from the start of the run on.
+        Makes a function for the animation of the unedited curve (`default_animation.default_poses`).
     handled : tuple of (float, float)
-        From and until when [s] the hand does something else than push.
+        Intervals of time [s] in which the hand does something other than push.
     memory : Array
-        Of the field, at the end.
+        The field's memory at the end of the run.
     save_curve : callable
-        Keeps a curve beside the recording.
+        Saves a curve beside the recording.
     """
 
     recording: Recording
@@ -222,42 +222,42 @@ class Measuring(NamedTuple):
 
 @dataclass(frozen=True)
 class Parts:
-    """A run in parts, as its mode puts it together.
+    """All parts of a run, as its mode makes them from the map's parts.
 
     Attributes
     ----------
     config : Settings
-        Of figure, device and clock, with all that was left to defaults; of a configured run its `RunConfig`.
+        Figure, device and clock with all defaults filled in; for a configured run, its `RunConfig`.
     maps : MapParts
         The map, its clips and its curve.
     field : Law
         Law of force of the mode.
     program : Program
-        The field as it runs, with all that is added.
+        The field as it is executed, with moments and walls added.
     course : Trajectory
-        Along which it leads.
+        Curve along which the field leads.
     user : Arm or Participant
-        The hand.
+        The simulated hand.
     tank : EnergyTank
-        What the field may inject.
+        Bounds the energy that the field may inject.
     notes : Notes
-        What is said of the run.
+        Titles and labels.
     gains : FigureGains
-        Of the physical figure.
+        Gains of the physical figure.
     bends : bool
-        Whether the curve is bent, so that the figure begins at rest.
+        Whether the hand bends the curve; the figure then begins at rest.
     held_seconds : float
-        Where a hand may hold the figure in the middle of a flight, time of the clips [s].
+        Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0.
     walker : callable, optional
-        From the field's memory to the walker whose place is the map's argument; by default that is where the stylus is.
+        Maps the field's memory to the walker whose state is the map's argument; without it that is the stylus pose.
     argument_at : callable
-        From nearest points (n, 3) and phases (n,) to what the default animation is evaluated at, (n, 7).
+        Maps nearest points (n, 3) and phases (n,) to the map's arguments (n, 7) for the default animation.
     handled : tuple of (float, float)
-        From and until when [s] the hand does something else than push.
+        Intervals of time [s] in which the hand does something other than push.
     remarks : tuple of str
-        What is to be said.
+        Remarks for the user, a line each.
     summarise : callable
-        What the mode adds to a summary.
+        Adds the mode's measures to a summary.
     """
 
     config: Settings

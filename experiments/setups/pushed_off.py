@@ -1,4 +1,4 @@
-"""Whether the physical figure follows a hand that is pushed off its curve on a lifted map, to other clips."""
+"""Trial before a run: whether the physical figure follows a hand pushed off its curve on a lifted map."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from models.mocap.clip import Clip
 from sim.reference.reference import poses_along
 
 _SECONDS, _FPS = 20.0, 120.0
-_PUSHED = 8e-3  # [m]: 2.5 N against 300 N/m
-_FIRST = 1.7  # [s], when the first push begins
+_PUSHED = 8e-3  # [m] offset by a push: 2.5 N against 300 N/m
+_FIRST = 1.7  # [s] start of the first push
 
 
 def toured(made: Lifted, curve: Trajectory) -> Clip:
-    """The animation of a hand that goes along a curve of a map at its pace, and is pushed out and in on its way.
+    """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
-    A push leaves its speed over the ground as it is, as in FOLLOW, so it goes round the more slowly the further out.
+    A push leaves the hand's speed as it is, as in FOLLOW, so its angular speed is lower the further out it is.
     """
     times = np.arange(round((_SECONDS + 1.0) * _FPS)) / _FPS
     pushed, phase = _PUSHED * push_profile(np.maximum(times - _FIRST, 0.0)), curve.start
@@ -35,7 +35,7 @@ def toured(made: Lifted, curve: Trajectory) -> Clip:
 
 
 def not_followed(made: Lifted, curve: Trajectory) -> tuple[str, ...]:
-    """What is to be said of a map and the curve of a run where pushes are not followed; needs compiled code."""
+    """Remark, if the physical figure does not follow pushes off this curve of the map; needs compiled code."""
     made_of = (made.compiled().params, np.asarray(curve.times), np.asarray(curve.positions))
     verdict = tried(__name__, lambda: toured(made, curve), _SECONDS, made_of)
     return () if verdict.bearable else (f"pushed off its curve to those beside it, the physical figure {verdict}",)

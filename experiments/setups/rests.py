@@ -1,4 +1,4 @@
-"""Where clips can stand still: a hand that leaves all rivers stops the figure, which should not have to hover."""
+"""Rest phases of clips: where a hand that leaves all rivers stops the figure, it should be statically balanced."""
 
 import mujoco
 import numpy as np
@@ -10,21 +10,24 @@ from experiments.setups.stylus import stylus_path
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from sim.reference.reference import poses_along
 
-_ROWS = 96  # of a lap
-_TOUCH = 0.003  # a contact point so near the floor bears [m]
-_SHARE = 0.8  # of the support, about its middle, over which the centre of mass is asked to be
-_FLIES = 1.0  # [m] worse than any place over the floor
+_ROWS = 96  # samples of a lap
+_TOUCH = 0.003  # height below which a contact point counts as support [m]
+_SHARE = 0.8  # the centre of mass is to lie over the support scaled by this factor about its middle
+_FLIES = 1.0  # [m] distance assigned to phases in flight: larger than any other
 
 
 def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
-    """The same map, whose clips stop where both feet stand under the centre of mass, or else where least is missing.
+    """The same map with the phases at which its clips can stop.
+
+    These are the phases with both feet on the floor and the centre of mass over the support, or else the one phase at
+    which the centre of mass is nearest to it.
 
     Parameters
     ----------
     clips : RiverClips
-        With limbs.
+        Map with limbs.
     figure : mujoco.MjModel
-        Whose poses they are, alone.
+        Model of the figure alone.
     """
     data, feet = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
     kind, params, memory = clips.compiled()
@@ -44,7 +47,7 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         touch = contacts[..., 2] < _TOUCH
         missing = np.linalg.norm(nearest_supported(centre, contacts, _SHARE) - centre, axis=1)
         missing[~touch.any(axis=1)] = _FLIES
-        # FOOT_CONTACTS has the four of the left foot first.
+        # FOOT_CONTACTS begins with the four points of the left foot.
         good = (missing == 0.0) & touch[:, :4].any(axis=1) & touch[:, 4:].any(axis=1)
         rests.append(phases[good] if good.any() else phases[[missing.argmin()]])
     return clips.with_rests(rests)

@@ -1,9 +1,9 @@
-"""Changes from river to river that floor contact alone can drive, found before a run.
+"""Dynamically feasible transitions between the clips of different rivers, computed before a run.
 
-Where a clip goes over into another by offsets that decay and hasty steps (`sim.reference.river_changes`), a figure
-lacks 13 to 25 % of its weight, and may fall. So that is only where the search begins: at some moments of the stride
-such a change is tried, and from 0.7 s before it to 0.9 s after it the motion is made feasible as a capture is
-(`models.mocap.preparation.feasible`), beginning with what lacks least; both of its ends stay as the clips are.
+A transition by decaying offsets and quick steps (`sim.reference.river_changes`) needs a residual force of 13 to 25 % of
+body weight, and the figure may fall. It serves as the initial guess only: such transitions are generated at several
+moments of the stride and ranked by residual. The best are made feasible from 0.7 s before the change to 0.9 s after it,
+as a capture is (`models.mocap.preparation.feasible`); both ends stay equal to the clips.
 """
 
 from typing import NamedTuple
@@ -28,32 +28,32 @@ from sim.compilation.side_by_side import side_by_side
 from sim.compilation.sources import kept_folder
 from sim.reference.reference import make_reference, poses_along, reference_along
 
-_LEAD, _TAIL = 0.7, 0.9  # [s] before a change and after it that are its own
-_SETTLES, _BANDWIDTH = 1.0, 40.0  # [s], [Hz] of the stylus filter, which is hardly to be seen
-_AT_ONCE = 6  # rows between two looks whether the clip has changed
+_LEAD, _TAIL = 0.7, 0.9  # [s] before and after a change that belong to it and are optimised
+_SETTLES, _BANDWIDTH = 1.0, 40.0  # [s] settling time and [Hz] cut-off of the stylus filter, high enough not to show
+_AT_ONCE = 6  # frames between two checks whether the clip has changed
 _ITERATIONS = 10
-_AROUND = 0.5  # [s] beside the part that is made feasible, by which its stances are told
-_MOMENTS = 8  # of a stride, at which a change by offsets is tried
-_TRIES, _WELL = 2, 400.0  # of these that are made feasible at most, and the cost at which one is done well
-_WAITS = 2.0  # [s] for the next gate, at most about
-_GATES = 3  # of a stride at most, for one takes some seconds to find
-_MOST = 8  # strides in a lap
-_LONG = 8.0  # [s] after which a change is given up
-_ROWS = 840  # of a lap: any number of strides up to `_MOST` divides it
-_REPEATS = 0.02  # [rad], [m] by which strides of one clip differ
+_AROUND = 0.5  # [s] of context on either side of a change, from which its stances are detected
+_MOMENTS = 8  # moments of a stride at which a change by offsets is tried
+_TRIES, _WELL = 2, 400.0  # how many of these are made feasible at most, and the cost below which no more are tried
+_WAITS = 2.0  # [s] that a hand waits for the next gate, at most about
+_GATES = 3  # gates in a stride at most, since each takes some seconds to compute
+_MOST = 8  # strides in a lap at most
+_LONG = 8.0  # [s] after which a change that has not happened is given up
+_ROWS = 840  # samples of a lap: divisible by any number of strides up to `_MOST`
+_REPEATS = 0.02  # [rad], [m] by which strides of one clip may differ
 
 
 class _Passage(NamedTuple):
-    """A change by offsets that decay.
+    """A transition by decaying offsets.
 
     Attributes
     ----------
     poses : Array, shape (n, nq)
-        From `_AROUND` before what is its own to `_AROUND` after, `FPS` a second.
+        The transition with `_AROUND` seconds of context on either side, at `FPS` frames a second.
     second : Array, shape (n, nq)
-        The new clip alone, where it then is.
+        The new clip alone at the same times, placed where the figure is after the change.
     gate : float
-        Phase at which its own begins, after the start of the lap [s].
+        Phase at which the transition begins, after the start of the lap [s].
     """
 
     poses: Array
@@ -62,22 +62,22 @@ class _Passage(NamedTuple):
 
     @property
     def own(self) -> slice:
-        """Rows that are its own."""
+        """Rows of the transition, without the context."""
         return slice(round(_AROUND * FPS), len(self.poses) - round(_AROUND * FPS))
 
     def clip(self) -> Clip:
-        """What is its own."""
+        """The transition without the context."""
         return Clip(self.poses[self.own], FPS, "change")
 
     def stances(self) -> Stances:
-        """Its stances, told with what is beside it."""
+        """Stances of the transition, detected with the context."""
         whole, own = Clip(self.poses, FPS, "change"), self.own
         told = stances(whole, whole)
         return Stances(told.standing[own], told.pushing[own], told.places[own], told.sliding[own])
 
 
 class _Gate(NamedTuple):
-    """Where a change is sought: from river to river, in a part of one of a lap's strides, at moments of it [s]."""
+    """Where a transition is sought: its two rivers, a part of a stride, strides in a lap, and moments to try [s]."""
 
     first: int
     second: int
@@ -91,16 +91,16 @@ class _Gate(NamedTuple):
 
 
 def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> RiverClips:
-    """The same map, whose clips go over into each other by feasible changes; needs compiled code, and they are kept.
+    """The same map with feasible transitions between its clips; needs compiled code. Transitions found are cached.
 
     Parameters
     ----------
     made : RiverClips
-        Whose rivers have laps of one duration.
+        Map whose rivers have laps of equal duration.
     blend : float
-        Time in which one clip goes over into another where the search begins [s].
+        Duration of the transition by offsets from which the search begins [s].
     figure : mujoco.MjModel
-        The figure alone.
+        Model of the figure alone.
     """
     rivers, alike = range(len(made.curves)), made.on_one_river()
     made_of = (made.compiled().params, np.array([blend]))
@@ -124,7 +124,7 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
 
 
 def _kept(made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate) -> Array:
-    """What `_found` gives, kept under what the rivers are made of."""
+    """Result of `_found`, cached under the data of which the rivers are made."""
 
     def find() -> Array:
         return _found(made, blend, figure, gate.first, gate.second, gate.moments)
@@ -133,7 +133,7 @@ def _kept(made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: 
 
 
 def _strides(made: RiverClips, first: int, second: int) -> int:
-    """In how many equal parts a lap of both clips falls."""
+    """Into how many equal strides a lap of both clips divides."""
     laps = [
         _alone(made, river, np.arange(_ROWS) * made.curves[river].duration / _ROWS)[:, 7:] for river in (first, second)
     ]
@@ -144,7 +144,7 @@ def _strides(made: RiverClips, first: int, second: int) -> int:
 
 
 def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
-    """Poses of a river's clip at phases after the start of the lap, from a memory on."""
+    """Poses of a river's clip at phases [s] after the start of the lap, beginning with a given memory of the map."""
     kind, params, fresh = made.compiled()
     memory = fresh.copy() if memory is None else memory.copy()
     memory[RIVER] = river
@@ -156,7 +156,7 @@ def _alone(made: RiverClips, river: int, phases: Array, memory: Array | None = N
 def _passage(
     made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
 ) -> _Passage | None:
-    """A clip that goes over into another's at a moment of the lap [s] or soon after; None if it does not."""
+    """The transition from one river's clip to another's at or soon after a moment of the lap [s]; None without one."""
     curve = made.curves[first]
     lap = curve.duration
     times = lap + moment - _LEAD - _AROUND - _SETTLES + np.arange(_AT_ONCE * round(_LONG * FPS / _AT_ONCE)) / FPS
@@ -182,7 +182,7 @@ def _passage(
 
 
 def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
-    """A row with the gate [s], and the offsets (n, 57) of a change that begins there; none if none is found."""
+    """The gate [s] as a first row, then the offsets (n, 57) of the transition that begins there; (0, 57) if none."""
     passages = [_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
     longest = LONGEST * made.curves[first].duration
     tried = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
@@ -199,14 +199,14 @@ def _found(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, s
     poses[own] = changed.clip.poses
     shown = slice(own.start - round(MARGIN * FPS), own.stop)
     offsets = _way(best.second[shown], poses[shown])
-    # What is left of the filter's lag.
+    # Offsets at the end are only the lag of the stylus filter: fade them out.
     left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)
     offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
     return np.vstack([np.full((1, 57), best.gate), offsets])
 
 
 def _way(second: Array, shown: Array) -> Array:
-    """Offsets (n, 57) from poses of the second clip to those that are shown, as `clip_change` adds them."""
+    """Offsets (n, 57) from poses of the second clip to the poses shown, as `clip_change` adds them."""
     n = len(second)
     turns = [poses[:, 3:].reshape(n, -1, 4) for poses in (second, shown)]
     away = quaternions.rotated(quaternions.conjugate(turns[0][:, 0]), shown[:, :3] - second[:, :3])

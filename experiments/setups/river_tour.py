@@ -1,4 +1,4 @@
-"""Whether the physical figure follows from river to river, where each plays a clip of its own."""
+"""Trial before a run: whether the physical figure follows changes between rivers that play clips of their own."""
 
 from collections.abc import Sequence
 
@@ -16,14 +16,14 @@ from models.mocap.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 
 _FPS = 120.0
-_WAY = (0, 1, 2, 0, 2, 1, 0)  # over three rivers: each change from one to another once
-_STAY, _GLIDE = 5.5, 0.3  # [s] on a river, in which a gate is passed and a change ends; and to go over
+_WAY = (0, 1, 2, 0, 2, 1, 0)  # order of the three rivers: each change from one to another occurs once
+_STAY, _GLIDE = 5.5, 0.3  # [s] on a river, enough to pass a gate and end the transition; [s] of a change of river
 _SECONDS = _STAY * len(_WAY)
 
 
 def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
-    """The animation of a hand that goes at the rivers' pace, and over from each of the three to each other."""
-    # The filter of the stylus begins at rest: what it shows in its first second is not looked at.
+    """The animation of a hand that moves at the rivers' pace and changes once between every two of the three rivers."""
+    # The stylus filter begins at rest: its first second is dropped.
     times = np.arange(round((_SECONDS + 2.0) * _FPS)) / _FPS - 1.0
     stay = np.clip(times // _STAY, 0, len(_WAY) - 1).astype(int)
     way = np.array(_WAY)
@@ -40,17 +40,18 @@ def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
 
 
 def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
-    """What is to be said of a map of three rivers that the physical figure does not follow; needs compiled code.
+    """Remark on a map of three rivers, if the physical figure does not follow it; needs compiled code.
 
     Parameters
     ----------
     made : RiverClips
+        The map.
     names : sequence of str
-        Of the rivers' clips.
+        Names of the rivers' clips.
     part : Figure
-        How one clip goes over into another.
+        Settings of the figure; of these, the stylus filter and the duration of transitions are used.
     figure : mujoco.MjModel
-        The figure alone.
+        Model of the figure alone.
     """
     made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
     verdict = tried(__name__, lambda: toured(made, part, figure), _SECONDS, made_of)

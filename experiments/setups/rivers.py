@@ -19,18 +19,19 @@ from experiments.setups.governor import governed, speeds_along
 from experiments.setups.pace import paced
 from experiments.setups.parts import ClipMapParts, Notes, Parts, RiverChoice, Static
 
-# Of the speed of the default curve. A hand at rest is taken: its velocity is 1 from the current's; one that crosses
-# at a right angle is not: it is √2 from it.
+# In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
+# a hand that crosses at a right angle is not: the difference is √2.
 ADMISSION, HYSTERESIS = 1.2, 0.15
-BESIDE = 0.05  # the hysteresis of rivers side by side, as a map's own are: places tell them apart, not directions
-# Smooth, σ says up to which angle rivers are blended, and a blend of tubes that part throws the hand out of both: with
-# 0.05 it ends at 20°, before the middle leaves the tubes.
+BESIDE = 0.05  # hysteresis of rivers side by side, as those of a lifted map: position tells them apart, not direction
+# In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
+# both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
-# Encoders make 10 mm/s of noise, which is more than the smooth form's σ; the discrete one has its hysteresis.
+# [s] time constant of the velocity filter: encoders make 10 mm/s of noise, more than the smooth form's σ. The discrete
+# form needs no filter, since it has a hysteresis.
 LOOK = {"discrete": 0.0, "smooth": 8e-3}
-SLOWEST = 0.03  # [m/s], three times that noise: rivers along which the hand goes more slowly are told apart by chance
-GATE = 0.4  # the admission of rivers that say what speeds they take: a hand that misses them by more stays out
-WAVE = 0.6  # height of the wave, of the map's half width
+SLOWEST = 0.03  # [m/s], three times that noise: at lower speeds of the hand the noise decides which river takes it
+GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
+WAVE = 0.6  # height of the wave as a share of the map's half width
 
 
 def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
@@ -57,7 +58,7 @@ def river_time(mode: Rivers) -> float:
 
 
 def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
-    """Law of rivers: their sum, or of higher order."""
+    """Law of force of several rivers: their sum, or a higher-order law that gives the hand to one river."""
     bundle, _, pace, hysteresis = choice
     if mode.crossing == "sum":
         return bundle
@@ -67,7 +68,7 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
 
 
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
-    """The same rivers, each with the speeds that the flights of its animation admit."""
+    """The same rivers, each restricted to the speeds at which the flights of its animation are ballistic enough."""
     rivers = tuple(
         replace(river, speeds=speeds_along(maps.haptic_map, curve, i, river.curve))
         for i, (river, curve) in enumerate(zip(choice.bundle.rivers, choice.given, strict=True))
@@ -76,9 +77,9 @@ def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:
 
 
 def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice:
-    """The default rivers about a curve (`river_bundle`), which lead the Phantom at their own pace (`paced`).
+    """The default rivers about a curve (`river_bundle`), timed to lead the Phantom at their own pace (`paced`).
 
-    They are told apart by the curve's mean speed.
+    Their reference speed is the curve's mean speed.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def drawn(bundle: RiverBundle) -> Static:
 def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:
     """The default curve; a wave about it, up and down twice a lap; and the curve lifted to the wave's crests.
 
-    The wave crosses the first, and touches the last: there a hand can change over.
+    The wave crosses the default curve and touches the lifted one; at these places a hand can change over.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsil
     reach : float
         Half width of the map's domain [m]; the crests are at `WAVE` times it.
     tau, drag, epsilon : float
-        Of the rivers: τ [s], b [N s/m], ε [m].
+        τ [s], b [N s/m] and ε [m] of the rivers.
     """
     times = np.linspace(curve.start, curve.end, 129)
     level = curve.point(times)

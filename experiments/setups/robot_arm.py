@@ -1,4 +1,4 @@
-"""The robot arm as a run: the same field and the same loop lead seven joints instead of a human figure."""
+"""Runs with a seven-joint robot arm in place of the figure: the same field and the same loop."""
 
 from collections.abc import Callable
 
@@ -28,18 +28,18 @@ from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.robot_world import RobotWorld
 
-HOME = np.array([0.7, 0.0, 0.4])  # of the tool, in the frame of the arm's base [m]
-TILT = np.radians(75.0)  # of the tool away from the vertical
+HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
+TILT = np.radians(75.0)  # tilt of the tool from the vertical
 ORIENTATION = np.array([np.cos(0.5 * TILT), 0.0, np.sin(0.5 * TILT), 0.0])
 SCALE = 1.5
 REACH = (0.07, 0.1)  # [m]
 TURN = (np.radians(15.0), np.radians(25.0))
 ARM_ANGLE = np.radians(30.0)
-RATE = 60.0  # of the arm's computed torque [1/s]
+RATE = 60.0  # feedback rate of the arm's computed-torque control [1/s]
 
 
 def robot_arm_map() -> RobotArm:
-    """The default map: the stylus leads the tool in front of the arm, 1.5 times as far as it moves itself."""
+    """The default map: the tool follows the stylus in front of the arm, with displacements scaled by 1.5."""
     arm = arm_model()
     return RobotArm(
         arm_lengths(arm), arm_limits(arm), HOME, ORIENTATION, SCALE, REACH, TURN, float(ARM_ANGLE), _evaluated
@@ -53,7 +53,7 @@ def _evaluated(compiled: CompiledMap, points: Array) -> Array:
 
 
 def tilted_circle(radius: float, lap: float) -> Trajectory:
-    """A circle about the origin of H, tilted by 30° to the user, run through in `lap` seconds."""
+    """A circle about the origin of H, tilted by 30° towards the user, passed in `lap` seconds."""
     times = np.linspace(0.0, lap, 65)
     points = Trajectory.circle(radius, lap).point(times)
     tilt = np.radians(30.0)
@@ -65,7 +65,7 @@ def tilted_circle(radius: float, lap: float) -> Trajectory:
 def wire_arm(
     config: ArmConfig, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> tuple[Servo, RobotWorld, Trajectory]:
-    """Put a run together: servo, world and curve; `ready` as in `experiments.setups.wiring.wire`.
+    """Wire a run of the arm: servo, world and curve; `ready` as in `experiments.setups.wiring.wire`.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def wire_arm(
         figure_ticks=config.arm_ticks,
         argument=device.hand[STYLUS_POSE],
     )  # fmt: skip
-    # The map looks at its domain with compiled code, when everything else has been checked.
+    # The map checks its domain with compiled code, so this comes after all other checks.
     ready(run_units(servo, program))
     compiled = robot_arm_map().compiled()
     world.put_arm(_evaluated(compiled, np.concatenate([start, stylus])[None])[0])

@@ -1,4 +1,4 @@
-"""A run that is wired up: its parts, and what of them a recording keeps."""
+"""A wired run: its parts, and the constant data that its recording keeps."""
 
 import math
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from sim.world.world import World
 
 @dataclass(frozen=True)
 class Session:
-    """A run that is wired up and has not begun: the servo, what it was made of, and what is to be said."""
+    """A wired run that has not begun: its parts, world, linked servo and remarks."""
 
     parts: Parts
     world: World
@@ -34,17 +34,17 @@ class Session:
 
     @property
     def config(self) -> Settings:
-        """Figure, device and clock; of a configured run its `RunConfig`, with all that was left to defaults."""
+        """Figure, device and clock; for a configured run its `RunConfig`, with all defaults filled in."""
         return self.parts.config
 
     @property
     def clips(self) -> tuple[Clip, ...]:
-        """What the figure plays."""
+        """Clips that the figure plays."""
         return self.parts.maps.clips
 
     @property
     def curve(self) -> Trajectory:
-        """Along which the field leads."""
+        """Curve along which the field leads."""
         return self.parts.course
 
     @property
@@ -59,7 +59,7 @@ class Session:
 
     @property
     def asking(self) -> Mapping[str, Any]:
-        """What the loop is told of a person's intent in Python (see `sim.loop.loop.Loop`)."""
+        """Keyword arguments of `sim.loop.loop.Loop` for a person's intent in Python; empty if there is none."""
         user, device = self.parts.user, self.servo.device
         own = user.own if isinstance(user, Participant) else None
         if own is None or own.compiled or not isinstance(device, SimulatedPhantom):
@@ -72,11 +72,11 @@ class Session:
 
     @property
     def _played(self) -> str:
-        """What the figure plays, in a word."""
+        """Names of the clips, or else the type of the map."""
         return ", ".join(clip.name for clip in self.clips) or type(self.haptic_map).__name__
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
-        """What the recording keeps beside the channels."""
+        """Constant data that the recording keeps beside the channels."""
         phases, notes = np.linspace(self.curve.start, self.curve.end, 241), self.parts.notes
         scene = self.world.config
         return {
@@ -105,7 +105,7 @@ class Session:
 
     @property
     def weight(self) -> float:
-        """Of the figure [N]."""
+        """Weight of the figure [N]."""
         figure = self.world.figure
         return float(figure.body_subtreemass[1]) * float(np.linalg.norm(figure.opt.gravity))
 

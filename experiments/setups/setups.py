@@ -1,4 +1,4 @@
-"""All set-ups: what each mode and each kind of map makes of a configuration."""
+"""Registry of set-ups: the functions that make the parts of a run, by kind of mode and kind of map."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,11 +25,11 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
     "stretch-then-follow": stretch_then_follow_parts,
     "lead": lead_parts,
 }
-"""From configuration, mode and map to the parts of a run, by kind of mode."""
+"""By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
 
 def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
-    """Clips that a map names, and what has to be said about them.
+    """Clips that a map names, and remarks about them.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
 
 
 def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
-    """What the map of a configuration gives a run: of clips that are given, or those that it names.
+    """Map parts of a configuration, made of the given clips or, without them, of those that its map names.
 
     Raises
     ------
@@ -53,5 +53,5 @@ def map_parts(config: RunConfig, figure: mujoco.MjModel, clips: tuple[Clip, ...]
 
 
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:
-    """Parts of a run on a map."""
+    """Parts of a run: its mode's set-up applied to the map's parts."""
     return MODE_SETUPS[config.mode.kind](config, config.mode, maps)

@@ -1,8 +1,4 @@
-"""STRETCHY TUBES as a run: the field, and what a hand does in it by default.
-
-On a map from a file the search is as soft as rivers there are: what the hand does, the figure has to do, and curves
-that are near each other hold different motions.
-"""
+"""STRETCHY TUBES as a run: the field, and the grabs by which the default hand bends the curve."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -40,12 +36,12 @@ from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 from sim.users.intent import Grab
 
-REACH = 1.8  # [s] in which the default hand gets to a place: a quarter of a lap at about the curve's own pace
-# Radii of the tube beside the curve, where it means to press; until then the search pulls it in by a third.
+REACH = 1.8  # [s] time of the default hand to get to a place: a quarter of a lap at about the curve's own pace
+# Distance from the curve, in tube radii, at which the hand means to press; the seeking spring pulls it in by a third.
 OUTSIDE = 2.2
-EASE = 1.0  # [s] in which the performance of the bent curve comes to its pace
-_BLINK = 0.05  # [s] a flight lasts longer
-_BEND = 2.0  # steepest slope of a bump of height and half width 1, and a little more
+EASE = 1.0  # [s] time in which the performance of the bent curve comes up to its pace
+_BLINK = 0.05  # [s] airborne phases up to this long are not taken for flights
+_BEND = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
@@ -54,7 +50,7 @@ def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts
 
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
-    """Parts of a run in the mode "stretch-then-follow", which performs once the last grab is over."""
+    """Parts of a run in the mode "stretch-then-follow": FOLLOW on the bent curve once the last grab is over."""
     course = maps.course(mode.damping, mode.stiffness)
     user = _user(config, mode, maps)
     until = edited_until(user.grabs)
@@ -69,7 +65,7 @@ def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: 
 
 
 class _Performance(NamedTuple):
-    """What performs the bent curve, from when on [s], its springs, and what its damper injects [W]."""
+    """FOLLOW on the bent curve: its law, when it begins [s], its springs, and the power of its damper [W]."""
 
     law: Follow | None
     until: float
@@ -79,7 +75,7 @@ class _Performance(NamedTuple):
 
 def _user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
     by_default = stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
-    if config.user.person is not None:  # who does not click where the stylus happens to be
+    if config.user.person is not None:  # a person makes no clicks without a place
         by_default = tuple(grab for grab in by_default if grab.place is not None)
     grabs = config.user.grabs or by_default
     return resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
@@ -105,7 +101,7 @@ def _parts(
     pushed = first_pushed_lap(maps.curve, user.grabs)
     if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:
         remarks = (f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that",)
-    # A press of the switch leaves the search for the rubber: its energy once a second.
+    # A press of the switch replaces the seeking spring by the rubber; its energy is allowed once a second.
     springs = ((max(seek, mode.rubber), SPAN), *performance.springs)
     power = spring_store(mode.rubber, mode.rubber_tube) + performance.power
     notes = Notes(mode.kind.upper(), mode.rubber_tube, "tube", hand_does="traces" if user.traces else "grabs or pushes")
@@ -124,14 +120,14 @@ def _parts(
         user=user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
         gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
-        # A bent curve keeps its phases: the same phase of the curve that was given is what it was before.
+        # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
         remarks=flight_remarks(maps.clips) + remarks + turning_remark(user, maps.expressive),
     )  # fmt: skip
 
 
 def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
-    """What is said of clips that fly where a hand may hold them: a body in the air falls with g."""
+    """Remarks on clips with flights where a hand may hold the figure: a body in the air cannot be held."""
     flying: list[str] = []
     over: list[str] = []
     for clip in clips:
@@ -140,7 +136,7 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
         if longest <= _BLINK * clip.fps:
             continue
         flying.append(clip.name)
-        # The height of the root's own vertical axis.
+        # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.
         if np.any(clip.poses[air, 4] ** 2 + clip.poses[air, 5] ** 2 > 0.5):
             over.append(clip.name)
     remarks: list[str] = []
@@ -155,10 +151,10 @@ def flight_remarks(clips: tuple[Clip, ...]) -> tuple[str, ...]:
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tuple[Grab, ...]:
-    """What a hand does by default, in thirteen seconds.
+    """Grabs of the default hand, in thirteen seconds.
 
-    It pulls the curve outwards, pulls it up, takes that back and does it again by a short and a long click, and pushes
-    it inwards from outside.
+    The hand pulls the curve outwards, pulls it up, undoes and redoes that by a short and a long click, and pushes the
+    curve inwards from outside.
 
     Parameters
     ----------
@@ -167,7 +163,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     epsilon : float
         Radius of its tube [m].
     share : float
-        Of the ways by which it bends the curve.
+        Factor on the distances by which the hand bends the curve.
     """
     phases = curve.start + curve.duration * np.array([1.0, 3.0, 5.0]) / 8.0
     first, second, third = curve.point(phases)

@@ -1,4 +1,4 @@
-"""How the physical figure follows what a map shows, tried before a run and kept."""
+"""Trials before a run of how the physical figure follows a map's animation; results are cached."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -22,9 +22,9 @@ class Verdict(NamedTuple):
     Attributes
     ----------
     residual : float
-        RMS of the force that is lacking [body weights].
+        RMS of the residual force [body weights].
     fell : float
-        When it fell [s]; infinite if it did not.
+        Time at which it fell [s]; infinite if it did not.
     """
 
     residual: float
@@ -37,35 +37,35 @@ class Verdict(NamedTuple):
 
     @property
     def bearable(self) -> bool:
-        """Whether it stands and lacks little."""
+        """Whether it does not fall and its residual is at most `BEARABLE`."""
         return not self.falls and self.residual <= BEARABLE
 
     def worse(self) -> tuple[float, float]:
-        """What is larger, the worse: an earlier fall before all."""
+        """Sort key that is larger for a worse verdict: first by an earlier fall, then by the residual."""
         return -self.fell, self.residual
 
     def __str__(self) -> str:
-        """What the figure does."""
+        """In words, as the end of a sentence about the figure."""
         return f"falls at {self.fell:.1f} s" if self.falls else f"lacks {100 * self.residual:.0f} % of weight"
 
 
 def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterable[npt.NDArray[np.generic]]) -> Verdict:
-    """Let the physical figure follow an animation, and keep how; needs compiled code.
+    """Let the physical figure follow an animation, and cache the verdict; needs compiled code.
 
     Parameters
     ----------
     module : str
-        Dotted name of the module that shows it: what is kept is found anew after a change of its code.
+        Dotted name of the module that makes the animation: a change of its code invalidates the cache.
     show : callable
         Makes the animation.
     seconds : float
-        For how long the figure follows [s].
+        Duration for which the figure follows [s].
     made_of : iterable of arrays
         Everything else that the animation depends on.
     """
 
     def find() -> Array:
-        from experiments.preparation.followed import followed  # brings signal processing with it
+        from experiments.preparation.followed import followed  # imported late: loads signal processing
 
         with working("following the blend"):
             told = followed(show(), seconds, compile_units)

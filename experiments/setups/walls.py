@@ -4,11 +4,11 @@ from controllers.fields.soft_wall import SoftWall
 from controllers.haptic_map.base import HapticMap
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 
-DAMPING = 2e-3  # of a joint beyond the greatest speed [N m s/rad]
+DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
 
 
 def figure_walls(haptic_map: HapticMap, stiffness: float, margin: float, speed: float) -> SoftWall:
-    """The limits of the figure's joints, and a greatest speed [rad/s] for each, as a field.
+    """A field that repels the hand from the limits of the figure's joints and from joint speeds above `speed` [rad/s].
 
     Raises
     ------

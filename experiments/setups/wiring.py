@@ -1,4 +1,4 @@
-"""Where a run is put together: from a configuration to a servo that runs."""
+"""Wiring: from a configuration to a linked servo with stylus and figure in their start state (`wire`)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -48,16 +48,16 @@ from sim.world.phantom_port import phantom_port, sense_in_motion
 from sim.world.plant import make_plant
 from sim.world.world import World
 
-MOST_PACE = 1.4  # times the clips' own that passes without a word
+MOST_PACE = 1.4  # ratio of played to recorded pace, or its inverse, beyond which a remark is made
 
 Ready = Callable[[tuple[Unit, ...]], None]
 """Called before compiled code is needed, with its units (see `experiments.compiling`)."""
 
 MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]
-"""From configuration, figure and clips to what the map gives a run."""
+"""Maps configuration, figure and clips to the map's parts."""
 
 DeviceOf = Callable[[World], DeviceState]
-"""Makes the device of a world; by default that is a simulated Phantom in the hand of the run's user."""
+"""Makes the device of a world; without it a simulated Phantom held by the run's user is made."""
 
 
 def wire(
@@ -67,20 +67,20 @@ def wire(
     device: DeviceOf | None = None,
     maps_of: MapsOf = map_parts,
 ) -> Session:
-    """Put a run together.
+    """Wire a run from its configuration.
 
     Parameters
     ----------
     config : RunConfig
-        What to run.
+        Configuration of the run.
     clips : tuple of Clip, optional
-        In place of those that it names.
+        Clips to use in place of those that the configuration names.
     ready : callable
         See `Ready`.
     device : callable, optional
         See `DeviceOf`.
     maps_of : callable
-        What makes the map's parts, as `map_parts` does; many runs on one map may share them.
+        Makes the map's parts, as `map_parts` does; many runs on one map may share them.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def wire(
         least = 2.0 * config.clock.servo_period * config.figure.figure_ticks
         raise ParameterError(f"a run of {config.seconds} s; expected {least:g} s or more, and finite")
     if device is None and config.mode.kind == "lead" and config.figure.kind == "none":
-        raise ParameterError(NOBODY_LED)  # on a device the walker alone is led
+        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
     check_rates(config)
     world = World(config.scene, config.figure.kind)
     if config.device.device_file:
@@ -108,16 +108,16 @@ def assemble(
     ready: Ready,
     device: DeviceOf | None = None,
 ) -> Session:
-    """Put the parts of a run together that a map makes.
+    """Wire a run from a world and the map's parts.
 
     Parameters
     ----------
     world : World
-        That is stepped.
+        The world that is stepped.
     maps : MapParts
-        The map.
+        The map's parts.
     parts_of : callable
-        From the map to the parts; called again when the map has been improved.
+        Makes the run's parts from the map's parts; called again when the map has been refined.
     ready : callable
         See `Ready`.
     device : callable, optional
@@ -130,7 +130,7 @@ def assemble(
     """
     draft = parts_of(maps)
     ready(_units(draft, _servo(draft, world, device)))
-    # Whatever takes compiled code to find is found when everything has been checked, and if anybody is to show it.
+    # The map is refined, which takes compiled code, only after all checks have passed and if there is a figure.
     refined = maps.refine() if world.kind != "none" else maps
     parts = draft if refined is maps else parts_of(refined)
     servo = _servo(parts, world, device).linked(parts.program)
@@ -142,12 +142,12 @@ def assemble(
 
 
 def check_rates(settings: Settings) -> None:
-    """Refuse rates that do not divide, or cannot be filtered.
+    """Check that the rates divide and that the reference can be filtered at them.
 
     Raises
     ------
     ModelError, SimError
-        If they are so.
+        If not.
     """
     settings.scene.substeps()
     figure = settings.figure
@@ -155,19 +155,19 @@ def check_rates(settings: Settings) -> None:
 
 
 def _units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
-    """Compiled code of a run."""
+    """Compilation units that a run needs."""
     more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((stood_unit(),) if parts.bends else ())
     return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
 
 
 def _servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:
-    """The servo of a run, without the addresses of what it calls: nothing has to be compiled for it."""
+    """The servo of a run, not yet linked to the addresses of its kernels, so that nothing need be compiled."""
     config, program = parts.config, parts.program
     compiled, walker = parts.maps.whole_map.compiled(), None
     period = config.clock.servo_period
     field = unlinked_field(program, ForceLimiter(period), parts.tank)
     if parts.walker is not None:
-        # The field moves the walker, the map shows it.
+        # The field moves the walker; the map poses the figure on the walker's path.
         walker = parts.walker(field.memory)
         compiled = compiled._replace(memory=walker.path)
     if device_of is None:
@@ -211,10 +211,10 @@ _BODIES = {"physical": _physical, "kinematic": _kinematic, "none": _none}
 
 
 def _begin(parts: Parts, servo: Servo, world: World) -> None:
-    """Put stylus and figure where the run begins."""
+    """Set stylus and figure to the start state of the run."""
     moves, reference, whole_map = parts.begins_in_motion, servo.reference, parts.maps.whole_map
     begin = beginning(parts.maps.curve, np.random.default_rng(parts.config.seed), moves)
-    # Where its orientation matters, the stylus begins as the curve and the first pose have it.
+    # Where the stylus's orientation matters, it begins upright, as the first pose assumes.
     orientation = UPRIGHT if parts.maps.expressive or parts.user.turns else None
     stylus = begin.velocity if moves else None
     if world.kind == "none":
@@ -238,7 +238,7 @@ def _velocity(haptic_map: HapticMap, argument: Array, begin: Beginning) -> Array
 
 
 def _pace_remark(maps: MapParts[Any]) -> tuple[str, ...]:
-    """What is said when a lap plays the clips much faster or slower than they are."""
+    """Remark, if a lap plays the clips much faster or slower than they were recorded."""
     lap, clips = maps.curve.duration, maps.lap_seconds
     if clips is None or 1.0 / MOST_PACE <= clips / lap <= MOST_PACE:
         return ()

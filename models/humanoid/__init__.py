@@ -1,1 +1,1 @@
-"""The figure: 57 degrees of freedom, de Leva's segments."""
+"""The figure: a humanoid skeleton of 57 degrees of freedom with de Leva's segment inertias."""

@@ -1,4 +1,4 @@
-"""The figure's skeleton: the one definition of its joints, their order, masses, limits and motors.
+"""The figure's skeleton: the single definition of its segments and joints, their order, masses, limits and motors.
 
 A pose is MuJoCo's qpos: root position (3), root quaternion wxyz (4), then 17 unit quaternions = 75 numbers. A tangent
 is MuJoCo's qvel: root velocity in the world (3), root angular velocity in the root frame (3), then 17 angular
@@ -103,7 +103,7 @@ def _mirrored(segment: Segment) -> Segment:
     return segment._replace(com=(x, -y, z), limit=((-x_high, -x_low), y_limit, (-z_high, -z_low)))
 
 
-# The trunk's masses keep de Leva's sum (43.46 %): the clavicles' 2 % come out of the upper trunk.
+# The trunk's masses keep de Leva's sum (43.46 %): the clavicles' 2 % are taken from the upper trunk.
 SEGMENTS: tuple[Segment, ...] = (
     Segment("pelvis", "root", -1, 0.1117, 0.1457 / _H, (0, 0, 0.3885 * 0.1457 / _H), (0.615, 0.551, 0.587), "z",
             _ANY, (0, 0, 0)),
@@ -128,8 +128,8 @@ FOOT_CONTACTS: tuple[str, ...] = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel_out", "heel_in", "toe_out", "toe_in")
 )
 HAND_CONTACTS: tuple[str, ...] = ("left_palm", "right_palm")
-_NEARLY_HALF_TURN = np.deg2rad(175.0)  # where the rotation vector of a joint jumps to its opposite
-CONTACT_RADIUS = 0.02  # of the contact spheres, at the default stature [m]
+_NEARLY_HALF_TURN = np.deg2rad(175.0)  # just below 180°, where the rotation vector of a joint jumps to its opposite
+CONTACT_RADIUS = 0.02  # radius of the contact spheres at the default stature [m]
 
 
 def joint_range() -> npt.NDArray[np.float64]:
@@ -209,7 +209,7 @@ def figure_spec(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) ->
 
 
 def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -> float:
-    """Height of the centre of mass of the figure in its rest pose over the floor [m]."""
+    """Height of the figure's centre of mass above the floor in the rest pose [m]."""
     model = figure_model(stature, mass)
     data = mujoco.MjData(model)
     data.qpos[:] = rest_pose(stature)
@@ -219,9 +219,9 @@ def standing_com(stature: float = DEFAULT_STATURE, mass: float = DEFAULT_MASS) -
 
 
 def _add_stop(joint: mujoco.MjsJoint, segment: Segment) -> None:
-    """Stop a ball joint at the largest angle that its limits admit, where that is less than half a turn.
+    """Limit a ball joint to the largest angle that its box of limits contains, if that is less than half a turn.
 
-    MuJoCo's ball joints know one limit, of the angle of the whole rotation: the corner of the box of `Segment.limit`.
+    MuJoCo's ball joints have a single limit, of the total angle of rotation: that of the corner of `Segment.limit`.
     """
     angle = float(np.linalg.norm(np.abs(segment.limit).max(axis=1)))
     if angle < _NEARLY_HALF_TURN:

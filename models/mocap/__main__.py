@@ -1,4 +1,4 @@
-"""``python -m models.mocap``: make the embedded clips again, all or those named, and write them to ``clips/``."""
+"""``python -m models.mocap [NAME ...]``: regenerate the embedded clips, all or those named, into ``clips/``."""
 
 import sys
 from pathlib import Path

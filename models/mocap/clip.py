@@ -12,14 +12,14 @@ from models.mocap import quaternions
 
 @dataclass(frozen=True)
 class PlanarDisplacement:
-    """A move over the floor: turn by `yaw` about the world's z, then shift.
+    """A planar displacement over the floor: rotation by `yaw` about the world's z, then translation.
 
     Attributes
     ----------
     x, y : float
-        Shift in the world frame [m].
+        Translation in the world frame [m].
     yaw : float
-        Turn [rad], −π to π.
+        Rotation [rad], −π to π.
     """
 
     x: float
@@ -27,7 +27,7 @@ class PlanarDisplacement:
     yaw: float
 
     def moved(self, poses: Array) -> Array:
-        """Poses of shape (..., 75) carried over the floor: p′ = R_z(yaw) p + (x, y, 0), q′ = R_z(yaw) q."""
+        """Displaced poses, shape (..., 75): p′ = R_z(yaw) p + (x, y, 0), q′ = R_z(yaw) q of the root."""
         turn = quaternions.about_axis(2, np.array(self.yaw))
         moved = np.array(poses, dtype=np.float64)
         moved[..., :3] = quaternions.rotated(turn, moved[..., :3]) + np.array([self.x, self.y, 0.0])
@@ -46,7 +46,7 @@ class Clip:
     fps : float
         Frames per second [1/s].
     name : str
-        What the motion is called.
+        Name of the motion.
 
     Raises
     ------
@@ -72,7 +72,7 @@ class Clip:
         if norms.min() < 1e-6:
             frame = int(np.argmin(norms.min(axis=(1, 2))))
             raise ModelError(f"clip {self.name!r}: frame {frame} has a zero quaternion; expected unit quaternions")
-        # A unit quaternion stays as it is, to the last bit, so that a clip made from a clip's poses is the same clip.
+        # Unit quaternions are left unchanged to the last bit, so that a clip made from a clip's poses is identical.
         norms[np.abs(norms - 1.0) < 1e-14] = 1.0
         poses[:, 3:] = quaternions.sign_continuous(rotations / norms).reshape(len(poses), -1)
         object.__setattr__(self, "poses", poses)
@@ -92,7 +92,7 @@ class Clip:
 
     @property
     def displacement(self) -> PlanarDisplacement:
-        """The move over the floor from the first frame's root to the last one's: that of a lap, if the clip closes."""
+        """Planar displacement from the first frame's root to the last one's: that of a lap, if the clip closes."""
         first, last = self.poses[0], self.poses[-1]
         turn = quaternions.product(last[3:7], quaternions.conjugate(first[3:7]))
         yaw = float(2.0 * np.arctan2(turn[3], turn[0]))
@@ -101,7 +101,7 @@ class Clip:
         return PlanarDisplacement(float(last[0] - start[0]), float(last[1] - start[1]), yaw)
 
     def closes(self, tolerance: float = 1e-6) -> bool:
-        """Whether the last frame is the first one moved over the floor, within `tolerance` [rad], [m] at the root."""
+        """Whether the last frame is the first displaced over the floor, within `tolerance` [rad], [m] at the root."""
         if self.n_frames < 2:
             return False
         gap = pose_difference(self.displacement.moved(self.poses[0]), self.poses[-1])
@@ -113,14 +113,14 @@ class Clip:
 
         .. math:: v_k = (\log(q_{k-1}^{-1} q_k) + \log(q_k^{-1} q_{k+1}))\, fps / 2
 
-        Open clips take the one-sided difference at their ends; a clip that closes goes on with its next lap.
+        Open clips have one-sided differences at their ends; a clip that closes is continued periodically.
         """
         if self.n_frames < 2:
             return np.zeros((1, 57))
         steps = pose_difference(self.poses[:-1], self.poses[1:]) * self.fps
         before, after = np.vstack((steps[:1], steps)), np.vstack((steps, steps[-1:]))
         if self.closes():
-            # The root's linear velocity is the only part in the world frame: it turns with the lap.
+            # The root's linear velocity, the only part in the world frame, rotates by the lap's yaw.
             turn = quaternions.about_axis(2, np.array(self.displacement.yaw))
             before[0], after[-1] = steps[-1], steps[0]
             before[0, :3] = quaternions.rotated(quaternions.conjugate(turn), steps[-1, :3])
@@ -129,7 +129,7 @@ class Clip:
 
 
 def pose_difference(start: Pose, end: Pose) -> Array:
-    """The tangent that carries `start` into `end` in unit time, shapes (..., 75) → (..., 57); mj_differentiatePos."""
+    """Tangent from `start` to `end` over unit time (mj_differentiatePos), shapes (..., 75) → (..., 57)."""
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     shape = (*start.shape[:-1], -1, 4)
     turns = quaternions.product(quaternions.conjugate(start[..., 3:].reshape(shape)), end[..., 3:].reshape(shape))

@@ -1,14 +1,14 @@
-r"""One lap of a captured walk: the part of a clip that repeats itself best.
+r"""Extraction of one lap (gait cycle) from a captured walk: the part of a clip that repeats itself best.
 
-A capture begins and ends anywhere, and one that is closed over its ends drags its feet there. Two frames i < j are as
-alike as
+A capture begins and ends at any phase of the gait, and closing it by a blend over its ends makes the feet skate there.
+The distance of two frames i < j is
 
 .. math:: d_{ij}^2 = \tfrac1{18}\,\bigl(\textstyle\sum_k \angle(q_{ik}, q_{jk})^2 + (z_i - z_j)^2/r^2
           + \tau^2 \|\omega_i - \omega_j\|^2 + \tau^2 \|v_i - v_j\|^2/r^2\bigr)
 
-with the rotations of root (but its heading) and joints, the root's height, and their velocities, seen from the heading
-(Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair that is most alike, of those between which the
-figure travels and both feet step.
+with the rotations of root (without its heading) and joints, the root's height, and their velocities relative to the
+heading (Kovar, Gleicher & Pighin 2002, "Motion graphs"). The lap is the pair of least distance among those between
+which the figure travels and both feet step.
 """
 
 from typing import NamedTuple
@@ -22,23 +22,23 @@ from models.mocap.clip import Clip
 from models.mocap.dynamics.contacts import contacts
 
 _TIME, _LENGTH = 0.1, 0.5  # τ [s], r [m]
-CLOSES = 1e-3  # [rad], [m] of a clip that is a lap as it is
-_SHORTEST = 0.4  # [s] of a lap
-_TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest turn of a lap
-_MOST_FRAMES = 1200  # that are compared with each other
+CLOSES = 1e-3  # largest gap of the ends of a clip that is already a lap [rad], [m]
+_SHORTEST = 0.4  # least duration of a lap [s]
+_TRAVEL, _TURN = 0.5, np.deg2rad(30.0)  # least travel [m], largest change of heading of a lap
+_MOST_FRAMES = 1200  # frames that are compared with each other, at most
 
 
 class Lap(NamedTuple):
-    """A lap, and where it was in the clip.
+    """A lap, and its place in the clip.
 
     Attributes
     ----------
     clip : Clip
-        Of its frames.
+        The frames of the lap.
     start, end : float
-        In the clip [s].
+        Times in the original clip [s].
     gap : float
-        d of its ends [rad].
+        d between its ends [rad].
     """
 
     clip: Clip
@@ -73,14 +73,14 @@ def lap_of(clip: Clip) -> Lap:
 
 
 def likeness(clip: Clip, frames: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """D of frames to each other [rad], shape (n, n), and headings, unwrapped, shape (n,)."""
+    """Distances d between frames [rad], shape (n, n), and unwrapped headings [rad], shape (n,)."""
     poses, velocities = clip.poses[frames], clip.velocities()[frames]
     heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])
     back = quaternions.about_axis(2, -heading)
     turns = poses[:, 3:].reshape(len(poses), -1, 4).copy()
     turns[:, 0] = quaternions.product(back, turns[:, 0])
     turns = quaternions.sign_continuous(turns).reshape(len(poses), -1)
-    # Small rotations are twice as long as their quaternions.
+    # The angle between nearby rotations is twice the distance of their quaternions.
     parts = [2.0 * turns, poses[:, 2:3] / _LENGTH, _TIME * velocities[:, 3:]]
     features = np.concatenate([*parts, _TIME / _LENGTH * quaternions.rotated(back, velocities[:, :3])], axis=1)
     squares = (features**2).sum(axis=1)

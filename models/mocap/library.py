@@ -1,4 +1,4 @@
-"""Clips by name or from files: `load_clip` for any format, `embedded` for those of the package."""
+"""Loading of clips: `load_clip` for files of any format, `embedded` for clips of the package; conversion to BVH."""
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -32,9 +32,9 @@ class Loaded(NamedTuple):
     clip : Clip
         The motion on the figure.
     report : RetargetReport or None
-        What the file was taken for; None where it is the figure's own.
+        How the file was interpreted; None for a file on the figure's own skeleton.
     loops : bool or None
-        Whether it goes on from its last frame with its first one, where the file tells it.
+        Whether the motion is cyclic, if the file states it.
     """
 
     clip: Clip
@@ -69,14 +69,14 @@ def load_clip(path: Path) -> Clip:
 
 
 def load(path: Path, hints: Hints | None = None) -> Loaded:
-    """The motion in a file, on the figure, and a report: a file of `write_bvh` as it is, another skeleton retargeted.
+    """The motion in a file, on the figure, and a report: unchanged from a file of `write_bvh`, otherwise retargeted.
 
     Parameters
     ----------
     path : Path
         BVH, AMC or DeepMimic.
     hints : Hints or None
-        What a person knows of a foreign file better than its motion tells.
+        Facts about a foreign file that the user states in place of estimates.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
 
 
 def read_motion(path: Path) -> SourceMotion:
-    """The motion in a file on its own skeleton; the format is told by the suffix, else by the first word.
+    """The motion in a file on its own skeleton; the format follows from the suffix, or else from the first word.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def read_motion(path: Path) -> SourceMotion:
 
 
 def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",)) -> None:
-    """Refuse to write a motion to a file.
+    """Check that a motion may be written to a file.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
 
 @contextmanager
 def writing(target: Path) -> Generator[None]:
-    """Say of a file that cannot be written which one, and why.
+    """Context in which an OSError becomes a ModelError that names the file and the reason.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def convert(
     hints: Hints | None = None,
     writers: Mapping[str, Writer] | None = None,
 ) -> Loaded:
-    """Read any motion file and write it on the figure's 57 channels: calibrated and on the floor, no more.
+    """Read any motion file and write it on the figure's 57 channels: retargeted and put on the floor, nothing more.
 
     Parameters
     ----------
@@ -166,9 +166,9 @@ def convert(
     overwrite : bool
         Replace the target if it exists.
     hints : Hints, optional
-        What a person knows of the source.
+        Facts about the source that the user states.
     writers : mapping, optional
-        What writes a file by the end of its name; by default BVH.
+        Writers by file suffix; by default BVH.
 
     Raises
     ------

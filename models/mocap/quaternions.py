@@ -1,4 +1,4 @@
-"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm, signs that do not jump."""
+"""Arrays of unit quaternions (wxyz): product, rotation of vectors, logarithm, velocities, continuous signs, slerp."""
 
 import numpy as np
 
@@ -41,10 +41,10 @@ def about_axis(axis: int, angle: Array) -> Array:
 
 
 def logarithm(q: Array) -> Array:
-    """Rotation vectors [rad] of the shortest turn, shape (..., 3)."""
+    """Rotation vectors [rad] of the shortest rotation, shape (..., 3)."""
     q = np.where(q[..., :1] < 0.0, -q, q)
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    # s/w to first order is half the angle: near zero the quotient of angle and sine is 2.
+    # Near zero, s is half the angle to first order, so the ratio of angle to s is 2.
     scale = np.where(s > 1e-12, 2.0 * np.arctan2(s, q[..., :1]) / np.maximum(s, 1e-12), 2.0)
     return scale * q[..., 1:]
 
@@ -64,7 +64,7 @@ def sign_continuous(q: Array) -> Array:
 
 
 def slerped(q: Array, r: Array, share: float | Array) -> Array:
-    """Rotations a share of the way from q to r along the shortest turn, shape (..., 4)."""
+    """Spherical linear interpolation by `share` (0 to 1) from q to r along the shortest rotation, shape (..., 4)."""
     half = share / 2 * logarithm(product(conjugate(q), r))
     angle = np.linalg.norm(half, axis=-1, keepdims=True)
     return product(q, np.concatenate((np.cos(angle), np.sinc(angle / np.pi) * half), axis=-1))

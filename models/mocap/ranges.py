@@ -1,4 +1,4 @@
-"""How far poses are beyond the ranges of the figure's joints."""
+"""Excess of poses over the ranges of the figure's joints."""
 
 import numpy as np
 
@@ -8,6 +8,6 @@ from models.mocap import quaternions
 
 
 def beyond_ranges(poses: Array) -> Array:
-    """Of poses (n, 75), the largest excess of each joint's rotation vector [rad], shape (n, 17); negative within."""
+    """Largest excess of each joint's rotation vector over its range [rad], (n, 75) → (n, 17); negative within it."""
     vectors, ranges = quaternions.logarithm(poses[:, 7:].reshape(len(poses), -1, 4)), joint_range()
     return np.maximum(ranges[:, :, 0] - vectors, vectors - ranges[:, :, 1]).max(axis=2)

@@ -1,9 +1,10 @@
-r"""Dynamics of the Phantom in closed form, compiled, and symbolic through ``.py_func``.
+r"""Dynamics of the Phantom in closed form: compiled functions, which also take CasADi symbols through ``.py_func``.
 
 .. math:: M(\theta)\,\ddot\theta + C(\theta, \dot\theta)\,\dot\theta + N(\theta) = \tau
 
 τ are the torques at the joints (motor torque × capstan ratio). Source of M and N: Çavuşoğlu, Feygin & Tendick 2002.
-C is derived from M by Christoffel symbols, since a transcription of the published one has a sign wrong: Ṁ − 2C is skew.
+C is derived from M by Christoffel symbols, so that Ṁ − 2C is skew-symmetric: a transcription of the published C has a
+wrong sign.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ L2 = _P.l2
 L3 = _P.l3
 M_A = _P.m_a
 M_C = _P.m_c
-# Bars be and c turn with θ2, df and a with θ3: what each pair adds about the vertical at angle 0 (yy) and 90° (zz).
+# Bars be and c rotate with θ2, df and a with θ3: inertia of each pair about the vertical at angle 0 (yy) and 90° (zz).
 UPPER_YY = _P.inertia_be[1] + _P.inertia_c[1]
 UPPER_ZZ = _P.inertia_be[2] + _P.inertia_c[2]
 FORE_YY = _P.inertia_df[1] + _P.inertia_a[1]
@@ -33,7 +34,7 @@ WEIGHT_3 = GRAVITY * (0.5 * L2 * M_A + L3 * M_C - _P.l6 * _P.m_df)
 
 @njit
 def mass_matrix(theta: Vec3) -> Matrix3:
-    """M(θ), symmetric [kg m²]; the reflected inertia of the rotors is in the published numbers."""
+    """M(θ), symmetric [kg m²]; the published numbers include the reflected inertia of the rotors."""
     s2, c2 = np.sin(theta[1]), np.cos(theta[1])
     s3, c3 = np.sin(theta[2]), np.cos(theta[2])
     reach_a = L1 * c2 + 0.5 * L2 * s3

@@ -1,10 +1,10 @@
-"""Kinematics of the Phantom in closed form (Çavuşoğlu, Feygin & Tendick 2002), compiled; symbolic through ``.py_func``.
+"""Closed-form kinematics of the Phantom (Çavuşoğlu, Feygin & Tendick 2002): compiled, or symbolic by ``.py_func``.
 
 θ = (θ1, θ2, θ3): turret about y, upper arm above the horizontal, forearm from hanging straight down; θ3 is absolute,
-thanks to the parallelogram. Frame P is the device's: x right, y up, z to the user, origin at the tip for θ = 0. Frame H
-has the same origin and the world's axes (x away from the user, y left, z up). S is the stylus: its axes are parallel to
-H when all six joints are zero. Angles and points come in as anything with three elements (array, tuple, CasADi vector)
-and go out as tuples of scalars, so the same source runs in the servo loop and inside a certificate.
+because of the parallelogram. Frame P is the device's: x right, y up, z to the user, origin at the tip for θ = 0. Frame
+H has the same origin and the world's axes (x away from the user, y left, z up). S is the stylus: its axes are parallel
+to H when all six joints are zero. Arguments are anything with three elements (array, tuple, CasADi vector) and results
+are tuples of scalars, so the same source runs in the servo loop and inside a certificate.
 """
 
 import numpy as np
@@ -32,13 +32,13 @@ R_HP: Matrix3 = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @njit
 def vector_to_hand_frame(v_P: Vec3) -> Scalars3:
-    """v_H = R_HP v_P, for points (one origin), velocities and forces alike."""
+    """v_H = R_HP v_P, for points (P and H have one origin), velocities and forces alike."""
     return -v_P[2], -v_P[0], v_P[1]
 
 
 @njit
 def vector_to_device_frame(v_H: Vec3) -> Scalars3:
-    """v_P = R_HPᵀ v_H, for points (one origin), velocities and forces alike."""
+    """v_P = R_HPᵀ v_H, for points (P and H have one origin), velocities and forces alike."""
     return -v_H[1], v_H[2], -v_H[0]
 
 
@@ -84,8 +84,8 @@ def jacobian(theta: Vec3) -> Matrix3:
 def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
     """Joint angles that put the gimbal centre at a point: the inverse of `forward_kinematics` within the limits.
 
-    With d the distance from the pivot, sin(θ3 − θ2) = (d² − l1² − l2²) / (2 l1 l2). Out of reach, the angles are those
-    of the straight (or folded) arm pointing at the target: finite, and marked.
+    With d the distance from the pivot, sin(θ3 − θ2) = (d² − l1² − l2²) / (2 l1 l2). For a point out of reach, the
+    angles are those of the straight (or folded) arm pointing at it, and `reachable` is False.
 
     Parameters
     ----------
@@ -97,17 +97,17 @@ def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
     theta1, theta2, theta3 : float
         [rad]; −π/2 ≤ θ1 ≤ π/2, −π/2 ≤ θ3 − θ2 ≤ π/2, −π ≤ θ2 < π.
     reachable : bool
-        Whether the arm is long enough. The joint limits are another question: `within_limits`.
+        Whether the point is within the reach of the links; joint limits are checked by `within_limits`.
     """
     depth = p_P[2] + L1
     height = p_P[1] - L2
-    # θ1 stays in front of the base, so a point behind the turret's axis is reached overhead, with a negative ρ.
+    # |θ1| ≤ π/2, so a point behind the turret's axis is reached overhead, with a negative ρ.
     side = np.copysign(1.0, depth)
     reach = side * np.sqrt(p_P[0] * p_P[0] + depth * depth)
     sine = (reach * reach + height * height - L1 * L1 - L2 * L2) / (2.0 * L1 * L2)
     bend = np.arcsin(np.fmin(1.0, np.fmax(-1.0, sine)))
     theta1 = np.arctan2(side * p_P[0], side * depth)
-    # Turned by θ2, the arm of θ2 = 0, whose tip lies at (l1 + l2 sin(bend), −l2 cos(bend)), points at the target.
+    # The arm at θ2 = 0 has its tip at (l1 + l2 sin(bend), −l2 cos(bend)); rotated by θ2 it points at the target.
     swing = np.arctan2(height, reach) + np.arctan2(L2 * np.cos(bend), L1 + L2 * np.sin(bend))
     theta2 = swing - 2.0 * np.pi * np.floor((swing + np.pi) / (2.0 * np.pi))
     return theta1, theta2, theta2 + bend, np.fabs(sine) <= 1.0
@@ -115,7 +115,7 @@ def inverse_kinematics(p_P: Vec3) -> tuple[float, float, float, bool]:
 
 @njit
 def within_limits(theta: Vec3) -> bool:
-    """Whether joint angles respect the stops of θ1, θ2, θ3 and, through the parallelogram, of θ3 − θ2."""
+    """Whether joint angles [rad] are within the limits of θ1, θ2, θ3 and, due to the parallelogram, of θ3 − θ2."""
     bend = theta[2] - theta[1]
     return (
         LIMIT[0][0] <= theta[0] <= LIMIT[0][1]
@@ -165,7 +165,7 @@ def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quat:
     sp, cp = np.sin(0.5 * gimbal[1]), np.cos(0.5 * gimbal[1])
     sr, cr = np.sin(0.5 * gimbal[2]), np.cos(0.5 * gimbal[2])
     aw, ax, ay, az = c1 * c3, -s1 * s3, c1 * s3, s1 * c3
-    # The gimbal's own z–y–x turn.
+    # Rotation of the gimbal, intrinsic z–y–x.
     gw = cy * cp * cr + sy * sp * sr
     gx = cy * cp * sr - sy * sp * cr
     gy = cy * sp * cr + sy * cp * sr
@@ -180,7 +180,7 @@ def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quat:
 
 @njit
 def stylus_axes(theta: Vec3, gimbal: Vec3) -> tuple[Scalars3, Scalars3, Scalars3, Scalars3, Scalars3]:
-    """Unit vectors of H about which θ1, θ3, g1, g2, g3 turn the stylus: ω = Σ a_j q̇_j, columns of `stylus_orientation`.
+    """Rotation axes of the stylus in H for θ1, θ3, g1, g2, g3: ω = Σ a_j q̇_j, the Jacobian of `stylus_orientation`.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def gimbal_angles(theta: Vec3, q_HS: Quat) -> Scalars3:
 
 @njit
 def encoder_reading(theta: Vec3) -> Scalars3:
-    """Joint angles as the motor encoders tell them: rounded to the nearest count [rad]."""
+    """Joint angles as measured by the motor encoders: rounded to the nearest count [rad]."""
     return (
         ENCODER_STEP[0] * np.rint(theta[0] / ENCODER_STEP[0]),
         ENCODER_STEP[1] * np.rint(theta[1] / ENCODER_STEP[1]),
@@ -228,7 +228,7 @@ def encoder_reading(theta: Vec3) -> Scalars3:
 
 @njit
 def gimbal_reading(gimbal: Vec3) -> Scalars3:
-    """Gimbal angles as their encoders tell them: rounded to the nearest count [rad]."""
+    """Gimbal angles as measured by their encoders: rounded to the nearest count [rad]."""
     return (
         GIMBAL_STEP * np.rint(gimbal[0] / GIMBAL_STEP),
         GIMBAL_STEP * np.rint(gimbal[1] / GIMBAL_STEP),

@@ -1,9 +1,9 @@
-"""Every number of the PHANToM Premium 1.5, with where it comes from.
+"""Parameters of the PHANToM Premium 1.5, with the source of every number.
 
 Sources: [C] Çavuşoğlu, Feygin & Tendick, "A Critical Study of the Mechanical and Electrical Properties of the PHANToM
 Haptic Interface", Presence 11(6), 2002, and the technical report of 2001 behind it; [S] SensAble's data sheet of the
-Premium 1.5, at second hand; [M] Maxon's RE 25, as the open models have it; [O] an open C++ model of the Premium 1.5
-built on mahi-util; [E] an estimate of ours.
+Premium 1.5, from secondary sources; [M] Maxon's RE 25, as in the open models; [O] an open C++ model of the Premium 1.5
+built on mahi-util; [E] our estimate.
 """
 
 from dataclasses import dataclass
@@ -24,45 +24,46 @@ def _deg(low: float, high: float) -> Pair:
 class PhantomParameters:
     """Geometry, inertia, drives, sensors and limits of a three-motor Phantom.
 
-    Bars: ``be`` is the upper arm b with what rides behind its pivot, e; ``df`` the short driven link d with its
-    counterweight f; ``c`` the long thin rod; ``a`` the forearm. At θ = 0, be and c lie along z, df and a along y.
+    Bars: ``be`` is the upper arm b with the assembly e behind its pivot; ``df`` the short driven link d with its
+    counterweight f; ``c`` the long thin rod; ``a`` the forearm. At θ = 0, be and c are along z, df and a along y.
 
     Attributes
     ----------
     l1, l2 : float
-        Pivot to elbow, elbow to tip [m] [C].
+        Lengths from pivot to elbow and from elbow to tip [m] [C].
     l3 : float
-        Pivot to the lower end of df: the short side of the parallelogram [m] [C].
+        Length from pivot to the lower end of df: the short side of the parallelogram [m] [C].
     l5, l6 : float
         Centre of mass of be along the bar (negative: behind the pivot), and of df behind the pivot [m] [C].
     m_a, m_c, m_be, m_df : float
         Masses [kg] [C].
     inertia_a, inertia_c : (float, float, float)
-        xx, yy, zz about the bar's centre of mass [kg m²] [C].
+        Moments of inertia xx, yy, zz about the bar's centre of mass [kg m²] [C].
     inertia_be, inertia_df : (float, float, float)
-        xx, yy, zz about the pivot; xx breaks the triangle inequality, so it includes the reflected rotor [kg m²] [C].
+        Moments of inertia xx, yy, zz about the pivot [kg m²] [C]; xx violates the triangle inequality, so it includes
+        the reflected rotor inertia.
     inertia_base_yy : float
-        Turret with its motor about the vertical axis [kg m²] [C].
+        Moment of inertia of the turret with its motor about the vertical axis [kg m²] [C].
     capstan : (float, float, float)
-        Motor turns per joint turn [C].
+        Capstan ratios: motor turns per joint turn [C].
     rotor_inertia : float
-        Of one motor [kg m²] [O]; public models of the RE 25 have 1.03e-6 and 1.07e-6.
+        Rotor inertia of one motor [kg m²] [O]; public models of the RE 25 have 1.03e-6 and 1.07e-6.
     torque_constant : float
-        [N m/A] [M].
+        Torque constant of the motors [N m/A] [M].
     continuous_motor_torque, stall_motor_torque : float
-        At the motor shaft [N m] [M].
+        Continuous and stall torque at the motor shaft [N m] [M].
     encoder_counts : int
         Counts per motor turn after quadrature [C].
     gimbal_counts : int
         Counts per turn of a gimbal joint [E].
     coulomb_friction : (float, float, float)
-        At the joint [N m]: 0.04 N of back-drive friction at the tip [S] times the lever l1, l1, l2.
+        Coulomb friction at the joint [N m]: 0.04 N of back-drive friction at the tip [S] times the lever l1, l1, l2.
     viscous_friction : (float, float, float)
-        At the joint [N m s/rad] [O].
+        Viscous friction at the joint [N m s/rad] [O].
     gimbal_inertia : (float, float, float)
-        Of the stylus about its gimbal axes, kept on the joints so that the linkage keeps the published M [kg m²] [E].
+        Inertia of the stylus about its gimbal axes [kg m²] [E]; as joint armature, it leaves the published M unchanged.
     gimbal_damping : float
-        [N m s/rad] [E].
+        Damping of the gimbal joints [N m s/rad] [E].
     limit : three (float, float)
         Range of θ1, θ2, θ3 [rad] [O].
     elbow_limit : (float, float)
@@ -108,7 +109,7 @@ class PhantomParameters:
 
     @property
     def continuous_torque(self) -> Triple:
-        """Joint torque that the motors can hold for ever [N m]."""
+        """Continuous joint torque of the motors [N m]."""
         n1, n2, n3 = self.capstan
         return self.continuous_motor_torque * n1, self.continuous_motor_torque * n2, self.continuous_motor_torque * n3
 
@@ -120,7 +121,7 @@ class PhantomParameters:
 
     @property
     def encoder_step(self) -> Triple:
-        """Smallest joint angle that the encoders tell apart [rad]."""
+        """Resolution of the encoders at the joints [rad]."""
         n1, n2, n3 = self.capstan
         turn = 2.0 * np.pi / self.encoder_counts
         return turn / n1, turn / n2, turn / n3

@@ -1,4 +1,4 @@
-"""A picture of the Phantom: ``python -m models.phantom.picture OUT.png`` (headless: ``MUJOCO_GL=egl``)."""
+"""Rendering of the Phantom to a PNG: ``python -m models.phantom.picture OUT.png`` (headless: ``MUJOCO_GL=egl``)."""
 
 import sys
 

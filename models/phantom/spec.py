@@ -1,4 +1,4 @@
-"""The Phantom as a MuJoCo model: geometry and closure from ``phantom.xml``, numbers from `PREMIUM_1_5`."""
+"""The Phantom as a MuJoCo model: geometry and loop closure from ``phantom.xml``, parameters from `PREMIUM_1_5`."""
 
 from importlib.resources import files
 
@@ -12,7 +12,7 @@ CLOSING_JOINTS = ("elbow", "twin")
 GIMBAL_JOINTS = ("gimbal1", "gimbal2", "gimbal3")
 MOTORS = ("motor1", "motor2", "motor3")
 
-_WEIGHTLESS = 1e-14  # MuJoCo wants every moving body to weigh something [kg], [kg m²]
+_WEIGHTLESS = 1e-14  # MuJoCo requires every moving body to have a mass and inertia [kg], [kg m²]
 
 
 def _set_inertia(spec: mujoco.MjSpec, body: str, mass: float, com: Triple, about_com: Triple) -> None:
@@ -29,22 +29,22 @@ def _set_range(spec: mujoco.MjSpec, joint: str, limit: Pair) -> None:
 def phantom_spec() -> mujoco.MjSpec:
     """The Premium 1.5 as an editable MuJoCo model, to be attached into a world.
 
-    Its base body is the device frame P (y up): the world turns it so that P's y axis points against gravity. The
-    reflected inertia of the rotors is taken out of the published inertias of turret, be and df and put into the joints'
-    armature: M stays exactly as published, and what remains of the bars obeys the triangle inequality. The gimbal
-    weighs nothing, as in the published model; its joints carry the stylus's inertia as armature.
+    Its base body is the device frame P (y up): the world rotates it so that P's y axis points against gravity. The
+    reflected inertia of the rotors is subtracted from the published inertias of turret, be and df and added to the
+    joints as armature: M remains exactly as published, and the remaining inertias of the bars obey the triangle
+    inequality. The gimbal is massless, as in the published model; its joints have the stylus's inertia as armature.
 
     Returns
     -------
     mujoco.MjSpec
-        Joints theta1..3 (motors), elbow, twin (closed by equalities), gimbal1..3; torque motors motor1..3
-        [N m at the joint]; site tip at the gimbal centre, its axes those of the stylus.
+        Joints theta1..3 (motors), elbow, twin (loop closed by equality constraints), gimbal1..3; torque motors
+        motor1..3 [N m at the joint]; site tip at the gimbal centre, with the axes of the stylus.
     """
     p = PREMIUM_1_5
     spec = mujoco.MjSpec.from_string(files("models.phantom").joinpath("phantom.xml").read_text(encoding="utf-8"))
     rotor = p.armature
     base_yy = p.inertia_base_yy - rotor[0]
-    # The turret turns about y only: its mass and its other two moments play no part.
+    # The turret rotates about y only: its mass and its other two moments of inertia have no effect.
     _set_inertia(spec, "turret", 0.5, (0.0, 0.0, 0.0), (base_yy, base_yy, base_yy))
     steiner_be, steiner_df = p.m_be * p.l5**2, p.m_df * p.l6**2
     be, df = p.inertia_be, p.inertia_df

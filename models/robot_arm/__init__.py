@@ -1,1 +1,1 @@
-"""A seven-joint robot arm of spherical shoulder, elbow and spherical wrist."""
+"""A seven-joint (S-R-S) robot arm: spherical shoulder, revolute elbow, spherical wrist."""

@@ -1,4 +1,4 @@
-"""The robot arm as a MuJoCo model, and the numbers that a closed-form kinematics of it needs."""
+"""The robot arm as a MuJoCo model, and its link lengths and joint limits for closed-form kinematics."""
 
 from importlib.resources import files
 
@@ -22,7 +22,7 @@ def arm_model() -> mujoco.MjModel:
 
 
 def arm_lengths(model: mujoco.MjModel) -> tuple[float, float, float, float]:
-    """Base to shoulder, shoulder to elbow, elbow to wrist, wrist to tool [m], of a compiled arm."""
+    """Link lengths of a compiled arm: base to shoulder, shoulder to elbow, elbow to wrist, wrist to tool [m]."""
     return (
         float(model.body("shoulder_yaw").pos[2]),
         float(model.body("elbow").pos[2]),

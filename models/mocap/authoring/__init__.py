@@ -1,1 +1,1 @@
-"""The embedded clips: key poses, gaits and flights from which they are made."""
+"""Authoring of the embedded clips from key poses, footsteps and gait curves."""

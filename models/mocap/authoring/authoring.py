@@ -1,8 +1,8 @@
-"""Authoring engine: readable key poses and footsteps in, C² motion of the figure out.
+"""Authoring of motions: key poses and footsteps are interpolated to a C² motion of the figure.
 
-The body above the hips is keyed in anatomical words and interpolated by splines; the feet follow their own tracks of
-footsteps, exact rests on the floor joined by quintic swings; the legs between the two are solved in closed form.
-Angles of keys are in degrees, lengths in metres, times in seconds.
+The body above the hips is keyed by anatomical angles and interpolated by splines. The feet follow footstep tracks:
+exact stances on the floor joined by quintic swings. The legs are solved by closed-form inverse kinematics. Angles of
+keys are in degrees, lengths in metres, times in seconds.
 """
 
 from collections.abc import Sequence
@@ -18,10 +18,10 @@ from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_POSE, figure_model
 
-_TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame, about which a heel rises
+_TOE = np.array([0.165, 0.0, -0.048])  # middle of the toe contacts in the foot's frame [m], about which the heel rises
 _HANG = Rotation.from_euler("x", -90, degrees=True)  # left arm from the T-pose to hanging, palm inwards
-_REACH = (0.95, 0.999)  # shares of a leg's length: reached as asked, and never exceeded
-_LIFT = np.array([0.06, np.deg2rad(15)])  # of toes [m] and heel in the middle of a swing that says nothing else
+_REACH = (0.95, 0.999)  # shares of a leg's length: exact up to the first, limited to the second
+_LIFT = np.array([0.06, np.deg2rad(15)])  # default lift of toes [m] and pitch of the foot in mid-swing
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class Arm:
     raised : float
         Elevation of the upper arm: 0 hanging, 90 horizontal, 180 overhead.
     plane : float
-        Where it is raised towards: 0 forwards, 90 sideways, negative across the body (ISB's plane of elevation).
+        Plane of elevation (ISB): 0 forwards, 90 sideways, negative across the body.
     turn : float
-        Inward rotation about its own axis.
+        Inward rotation of the upper arm about its own axis.
     elbow : float
-        Flexion.
+        Flexion of the elbow.
     pronation : float
-        Turn of the palm: positive brings it down when the elbow is bent.
+        Pronation of the forearm: positive turns the palm down when the elbow is bent.
     wrist : float
         Flexion of the hand towards the palm.
     """
@@ -56,7 +56,7 @@ class Arm:
         raised, plane = np.deg2rad([self.raised, self.plane])
         swing = Rotation.from_rotvec(raised * np.array([np.sin(plane), -np.cos(plane), 0.0]))
         arm = swing * _HANG * Rotation.from_euler("y", self.turn, degrees=True)
-        # The shoulder girdle takes its share: it rises with the arm (scapulohumeral rhythm) and reaches forwards.
+        # The shoulder girdle moves with the arm: it rises (scapulohumeral rhythm) and protracts.
         lift = 0.2 * max(0.0, self.raised - 30.0)
         reach = -14.0 * np.sin(raised) * np.cos(plane)
         clavicle = Rotation.from_euler("zx", [reach, lift], degrees=True)
@@ -67,20 +67,20 @@ class Arm:
 
 @dataclass(frozen=True)
 class Key:
-    """What is keyed at a time; what is None is left to the keys before and after.
+    """A key of the body at a time; channels that are None are interpolated between other keys.
 
     Parameters
     ----------
     t : float
         Time [s].
     x, y, height : float
-        Place of the pelvis in the world [m]; 0.9286 is the height with straight legs.
+        Position of the pelvis in the world [m]; 0.9286 is its height with straight legs.
     yaw, lean, tilt : float
         Heading to the left, then pitch forwards and roll to the left of the pelvis [degrees].
     trunk : (bend, side, twist)
-        Of the chest against the pelvis: forwards, to the left, to the left [degrees].
+        Chest relative to the pelvis: forwards, to the left, to the left [degrees].
     head : (nod, tilt, turn)
-        Of the head against the *pelvis*, so that the gaze is steady when the trunk moves: down, left, left [degrees].
+        Head relative to the *pelvis*, so that the gaze is steady when the trunk moves: down, left, left [degrees].
     left_arm, right_arm : Arm
         The arms.
     """
@@ -100,20 +100,20 @@ class Key:
 
 @dataclass(frozen=True)
 class Step:
-    """A foot at a time: two resting steps in one place are a plant, resting steps in two places a swing.
+    """A foot's pose at a time: between two resting steps in one place is a stance, in two places a swing.
 
     Parameters
     ----------
     t : float
         Time [s].
     x, y : float
-        Place of the ankle when the foot lies flat [m].
+        Position of the ankle when the foot lies flat [m].
     z : float
         Height of the sole at the toes [m].
     yaw, pitch, roll : float
         Heading to the left; heel up about the toes; roll [degrees].
     knee : float
-        How far the knee points outwards of the way between the headings of foot and pelvis [degrees].
+        Angle by which the knee points outwards of the mean heading of foot and pelvis [degrees].
     rest : bool
         Whether the foot has no velocity and no acceleration here.
     """
@@ -132,7 +132,7 @@ class Step:
     def in_air(
         cls, t: float, ankle: tuple[float, float, float], yaw: float = 0.0, pitch: float = 0.0, knee: float = 0.0
     ) -> "Step":
-        """Pass through an ankle position in the air [m]: for kicks, which are aimed with the leg, not with the toes."""
+        """A step given by a position of the ankle in the air [m], through which the foot passes, as in kicks."""
         heading = Rotation.from_euler("z", yaw, degrees=True)
         toe = np.array(ankle) + (heading * Rotation.from_euler("y", pitch, degrees=True)).apply(_TOE)
         x, y, z = toe - heading.apply([_TOE[0], 0.0, CONTACT_RADIUS])
@@ -141,7 +141,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Lap:
-    """What one lap of a cyclic motion adds to the place [m] and heading [degrees] of the figure."""
+    """Displacement [m] and change of heading [degrees] of the figure in one lap of a cyclic motion."""
 
     x: float = 0.0
     y: float = 0.0
@@ -150,18 +150,18 @@ class Lap:
 
 @dataclass(frozen=True)
 class Choreography:
-    """A motion as it is written down.
+    """A motion given by keys and footsteps.
 
     Parameters
     ----------
     name : str
         Name of the clip.
     duration : float
-        Length [s]; of one lap, when it is cyclic.
+        Duration [s]; of one lap, if it is cyclic.
     keys : sequence of Key
         Body keys; every channel must be keyed at least once. Cyclic motions need times within one duration.
     left_foot, right_foot : sequence of Step
-        The tracks of the feet, with at least one resting step each.
+        Footstep tracks, with at least one resting step each.
     lap : Lap or None
         Displacement of one lap of a cyclic motion; None for a motion that starts and ends at rest.
     """
@@ -175,7 +175,7 @@ class Choreography:
 
 
 def _check_times(choreography: Choreography, what: str, times: Array) -> None:
-    """Refuse times that do not increase or, in a lap, come back to where they began."""
+    """Refuse times that do not increase or, in a cyclic motion, span a whole lap or more."""
     if np.any(np.diff(times) <= 0) or (choreography.lap is not None and np.ptp(times) >= choreography.duration):
         raise ModelError(
             f"{choreography.name}: {what} at {times.tolist()} s; times must increase and those of a cyclic motion span "
@@ -184,7 +184,7 @@ def _check_times(choreography: Choreography, what: str, times: Array) -> None:
 
 
 def _from_rest_to_rest(times: Array, values: Array) -> BSpline:
-    """Quintic spline through values (n, k) without velocity and acceleration at either end."""
+    """Quintic spline through values (n, k) with zero velocity and acceleration at both ends."""
     still = [(1, np.zeros(values.shape[1])), (2, np.zeros(values.shape[1]))]
     return make_interp_spline(times, values, k=5, bc_type=(still, still))
 
@@ -223,8 +223,8 @@ _STEP_CHANNELS = tuple(f.name for f in fields(Step) if f.name not in ("t", "rest
 def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
     """Track of a foot as (x, y, z, yaw, pitch, roll, knee) [m, rad], shape (n, 7).
 
-    Quintic splines from resting step to resting step, with no velocity and acceleration at either: C², and a plant is
-    constant exactly. A swing that passes through no step in between is lifted, heel first.
+    Quintic splines between resting steps have zero velocity and acceleration there, so the track is C², and exactly
+    constant in stance. A swing without steps in between is lifted by `_LIFT`, heel first.
     """
     steps: Sequence[Step] = getattr(choreography, f"{side}_foot")
     rests = [i for i, step in enumerate(steps) if step.rest]
@@ -263,7 +263,7 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
 
 @cache
 def _leg_geometry() -> tuple[Array, float, float]:
-    """Place of the left hip in the pelvis, lengths of thigh and shank [m], of the figure at its default stature."""
+    """Position of the left hip in the pelvis, and lengths of thigh and shank [m], of the figure at default stature."""
     model = figure_model()
     return model.body("left_thigh").pos, -model.body("left_shank").pos[2], -model.body("left_foot").pos[2]
 
@@ -271,18 +271,18 @@ def _leg_geometry() -> tuple[Array, float, float]:
 def solve_leg(
     side: str, root: Array, pelvis: Rotation, ankle: Array, foot: Rotation, knee: Array
 ) -> tuple[Rotation, Rotation, Rotation]:
-    """Closed-form leg: the knee bends about one axis, held as near as can be to the sideways axis of pelvis and foot.
+    """Closed-form inverse kinematics of a leg; the knee axis is as near as possible to lateral in pelvis and foot.
 
     Parameters
     ----------
     side : {"left", "right"}
         Which leg.
     root, ankle : array, shape (n, 3)
-        Origins of pelvis and foot in the world [m]. An ankle out of reach is drawn in smoothly to the leg's length.
+        Origins of pelvis and foot in the world [m]. The distance of an ankle out of reach saturates smoothly.
     pelvis, foot : Rotation
         Orientations of pelvis and foot in the world, n each.
     knee : array, shape (n,)
-        How far the knee points outwards [rad].
+        Angle by which the knee points outwards [rad].
 
     Returns
     -------
@@ -296,7 +296,7 @@ def solve_leg(
     u = line / distance[:, None]
     soft, hard = _REACH[0] * (a + b), _REACH[1] * (a + b)
     over = np.maximum(distance - soft, 0.0) / (hard - soft)
-    # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
+    # x / (1 + x³)^(1/3) agrees with x up to the second derivative at 0, so the saturation is C².
     d = np.where(over > 0, soft + (hard - soft) * over / np.cbrt(1 + over**3), distance)
     sideways = pelvis.apply([0.0, 1.0, 0.0]) + foot.apply([0.0, 1.0, 0.0])
     sideways = Rotation.from_rotvec(np.outer(sign * knee, [0.0, 0.0, 1.0])).apply(sideways)
@@ -320,7 +320,7 @@ def poses_at(choreography: Choreography, t: Array, sway: Array | None = None) ->
     t : array, shape (n,)
         Times [s].
     sway : array, shape (n, 2), optional
-        Added to the pelvis's place in the plane [m]; see `models.mocap.authoring.balance`.
+        Added to x and y of the pelvis [m]; see `models.mocap.authoring.balance`.
 
     Returns
     -------

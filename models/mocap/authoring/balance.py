@@ -1,11 +1,11 @@
 """Balance of a cyclic motion: its zero-moment point, and the sway of the pelvis that brings it under the feet.
 
-The zero-moment point (Vukobratović & Borovac 2004) is where the floor would have to push so that the body needs no
-other help: with mass m, centre of mass c, angular momentum L about it and F = m (c̈ + g e_z),
+The zero-moment point (Vukobratović & Borovac 2004) is the centre of pressure that the motion needs: with mass m, centre
+of mass c, angular momentum L about it and F = m (c̈ + g e_z),
 
     p_x = c_x − (c_z F_x + L̇_y) / F_z,    p_y = c_y − (c_z F_y − L̇_x) / F_z.
 
-Feet can only push inside the convex hull of their contacts.
+Feet can only give it inside the support polygon, the convex hull of their contacts.
 """
 
 from typing import NamedTuple
@@ -20,20 +20,20 @@ from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.clip import Clip
 
 GRAVITY = 9.81
-_TOUCH = 0.006  # a contact sphere this near the floor [m] can push
+_TOUCH = 0.006  # height below which a contact sphere counts as support [m]
 
 
 class Dynamics(NamedTuple):
-    """What a motion asks of the floor, frame by frame.
+    """Ground reaction force that a motion needs, frame by frame.
 
     Attributes
     ----------
     com : array, shape (n, 3)
         Centre of mass [m].
     force : array, shape (n, 3)
-        Force of the floor on the body [N].
+        Ground reaction force [N].
     torque : array, shape (n, 3)
-        Rate of the angular momentum about the centre of mass [N m]: the moment that force must have about it.
+        Rate of angular momentum about the centre of mass [N m]: the moment of the ground reaction about it.
     zmp : array, shape (n, 2)
         Zero-moment point on the floor [m].
     contacts : array, shape (n, 8, 3)
@@ -48,7 +48,7 @@ class Dynamics(NamedTuple):
 
 
 def dynamics(clip: Clip) -> Dynamics:
-    """Centre of mass, floor force and zero-moment point of a clip that closes in place, by differences over the lap.
+    """Centre of mass, ground reaction and zero-moment point of a clip that closes in place, by finite differences.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def dynamics(clip: Clip) -> Dynamics:
     Returns
     -------
     Dynamics
-        Of the frames but the last.
+        One row for each frame but the last.
     """
     model = figure_model()
     data = mujoco.MjData(model)
@@ -82,16 +82,16 @@ def dynamics(clip: Clip) -> Dynamics:
 
 
 def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
-    """The point of the support nearest to a point on the floor.
+    """The point of the support polygon nearest to a point on the floor.
 
     Parameters
     ----------
     point : array, shape (2,)
-        Where, in the plane of the floor [m].
+        The point [m].
     contacts : array, shape (k, 3)
-        Centres of the contact spheres [m]; those that touch the floor span the support.
+        Centres of the contact spheres [m]; those that touch the floor span the polygon.
     share : float
-        How far the support is shrunk towards its middle.
+        Factor by which the polygon is scaled about its middle.
 
     Returns
     -------
@@ -122,24 +122,23 @@ def supported(point: Array, contacts: Array, share: float = 1.0) -> Array:
 def balanced_clip(
     choreography: Choreography, fps: float, cutoff: float = 8.0, rounds: int = 12, share: float = 0.7
 ) -> Clip:
-    """Sample a cyclic in-place choreography, its pelvis swaying so that the zero-moment point stays under the feet.
+    """Sample a cyclic in-place choreography with a sway of the pelvis that keeps the zero-moment point under the feet.
 
-    A pelvis that sways by δ moves the zero-moment point by about δ − (h/g) δ̈ (cart-table model, Kajita et al. 2003).
-    For a periodic error e that is solved harmonic by harmonic, δ̂ = ê / (1 + h ω²/g), and repeated on the exact
-    dynamics.
+    A sway δ of the pelvis moves the zero-moment point by about δ − (h/g) δ̈ (cart-table model, Kajita et al. 2003). For
+    a periodic error e this is solved harmonic by harmonic, δ̂ = ê / (1 + h ω²/g), and iterated with the exact dynamics.
 
     Parameters
     ----------
     choreography : Choreography
         The motion; its sway is added to the x and y of its keys.
     fps : float
-        Frames per second [1/s].
+        Frame rate [1/s].
     cutoff : float
-        Highest frequency of the sway [Hz]: it is smooth by construction.
+        Highest frequency of the sway [Hz].
     rounds : int
-        Repetitions.
+        Number of iterations.
     share : float
-        Share of the support, about its middle, in which the zero-moment point is asked to lie.
+        The zero-moment point is to lie within the support polygon scaled by this factor about its middle.
 
     Returns
     -------
@@ -155,7 +154,7 @@ def balanced_clip(
         wanted = [
             supported(point, contacts, share) for point, contacts in zip(motion.zmp, motion.contacts, strict=True)
         ]
-        # A sway adds a moment: the same one moves the zero-moment point further where the floor pushes less.
+        # A sway adds a moment, which moves the zero-moment point further where the vertical force is smaller.
         load = np.maximum(motion.force[:, 2:] / motion.force[:, 2].mean(), 0.0)
         error = np.fft.rfft(load * (np.array(wanted) - motion.zmp), axis=0)
         error[frequency > cutoff] = 0.0

@@ -1,4 +1,4 @@
-"""Key poses of the embedded dances and gestures; `models.mocap.authoring.authoring` makes motion of them.
+"""Key poses and footsteps of the embedded dances and gestures, interpolated by `models.mocap.authoring.authoring`.
 
 Angles in degrees, lengths in metres, times in seconds; the figure faces +x, its left is +y.
 """
@@ -145,7 +145,7 @@ def squat_dance() -> Choreography:
             stand = Step(start - beat, 0.0, side * 0.10, yaw=side * 24, knee=20)
             track += [
                 replace(stand, t=start - beat - 0.02),
-                # Under the body's whole weight the knee comes in over the foot: less of a moment about it and the hip.
+                # Under full body weight the knee is over the foot, which reduces the moments at knee and hip.
                 replace(stand, t=start - beat + 0.16, knee=0, rest=False),
                 replace(stand, t=start - beat / 2, knee=-4, rest=False),
                 replace(stand, t=start - 0.16, knee=0, rest=False),

@@ -1,8 +1,8 @@
-"""Standing jump and backflip: key poses, made to push off, fly and land by spacetime optimisation.
+"""Standing jump and backflip: key poses, made feasible by spacetime optimisation.
 
-Both are symmetric, left and right, so everything happens in the sagittal plane. While no foot stands, the spacetime
-optimisation leaves no force but gravity: the centre of mass follows its parabola and angular momentum stays what the
-push-off made it, so the backflip turns as fast as its tuck allows (Yeadon 1990, "The simulation of aerial movement").
+Both motions are symmetric, so they are described in the sagittal plane. While no foot stands, the optimisation leaves
+no force but gravity: the centre of mass moves on a parabola and angular momentum is conserved from push-off, so the
+backflip turns as fast as its tuck allows (Yeadon 1990, "The simulation of aerial movement").
 """
 
 from collections.abc import Callable
@@ -20,8 +20,8 @@ from models.mocap.dynamics.floor_forces import soles
 from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
 
 FPS = 120.0
-_HIP = 0.0875  # from the middle to a hip [m]: the feet stand below the hips
-# Symmetric degrees of freedom, and what a radian (metre) of distance from the sketch costs.
+_HIP = 0.0875  # half the distance of the hips [m]: the feet stand below them
+# Symmetric degrees of freedom, with the weights of a distance of a radian (metre) from the sketch.
 _ACTIVE = (
     ("position", "x", 0.3), ("position", "z", 0.3), ("root", "y", 0.5), ("abdomen", "y", 4.0), ("chest", "y", 4.0),
     ("head", "y", 6.0), ("left_clavicle", "x", 8.0), ("left_clavicle", "z", 8.0), ("left_shoulder", "x", 4.0),
@@ -35,16 +35,16 @@ _ROUGH = Weights(force=3.0, moment=6.0, flight=1.0, slip=100.0, depth=50.0, limi
 
 
 class Key(NamedTuple):
-    """A pose of the sagittal plane at a time; angles in degrees.
+    """A key pose in the sagittal plane; angles in degrees.
 
     Attributes
     ----------
     time : float
-        [s].
+        Time [s].
     hip, knee, ankle : float
         Flexion of hip and knee, dorsiflexion of the ankle.
     pitch : float
-        Of the pelvis, forwards.
+        Forward pitch of the pelvis.
     trunk : float
         Flexion of the trunk on the pelvis, shared by abdomen and chest.
     neck : float
@@ -52,7 +52,7 @@ class Key(NamedTuple):
     arm : Arm
         Both arms.
     place : (float, float)
-        Of the pelvis: x and z [m].
+        x and z of the pelvis [m].
     """
 
     time: float
@@ -72,17 +72,17 @@ class Flight(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the clip.
+        Name of the clip.
     keys : tuple of Key
-        The sketch; the first and the last hold.
+        Key poses of the sketch; the motion begins and ends at rest in the first and the last.
     off, down : (float, float)
-        When heels and toes leave the floor, and when they are back [s].
+        Times at which heels and toes leave the floor, and at which they touch down [s].
     travel : float
-        From the place of push-off to the place of landing [m].
+        Forward displacement of the feet from push-off to landing [m].
     intervals : int
-        Knot intervals.
+        Knot intervals of the spline.
     weights : Weights
-        Of everything but the sketch.
+        Weights of everything but the sketch.
     """
 
     name: str
@@ -99,7 +99,7 @@ _BACK = Arm(raised=48, plane=165, elbow=18)
 
 
 def _stand(time: float, x: float, pitch: float = 0.0) -> Key:
-    """Upright at rest: knees not quite locked, the pelvis 2 cm ahead of the ankles: the weight is over the feet."""
+    """Upright at rest with knees bent by 6° and the pelvis 2 cm ahead of the ankles: the weight is over the feet."""
     thigh, shank, bend = 0.4244, 0.4362, np.deg2rad(6.0)
     alpha = np.arctan2(shank * np.sin(bend), thigh + shank * np.cos(bend))
     length = thigh * np.cos(alpha) + shank * np.cos(bend - alpha)
@@ -147,7 +147,7 @@ BACKFLIP = Flight(
 
 
 def _sketch(keys: tuple[Key, ...], times: Array) -> Array:
-    """The 57 coordinates the keys ask for, shape (m, 57); monotone between keys."""
+    """The 57 coordinates of the key poses, interpolated monotonically at times (m,), shape (m, 57)."""
     u = np.zeros((len(keys), N_TANGENT))
     for row, key in zip(u, keys, strict=True):
         row[0], row[2] = key.place
@@ -161,7 +161,7 @@ def _sketch(keys: tuple[Key, ...], times: Array) -> Array:
 
 
 def _stances(flight: Flight) -> list[Stance]:
-    """Both feet stand until push-off and after landing."""
+    """Contact schedule: both feet stand until push-off and after landing."""
     stances: list[Stance] = []
     for sphere, (name, (x, across, _)) in enumerate(zip(FOOT_CONTACTS, soles(), strict=True)):
         part = int("toe" in name)
@@ -172,7 +172,7 @@ def _stances(flight: Flight) -> list[Stance]:
 
 
 def task(flight: Flight, weights: Weights) -> Task:
-    """The whole flight as a task for the spacetime optimisation, from push-off to recovery."""
+    """The whole motion, from rest to rest, as a task for the spacetime optimisation."""
     frames = 3 * flight.intervals
     duration = flight.keys[-1].time
     columns = np.eye(N_TANGENT)[:, _COLUMNS]
@@ -186,7 +186,7 @@ def task(flight: Flight, weights: Weights) -> Task:
 
 
 def _clip(flight: Flight) -> Clip:
-    # Straight from the sketch to the true weights there are poor minima on the way; a rough solution avoids them.
+    # With the final weights from the start the optimisation ends in poor local minima: a rough solution warm-starts it.
     rough = Motion(task(flight, _ROUGH))
     rough.solve(40, 1e-3)
     motion = Motion(task(flight, flight.weights))

@@ -1,10 +1,10 @@
-"""Walk and run: published normative joint angles, made to stand on the floor by spacetime optimisation.
+"""Walk and run: published normative joint angles, made feasible by spacetime optimisation.
 
 The sketches are the sagittal hip, knee and ankle angles of normal adults at every 5 % of the cycle, rounded to a few
 degrees from what is published: Winter (1991, *The Biomechanics and Motor Control of Human Gait*, natural cadence) and
 Perry & Burnfield (2010, *Gait Analysis*) for the walk, Novacheck (1998, "The biomechanics of running", *Gait & Posture*
-7) for the run. Pelvis and arms are first harmonics of the amplitudes and phases those sources describe. What the
-optimisation changes is what a floor asks for: the path of the pelvis, and a few degrees at the joints.
+7) for the run. Pelvis and arms are first harmonics with the amplitudes and phases that those sources describe. To make
+the motion feasible, the optimisation changes the path of the pelvis, and joint angles by a few degrees.
 """
 
 from collections.abc import Callable
@@ -28,47 +28,47 @@ _ACTIVE = (
       for joint, axes in (("shoulder", "xyz"), ("elbow", "z"), ("hip", "xyz"), ("knee", "y"), ("ankle", "xy"))),
 )  # fmt: skip
 _COLUMNS = [coordinate(joint, axis) for joint, axes in _ACTIVE for axis in axes]
-# Cost of a radian or metre from the sketch: feet and forces lead the pelvis, the sketch leads the look.
+# Weights of a distance of a radian or metre from the sketch: low for the pelvis, which contacts and forces determine.
 _TRACKING = {"position": 0.3, "root": 8.0, "abdomen": 6.0, "chest": 6.0, "head": 10.0, "shoulder": 6.0, "elbow": 6.0,
              "hip": 3.0, "knee": 3.0, "ankle": 3.0}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait's normative curves, in degrees of flexion at 0, 5, …, 95 % of the cycle from the foot's strike.
+    """A gait's normative curves, in degrees of flexion at 0, 5, …, 95 % of the gait cycle from foot strike.
 
     Parameters
     ----------
     name : str
-        Of the clip.
+        Name of the clip.
     period : float
-        Of the cycle, two steps [s].
+        Duration of a gait cycle, two steps [s].
     speed : float
-        [m/s].
+        Forward speed [m/s].
     cycles : int
-        In the clip.
+        Number of gait cycles in the clip.
     hip, knee, ankle : tuple of 20 floats
         Flexion of hip and knee, dorsiflexion of the ankle [degrees].
     heel, toe : (float, float)
-        Shares of the cycle between which heel and toes stand.
+        Shares of the cycle between which heel and toes are in stance.
     width, splay, apart : float
-        Between the feet [m]; of each foot outwards; of the hips, which lets the swinging leg pass the other [degrees].
+        Step width [m]; toe-out of each foot [degrees]; hip abduction, with which the legs pass each other [degrees].
     height, tilt : float
-        Of the pelvis: mean [m], forwards [degrees].
+        Mean height [m] and forward tilt [degrees] of the pelvis.
     turn, obliquity : float
-        Amplitudes of the pelvis about the vertical and about the line of travel [degrees].
+        Amplitudes of pelvic rotation about the vertical and of pelvic obliquity [degrees].
     lean : float
-        Of the trunk forwards, on top of the pelvis's tilt [degrees].
+        Forward lean of the trunk relative to the pelvis [degrees].
     swing : (float, float)
         Shoulder flexion: mean and amplitude [degrees].
     elbow : (float, float)
         Elbow flexion: mean and amplitude [degrees].
     inward : float
-        Turn of the arms about their own axes, which brings the forearms before the body [degrees].
+        Inward rotation of the upper arms, which brings the forearms in front of the body [degrees].
     lead : float
-        Where the ankle is planted ahead of the pelvis's mean path [m].
+        Distance of the ankle ahead of the pelvis's mean position at foot strike [m].
     lift : float
-        Least clearance of the swinging foot at mid-swing [m].
+        Least foot clearance at mid-swing [m].
     intervals : int
         Knot intervals in half a cycle.
     """
@@ -120,13 +120,13 @@ RUN = Gait(
 
 
 def _sketch(gait: Gait, phase: Array) -> Array:
-    """The 57 coordinates a gait's curves ask for at phases of the left foot's cycle, shape (m, 57)."""
+    """The 57 coordinates of a gait's curves at phases (m,) of the left foot's cycle (0 to 1), shape (m, 57)."""
     u = np.zeros((len(phase), N_TANGENT))
     wave = np.cos(2 * np.pi * phase)
     u[:, coordinate("position", "z")] = gait.height
     obliquity, turn = np.deg2rad(gait.obliquity) * np.cos(2 * np.pi * (phase - 0.14)), -np.deg2rad(gait.turn) * wave
     u[:, 3:6] = np.stack([obliquity, np.full(len(phase), np.deg2rad(gait.tilt)), turn], axis=1)
-    # Abdomen and chest undo the pelvis's obliquity and turn it back beyond straight; the head looks ahead.
+    # Abdomen and chest cancel the pelvis's obliquity and counter-rotate the shoulders; the head looks ahead.
     for joint, share in (("abdomen", 0.5), ("chest", 0.5), ("head", 0.0)):
         first = coordinate(joint, "x")
         u[:, first] = -0.9 * share * obliquity
@@ -152,7 +152,7 @@ def _sketch(gait: Gait, phase: Array) -> Array:
 
 
 def _stances(gait: Gait) -> list[Stance]:
-    """Every stand of a contact sphere that meets the first half cycle."""
+    """All stances of contact spheres that overlap the first half cycle."""
     stances: list[Stance] = []
     for sphere, (name, (x, y, _)) in enumerate(zip(FOOT_CONTACTS, soles(), strict=True)):
         sign = 1.0 if name.startswith("left") else -1.0

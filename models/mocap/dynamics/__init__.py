@@ -1,1 +1,1 @@
-"""What a motion asks of the floor and of gravity."""
+"""Dynamics of clips: contacts, contact forces, momentum, and trajectory optimisation."""

@@ -1,8 +1,8 @@
-"""When a clip touches the floor: robust to the few centimetres by which retargeted captures miss it.
+"""Contact detection: which parts of the body touch the floor, robust to errors of some centimetres in captures.
 
-A part of the body that bears load is near the floor *and* at rest. Height alone does not tell: runners' soles clear
-the floor by less than a capture's feet hover over it. Hands bear on fingers that the figure lacks, so their reach is
-longer.
+A part of the body that bears load is near the floor *and* at rest. Height alone does not suffice: the soles of runners
+clear the floor by less than a capture's standing feet may hover above it. Hands are supported by fingers, which the
+figure lacks, so their height threshold is larger.
 """
 
 from typing import NamedTuple
@@ -17,25 +17,24 @@ from models.mocap.clip import Clip
 
 Mask = npt.NDArray[np.bool_]
 
-_CERTAIN = 0.005  # what is lower than this touches, however fast [m]
-_REACH, _HAND_REACH = 0.06, 0.12  # what is higher than this does not, however slow [m]
-_SLOW = 0.6  # m/s: soles that stand slip and roll slower, soles that fly pass faster
-_HIGHER = 0.005  # what has come to rest on the floor is not so much higher than later [m]
-_LOW, _LEVEL = 0.03, 0.25  # what is lower [m] and hardly rises or sinks [m/s] skids over the floor
+_CERTAIN = 0.005  # height below which a part touches at any speed [m]
+_REACH, _HAND_REACH = 0.06, 0.12  # height above which it does not touch at any speed [m]
+_SLOW = 0.6  # speed below which it rests [m/s]: soles slip and roll more slowly in stance, and pass faster in swing
+_HIGHER = 0.005  # largest height of a settled foot over the median of its stance [m]
+_LOW, _LEVEL = 0.03, 0.25  # a part below this height [m] and vertical speed [m/s] slides over the floor
 
 
 class Contacts(NamedTuple):
-    """Parts of the body against the floor, of n frames.
+    """Contacts of m parts of the body with the floor over n frames.
 
     Attributes
     ----------
     heights : array, shape (n, m)
-        Of the lowest points over the floor [m]: the feet's 8 contact spheres, the hands' 2, then all other shapes of
-        the body.
+        Heights of the parts' lowest points [m]: the feet's 8 contact spheres, the hands' 2, then all other geoms.
     touching : array of bool, shape (n, m)
-        Which of them are taken to bear load.
+        Whether a part is taken to bear load.
     resting : array of bool, shape (n, m)
-        Which of them do so at rest: of these, one that skids over the floor in the middle of its swing is none.
+        Whether it does so at rest; a foot that slides over the floor in mid-swing does not rest.
     """
 
     heights: Array
@@ -64,7 +63,7 @@ class Contacts(NamedTuple):
 
     @property
     def settled(self) -> Mask:
-        """Whether each foot stands at rest, no higher than for most of that stance, left and right, shape (n, 2)."""
+        """Whether each foot stands at rest and near the median height of its stance, left and right, shape (n, 2)."""
         settled = self.planted
         for foot, stands in enumerate(settled.T):
             lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
@@ -76,7 +75,7 @@ class Contacts(NamedTuple):
 
 
 def contacts(clip: Clip) -> Contacts:
-    """What of the figure touches the floor z = 0 in each frame of a clip."""
+    """Contacts of the figure with the floor z = 0 in each frame of a clip."""
     model = figure_model()
     data = mujoco.MjData(model)
     spheres = [int(model.geom(name).id) for name in FOOT_CONTACTS + HAND_CONTACTS]
@@ -102,7 +101,7 @@ def contacts(clip: Clip) -> Contacts:
 
 
 def _slower_side(speeds: Array) -> Array:
-    """Speeds at n frames from those between them: at take-off a sole has been at rest, at landing it will be."""
+    """Lower of the speeds before and after each of n frames: a sole rests before take-off, or after landing."""
     if len(speeds) == 0:
         return np.zeros((1, speeds.shape[1]))
     return np.minimum(np.vstack([speeds, speeds[-1:]]), np.vstack([speeds[:1], speeds]))

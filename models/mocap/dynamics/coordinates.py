@@ -1,8 +1,8 @@
-"""The figure's 57 free coordinates: the root's place, and the rotation vectors of the root and of the 17 joints.
+"""Minimal coordinates of the figure (57): position of the root, and rotation vectors of the root and the 17 joints.
 
-They are to positions what MuJoCo's qvel is to velocities, in the same order; unlike a pose's quaternions they form a
-linear space, so splines and least squares work on them. Half a turn of a joint is beyond its limits, so no joint meets
-the singularity at a full turn; the root may (a backflip), if it turns about one axis.
+They are in the order of MuJoCo's qvel. Unlike quaternions they form a linear space, so splines and least squares apply
+to them. Joint limits are below half a turn, so no joint meets the singularity of rotation vectors at a full turn; the
+root may rotate by a full turn (a backflip) if it does so about one axis.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
 from models.mocap import quaternions
 
-_DELTA = 1e-3  # [s] of the difference quotients that turn rotation vectors into angular velocity
+_DELTA = 1e-3  # [s] step of the finite differences for angular velocity and acceleration
 
 
 def coordinate(joint: str, axis: str) -> int:
@@ -37,7 +37,7 @@ def coordinate(joint: str, axis: str) -> int:
 
 
 def reflection() -> Array:
-    """Reflection of the coordinates in the x–z plane, (57, 57): sides swap, y and turns about x and z change sign."""
+    """Matrix (57, 57) of the reflection in the x–z plane: sides swap; y and rotations about x and z change sign."""
     mirror = np.zeros((N_TANGENT, N_TANGENT))
     for i, joint in enumerate(("position", "root", *JOINTS)):
         side, _, rest = joint.partition("_")
@@ -67,7 +67,7 @@ def _turns(a: Array, b: Array) -> Array:
 
 
 def states(u: Array, du: Array, ddu: Array) -> tuple[Array, Array, Array]:
-    """MuJoCo's qpos, qvel, qacc of coordinates and their two time derivatives, (m, 57) ×3 → (m, 75), (m, 57) ×2."""
+    """MuJoCo's qpos, qvel, qacc from coordinates and two time derivatives, (m, 57) ×3 → (m, 75), (m, 57) ×2."""
     bend = 0.5 * _DELTA**2 * ddu
     before, now, after = poses(u - _DELTA * du + bend), poses(u), poses(u + _DELTA * du + bend)
     velocity, acceleration = du.copy(), ddu.copy()

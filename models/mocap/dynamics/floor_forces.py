@@ -1,10 +1,10 @@
-r"""What a motion asks of the floor: whole-body inverse dynamics, and the friction forces that answer it best.
+r"""Contact forces of a motion: whole-body inverse dynamics, and the friction forces that match it best.
 
 .. math:: f^* = \arg\min_{f \ge 0} \lVert S (w - A f) \rVert^2 + \epsilon^2 \lVert f \rVert^2, \qquad r = w - A f^*
 
-w is the wrench at the centre of mass that Newton and Euler demand of the whole figure (the root's rows of M q̈ + c), the
-columns of A are the wrenches of the edges of the standing spheres' friction pyramids, S weighs moments against
-forces, r is the **residual wrench** (DESIGN 4.11). Everything works on batches of m states.
+w is the wrench about the centre of mass that the Newton–Euler equations of the whole figure require (the root's rows of
+M q̈ + c), the columns of A are the wrenches of unit forces along the edges of the standing spheres' friction pyramids, S
+weighs moments against forces, and r is the **residual wrench**. Everything works on batches of m states.
 """
 
 from typing import NamedTuple
@@ -20,15 +20,15 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TA
 
 Mask = npt.NDArray[np.bool_]
 
-_SHARE = 0.01  # ε: makes the forces unique, so that they share the load and depend continuously on the state
-_SLOPE = FRICTION / np.sqrt(2)  # the pyramid lies inside the cone
+_SHARE = 0.01  # ε, regularisation: makes the forces unique, shared between spheres, and continuous in the state
+_SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone
 EDGES = np.array([(x * _SLOPE, y * _SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
 _N_SPHERES = len(FOOT_CONTACTS)
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
 
 class Demand(NamedTuple):
-    """What m states ask for.
+    """Inverse dynamics of m states, and the geometry of their contacts.
 
     Attributes
     ----------
@@ -37,11 +37,11 @@ class Demand(NamedTuple):
     com : (m, 3) array
         Centre of mass in W [m].
     wrench : (m, 6) array
-        Force, and moment about the centre of mass, in W [N, N m].
+        Required force, and moment about the centre of mass, in W [N, N m].
     torque : (m, 51) array
-        Of the joints, without floor [N m].
+        Joint torques without contact forces [N m].
     anchors, frames : (m, 6, 3) and (m, 6, 3, 3) arrays
-        Where the joints of the legs are, and R_WB of the segments they carry.
+        Positions in W of the leg joints [m], and R_WB of the segments that they move.
     """
 
     spheres: Array
@@ -59,7 +59,7 @@ class Demand(NamedTuple):
         return np.concatenate([edges, moments], axis=-1).reshape(len(arms), 4 * _N_SPHERES, 6).transpose(0, 2, 1)
 
     def levers(self) -> Array:
-        """Jᵀ: torques of the joints that a unit force along every edge of every sphere makes, shape (m, 51, 32)."""
+        """Jᵀ: joint torques due to a unit force along every edge of every sphere, shape (m, 51, 32)."""
         soles = self.spheres - (0.0, 0.0, CONTACT_RADIUS)
         levers = np.zeros((*self.torque.shape, 4 * _N_SPHERES))
         for leg, body in enumerate(_LEGS):
@@ -70,17 +70,17 @@ class Demand(NamedTuple):
         return levers
 
     def torque_on(self, grip: Array) -> Array:
-        """τ − Jᵀ f: torques of the joints while the floor pushes with `grip` (m, 32), shape (m, 51) [N m]."""
+        """τ − Jᵀ f: joint torques under contact forces `grip` (m, 32) [N], shape (m, 51) [N m]."""
         return self.torque - np.einsum("mte,me->mt", self.levers(), grip)
 
 
 class Floor:
-    """Answers the demands of the default figure with contact forces.
+    """Finds contact forces for demands of the default figure.
 
     Parameters
     ----------
     moment_per_force : float
-        S: how much a newton metre of residual counts, compared with a newton [1/m].
+        S: weight of a residual moment relative to a residual force [1/m].
     """
 
     def __init__(self, moment_per_force: float = 2.0) -> None:
@@ -107,7 +107,7 @@ class Floor:
         return Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, 6, 3, 3))
 
     def grip(self, demand: Demand, standing: Mask) -> Array:
-        """f*: forces along the pyramids' edges, shape (m, 32) [N]; `standing` (m, 8) says which spheres may push."""
+        """f*: forces along the pyramids' edges, shape (m, 32) [N]; only spheres in `standing` (m, 8) bear load."""
         columns = self._scale[:, None] * demand.columns()
         grip = np.zeros((len(columns), 4 * _N_SPHERES))
         for k, stands in enumerate(standing):
@@ -118,7 +118,7 @@ class Floor:
         return grip
 
     def answer(self, demand: Demand, grip: Array) -> Array:
-        """K: how f* follows the wrench while the same edges carry, df* = K dw, shape (m, 32, 6)."""
+        """K: derivative of f* by the wrench with a fixed set of loaded edges, df* = K dw, shape (m, 32, 6)."""
         columns = (self._scale[:, None] * demand.columns()) * (grip > 0)[:, None]
         inside = columns @ columns.transpose(0, 2, 1) + _SHARE**2 * np.eye(6)
         return columns.transpose(0, 2, 1) @ np.linalg.solve(inside, np.broadcast_to(np.diag(self._scale), inside.shape))
@@ -131,5 +131,5 @@ def soles() -> Array:
 
 
 def residual(demand: Demand, grip: Array) -> Array:
-    """What the floor cannot give, r = w − A f, shape (m, 6) [N, N m]."""
+    """Residual wrench r = w − A f that contact forces leave, shape (m, 6) [N, N m]."""
     return demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)

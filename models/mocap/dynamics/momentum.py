@@ -1,4 +1,4 @@
-"""Centre of mass of a clip, and what turns about it: angular momentum and inertia, frame by frame."""
+"""Centre of mass, angular momentum and inertia of a clip, frame by frame."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from models.mocap.clip import Clip
 
 
 class Momentum(NamedTuple):
-    """Motion of the whole body, of n frames, in the world.
+    """Motion of the whole body in the world over n frames.
 
     Attributes
     ----------
@@ -20,7 +20,7 @@ class Momentum(NamedTuple):
     angular : array, shape (n, 3)
         Angular momentum about the centre of mass [kg m²/s].
     inertia : array, shape (n, 3, 3)
-        Inertia about the centre of mass, of the pose as if it were rigid [kg m²].
+        Composite inertia of the pose as a rigid body about the centre of mass [kg m²].
     """
 
     com: Array

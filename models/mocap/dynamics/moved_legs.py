@@ -1,4 +1,4 @@
-"""Legs that follow a moved body: feet that stand stay where they are, knees bend about their own axes."""
+"""Inverse kinematics of the legs under a displaced body: standing feet keep their places, knees bend as hinges."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap import quaternions
 from models.mocap.clip import global_rotations
 
-_REACH = 0.9995  # share of a leg's length that a knee can straighten to
+_REACH = 0.9995  # largest distance from hip to ankle as a share of the leg's length
 _CHAINS = tuple(
     tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
 )
 
 
 def leg_lines(poses: Array) -> tuple[Array, float]:
-    """From hips to ankles in the world [m], left and right, shape (n, 2, 3), and the length of a straight leg [m]."""
+    """Vectors from hips to ankles in the world [m], shape (n, 2, 3), and the length of a straight leg [m]."""
     thigh, shank = _bones()
     segments = global_rotations(poses)
     lines = [
@@ -25,22 +25,22 @@ def leg_lines(poses: Array) -> tuple[Array, float]:
 
 
 def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
-    """Poses moved as a whole, but for the feet that stand.
+    """Poses displaced as a whole except for standing feet.
 
     Parameters
     ----------
     poses : array, shape (n, 75)
         MuJoCo's qpos.
     shift : array, shape (n, 3)
-        How far the body is moved [m].
+        Displacement of the body [m].
     planted : array, shape (n, 2)
-        How far each foot stays behind, left and right: 1 keeps its place, 0 moves it with the body. Its orientation in
-        the world stays in any case.
+        Share of the displacement that each foot, left and right, does not take: 1 keeps its place, 0 moves it with the
+        body. Its orientation in the world is kept in any case.
 
     Returns
     -------
     array, shape (n, 75)
-        An ankle that would be out of reach is drawn in along the line from the hip.
+        The new poses. An ankle that would be out of reach is moved along the line to the hip.
     """
     thigh, shank = _bones()
     a, b = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
@@ -55,7 +55,7 @@ def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
         axis = np.cross(upper, lower)
         sine = np.linalg.norm(axis, axis=1)
         side = quaternions.rotated(segments[:, first], np.array([0.0, 1.0, 0.0]))
-        # A straight knee has no plane of its own; it bends about the thigh's sideways axis.
+        # A straight knee defines no plane; it bends about the thigh's lateral axis.
         axis = np.where((sine > 0.03 * a * b)[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
         now = np.arctan2(np.sum(np.cross(upper, lower) * axis, axis=1), np.sum(upper * lower, axis=1))
         then = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))

@@ -1,10 +1,9 @@
-"""Spacetime optimisation: the motion nearest a sketch that floor contact alone can drive (Witkin & Kass 1988).
+"""Spacetime optimisation (Witkin & Kass 1988): the feasible motion nearest to a kinematic sketch.
 
-A motion is a quintic B-spline in the figure's `coordinates`. Its control points minimise a sum of squares over
-sampled instants: the distance from a sketch, jerk, effort of the joints, slip of feet that stand, depth of feet that
-swing below their clearance, excess over joint limits, and above all the residual wrench at the root (`floor_forces`).
-In flight no contact gives anything, so the same term makes the centre of mass fall with g and keeps angular momentum
-constant.
+A motion is a quintic B-spline in the figure's `coordinates`. Its control points minimise a sum of squares over sampled
+instants: the distance from the sketch, jerk, joint effort, skate of standing feet, depth of swinging feet below their
+clearance, excess over joint limits, and above all the residual wrench at the root (`floor_forces`). In flight there are
+no contact forces, so the same term makes the centre of mass fall with g and keeps angular momentum constant.
 """
 
 from collections.abc import Sequence
@@ -22,9 +21,9 @@ from models.mocap.dynamics.coordinates import states
 from models.mocap.dynamics.floor_forces import Demand, Floor, residual
 
 DEGREE = 5
-_STRONG = 0.8  # share of the joints' largest torques beyond which effort counts as strain
-_LAG = 0.012  # a sphere stands this long before and after it pushes [s]: no force without touch
-_MARGIN = 0.02  # to the joints' limits [rad]
+_STRONG = 0.8  # share of the torque limits beyond which effort is also penalised as strain
+_LAG = 0.012  # a sphere stands this long before and after it bears load [s], so that there is no force without contact
+_MARGIN = 0.02  # kept from the joints' limits [rad]
 
 
 class Stance(NamedTuple):
@@ -35,9 +34,9 @@ class Stance(NamedTuple):
     sphere : int
         Index into `FOOT_CONTACTS`.
     start, end : float
-        When [s].
+        Start and end of the stance [s].
     place : tuple of float
-        Where its centre is on the floor, x and y [m] in W.
+        x and y of its centre in W [m].
     """
 
     sphere: int
@@ -47,7 +46,7 @@ class Stance(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """What one unit of error costs before it is squared, per sampled instant.
+    """Weights of the errors before squaring, per sampled instant.
 
     Attributes
     ----------
@@ -60,9 +59,9 @@ class Weights(NamedTuple):
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     effort, strain : float
-        Torque of a joint as a share of its largest; what of it is beyond 80 %.
+        Joint torque as a share of its limit; the excess of this share over 80 %.
     sway, jerk : float
-        Third derivatives of the root's place [s³/m] and of rotation vectors [s³/rad].
+        Third derivatives of the root's position [s³/m] and of rotation vectors [s³/rad].
     """
 
     force: float = 20.0
@@ -82,30 +81,30 @@ _EVEN = Weights()
 
 @dataclass(frozen=True)
 class Task:
-    """What a motion should look like and where it stands.
+    """An optimisation problem: sketch, contact schedule and weights.
 
     Parameters
     ----------
     duration : float
-        Of the span that is optimised [s]; half a cycle where `mirror` is given.
+        Duration of the optimised span [s]; half a cycle if `mirror` is given.
     intervals : int
         Knot intervals of the spline in that span.
     embed : (57, n) array
-        Which combinations of the 57 coordinates are free: u = E y.
+        E, which maps the free coordinates y to the 57 coordinates, u = E y.
     mirror : (n, n) array or None
-        What turns y into the other half of the cycle; None for a motion that starts and ends at rest.
+        Maps y to the other half of the cycle; None for a motion that starts and ends at rest.
     speed : float
-        Mean forward speed, on top of the periodic part of the root's x [m/s].
+        Mean forward speed [m/s], added to the periodic part of the root's x.
     sketch : (frames, n) array
-        Wanted y at `times`.
+        Desired y at `times`.
     tracking : (frames, n) array
-        What a unit of distance from the sketch costs.
+        Weights of the distance from the sketch.
     stances : sequence of Stance
-        Who stands when and where.
+        Contact schedule.
     clearance : (frames, 8) array
         Least height of the swinging spheres' lowest points above the floor [m].
     weights : Weights
-        Of everything else.
+        Weights of all other errors.
     """
 
     duration: float
@@ -126,18 +125,18 @@ class Task:
 
 
 class Errors(NamedTuple):
-    """How far m states are from what is wanted.
+    """Errors of m states.
 
     Attributes
     ----------
     weighted : (m, 140) array
-        Residual wrench (6), slip (24), depth (8), effort (51) and excess over limits (51), weighted.
+        Weighted residual wrench (6), slip (24), depth (8), effort (51) and excess over limits (51).
     grip : (m, 32) array
         Contact forces along the pyramids' edges [N].
     residual : (m, 6) array
         Residual wrench about the centre of mass [N, N m].
     demand : Demand
-        What the forces answer.
+        Inverse dynamics of the states.
     """
 
     weighted: Array
@@ -147,7 +146,7 @@ class Errors(NamedTuple):
 
 
 class _Answer(NamedTuple):
-    """Contact forces near sampled states: f ≈ grip + gain (change of the residual at that grip)."""
+    """Linearised contact forces near the sampled states: f ≈ grip + gain × (change of the residual under that grip)."""
 
     grip: Array
     residual: Array
@@ -160,12 +159,12 @@ class Motion:
     Parameters
     ----------
     task : Task
-        What is wanted.
+        The optimisation problem.
 
     Attributes
     ----------
     unknowns : (k,) array
-        x, at first those nearest the sketch.
+        x; initially the least-squares fit to the sketch.
 
     Raises
     ------
@@ -215,7 +214,7 @@ class Motion:
     def _errors(self, y: Array, frames: npt.NDArray[np.intp], answer: _Answer | None) -> Errors:
         """Errors of states y (3, m, n) at the sampled instants `frames`.
 
-        With an `answer`, contact forces follow the demand linearly, at a tenth of the cost.
+        With an `answer`, contact forces depend linearly on the demand, which takes a tenth of the time.
         """
         task, w = self.task, self.task.weights
         u, du, ddu = y @ task.embed.T
@@ -257,7 +256,7 @@ class Motion:
         return np.concatenate(rows).reshape(-1, len(self.unknowns)), np.concatenate(wanted).ravel()
 
     def _normal_equations(self, errors: Errors) -> tuple[Array, Array]:
-        """Gauss–Newton matrix and gradient of the nonlinear errors: differences in y, ẏ, ÿ, then the chain rule."""
+        """Gauss–Newton matrix and gradient of the nonlinear errors: differences by y, ẏ, ÿ, then the chain rule."""
         frames, n = self.task.sketch.shape
         answer = _Answer(errors.grip, errors.residual, self.floor.answer(errors.demand, errors.grip))
         which = np.repeat(np.arange(frames), n)
@@ -277,7 +276,7 @@ class Motion:
         return matrix, gradient
 
     def solve(self, iterations: int, tolerance: float = 1e-4) -> list[float]:
-        """Levenberg–Marquardt from the present unknowns, until the cost falls by less than `tolerance`.
+        """Levenberg–Marquardt from the present unknowns, until a step lowers the cost by a share below `tolerance`.
 
         Returns
         -------
@@ -313,7 +312,7 @@ class Motion:
         return costs
 
     def coordinates(self, times: Array) -> Array:
-        """The 57 coordinates at any times [s], shape (m, 57); a mirrored motion goes on for ever."""
+        """The 57 coordinates at any times [s], shape (m, 57); a motion with a mirror is continued periodically."""
         points = (self._expand @ self.unknowns).reshape(self._ends.shape) + self._ends
         if self.task.mirror is None:
             y = self._basis(times) @ points

@@ -1,1 +1,1 @@
-"""From a capture on the figure to a well-formed clip: at rest or closed, on the floor, feasible on contact alone."""
+"""Preparation of captures: from a retargeted clip to one that is closed or at rest at its ends, and feasible."""

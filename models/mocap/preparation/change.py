@@ -1,9 +1,9 @@
-r"""A small change of a motion: q(t) = q_ref(t) exp δ(t), δ a quintic B-spline in the tangent, and its normal equations.
+r"""A small change of a motion, q(t) = q_ref(t) exp δ(t) with a quintic B-spline δ in the tangent, and normal equations.
 
-A closed motion's spline goes on over its ends, turned by the lap's yaw (matrix W). An open motion rests at both ends,
-and so does its change: the outer five control points are one, so that δ̇ = δ̈ = 0 there. A passage goes on beyond its
-ends as it was: there they are none, and δ = 0 besides. Each instant depends on six control points, so the normal
-equations are banded; those of a closed motion have a border of the last five of them.
+The spline of a closed motion is periodic, up to the lap's yaw (matrix W). An open motion rests at both ends, and so
+does its change: the outer five control points are equal, so that δ̇ = δ̈ = 0 there. A passage, part of a longer motion,
+is unchanged beyond its ends: the outer five control points are zero, so that δ = 0 as well. Each instant depends on six
+control points, so the normal equations are banded; those of a closed motion have a border for the last five points.
 """
 
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from models.mocap.clip import Clip
 from models.mocap.preparation.poses import around, plus
 
 DEGREE = 5
-_STEP = 1e-3  # of the differences that give velocities [s]
-_HELD = DEGREE - 1  # control points beyond an open motion's first and last one that are the same as it
-_MARGIN = 12  # frames beyond the ends of a closed clip that shape its spline
+_STEP = 1e-3  # step of the finite differences for velocities and accelerations [s]
+_HELD = DEGREE - 1  # outer control points at either end of an open motion that equal the first or last free one
+_MARGIN = 12  # frames beyond the ends of a closed clip through which its spline goes
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """States of the changed motion at the sampled instants: MuJoCo's qpos, qvel, qacc."""
+    """States of the changed motion at m sampled instants: qpos (m, 75), qvel (m, 57) and qacc (m, 57)."""
 
     q: Array
     v: Array
@@ -36,16 +36,16 @@ class State:
 
 
 class Change:
-    """δ(t) over a clip: n_points control points of 57 numbers.
+    """The change δ(t) of a clip: n_points free control points of 57 numbers.
 
     Parameters
     ----------
     clip : Clip
         q_ref; closed, or open.
     knot, step : float
-        About how far knots and sampled instants lie apart [s]; both are made to fit the clip.
+        Approximate spacing of knots and of sampled instants [s]; both are adjusted to divide the clip.
     passage : bool
-        Whether an open clip is a part of a motion that goes on beyond its ends, unchanged.
+        Whether an open clip is a part of a longer motion that is unchanged beyond its ends.
 
     Attributes
     ----------
@@ -54,11 +54,11 @@ class Change:
     passage : bool
         As given.
     outer : int
-        Control points at either end of an open one that are not free.
+        Number of control points at either end of an open clip that are not free.
     basis : list of 4 arrays, shape (m, 6)
-        Weights of the six control points that an instant depends on, and their derivatives.
+        Weights of the six control points on which an instant depends, and their first three derivatives.
     first : array of int, shape (m,)
-        Number of the first of them.
+        Index of the first of these six control points.
     """
 
     def __init__(self, clip: Clip, knot: float, step: float, passage: bool = False) -> None:
@@ -98,13 +98,16 @@ class Change:
         return poses
 
     def points(self, x: Array) -> Array:
-        """All control points, those that wrap or are held included, shape (intervals + 5, 57)."""
+        """All control points, including those that wrap around or are not free, shape (intervals + 5, 57)."""
         if not self.closed:
             return np.pad(x, ((self.outer, self.outer), (0, 0)), mode="edge" if self._rests else "constant")
         return np.vstack((x, x[:DEGREE] @ self.wrap.T))
 
     def free(self, interval: int) -> tuple[int, Array]:
-        """The six control points of a knot interval of an open motion by free ones: the first, and shares (6, 6)."""
+        """The control points of a knot interval of an open motion as combinations of free ones.
+
+        Returns the index of the first of six consecutive free points, and the shares (6, 6) of these.
+        """
         points = np.arange(interval, interval + DEGREE + 1) - self.outer
         inside = np.clip(points, 0, self.n_points - 1)
         first = min(int(inside[0]), self.n_points - DEGREE - 1)
@@ -113,7 +116,7 @@ class Change:
         return first, shares
 
     def states(self, x: Array, instants: npt.NDArray[np.intp] | slice = slice(None)) -> State:
-        """The changed motion at the sampled instants, or at some of them."""
+        """States of the changed motion at the sampled instants, or at a subset of them."""
         points, times = self.points(x), self.times[instants]
         which = self.first[instants, None] + np.arange(DEGREE + 1)
         d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[which]) for order in range(3))
@@ -138,7 +141,7 @@ class Change:
         return State(moments[1], v, a)
 
     def changed(self, x: Array, fps: float) -> Clip:
-        """The clip with the change, closed as it was."""
+        """The changed clip at a frame rate [1/s]; closed if the clip was."""
         n = round(self.clip.duration * fps)
         times = np.arange(n + 1) * self._end / n
         tangents = self._spline(np.minimum(times, self._end - 1e-12)) @ self.points(x)
@@ -148,18 +151,18 @@ class Change:
         return Clip(poses, n / self._end, self.clip.name)
 
     def size(self, x: Array) -> Array:
-        """Δ at the sampled instants, shape (m, 57)."""
+        """The change δ at the sampled instants, shape (m, 57)."""
         which = self.first[:, None] + np.arange(DEGREE + 1)
         return np.einsum("mk,mkn->mn", self.basis[0], self.points(x)[which])
 
 
 class Normal:
-    """Normal equations of a change, H x = g: a band, and a border where the motion is closed.
+    """Normal equations H x = g for the control points of a change: a band, and a border where the motion is closed.
 
     Parameters
     ----------
     change : Change
-        Whose control points are unknown.
+        The change whose control points are the unknowns.
     """
 
     def __init__(self, change: Change) -> None:
@@ -172,7 +175,7 @@ class Normal:
         self.corner = np.zeros((change.border, change.border))
 
     def copy(self) -> "Normal":
-        """The same, to be added to."""
+        """A copy to which more blocks can be added."""
         twin = Normal(self._change)
         twin.band, twin.side, twin.corner = self.band.copy(order="K"), self.side.copy(), self.corner.copy()
         return twin
@@ -234,7 +237,7 @@ class Normal:
         return np.concatenate((y + self.side @ border, self.side.T @ inner + self.corner @ border))
 
     def solve(self, g: Array, damping: float) -> Array:
-        """X of (H + damping diag H) x = g."""
+        """Solution x of (H + damping diag H) x = g."""
         band = self.band.copy(order="K")
         band[0] = band[0] * (1.0 + damping) + 1e-9
         factor = cholesky_banded(band, lower=True, check_finite=False)
@@ -248,7 +251,7 @@ class Normal:
         return np.concatenate((cho_solve_banded((factor, True), inner - self.side @ last, check_finite=False), last))
 
     def _lowered(self, factor: Array) -> Array:
-        """L⁻¹ of the side, by blocks as large as the band is wide: one at a time LAPACK's takes three times as long."""
+        """L⁻¹ times the side, in blocks as wide as the band: three times as fast as LAPACK by single columns."""
         width, lowered = self._width, self.side.copy()
         for start in range(0, self._inner, width):
             here = slice(start, min(start + width, self._inner))

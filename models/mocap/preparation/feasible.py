@@ -1,14 +1,16 @@
-r"""The motion nearest a capture that floor contact alone can drive, by Gauss–Newton over the whole of it.
+r"""Trajectory optimisation of a capture: the nearest motion that contact forces and joint torques alone can produce.
 
-Minimises over the change δ(t) of `change` the sum over sampled instants of squared
+Gauss–Newton over the whole motion minimises, over the change δ(t) of `change`, the sum over sampled instants of the
+squares of
 
-- residual wrench at the centre of mass, r = w − A f*, f* the contact forces that answer w best (`floor_forces`;
-  variable projection, Golub & Pereyra 1973), more in flight, where nothing can answer;
-- displacement of standing spheres from their places, depth of the others below the floor;
-- excess over joint limits, torques of the legs beyond three quarters of their strength;
+- the residual wrench at the centre of mass, r = w − A f*, with f* the contact forces that best produce the required
+  wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
+- the displacement of standing contact spheres from their places (foot skate), and the depth of the others below the
+  floor;
+- the excess over joint limits, and torques of the legs beyond three quarters of their limits;
 - the change itself, and its third derivative.
 
-Feet are planted together with the dynamics: planted by inverse kinematics alone, they made tracking worse.
+Feet are planted together with the dynamics: planting them by inverse kinematics alone made tracking worse.
 """
 
 from dataclasses import dataclass
@@ -28,11 +30,11 @@ from models.mocap.preparation.stances import Stances, clearance
 
 Mask = npt.NDArray[np.bool_]
 
-_MARGIN = 0.02  # to the joints' limits [rad]
-_STRONG = 0.75  # share of the legs' largest torques beyond which effort counts
-_KNOT, _STEP = 0.05, 0.0125  # of the change and of the instants [s]; 80 and 20 ms cost half, and a run falls
-_TOLERANCE, _LAST = 0.01, 3  # share of the cost by which the last iterations lower it together, and how many
-_GOOD = 0.25  # share of the promised decrease, below which the next step is damped more
+_MARGIN = 0.02  # kept from the joints' limits [rad]
+_STRONG = 0.75  # share of the torque limits of the legs beyond which torque is penalised
+_KNOT, _STEP = 0.05, 0.0125  # spacing of knots and of instants [s]; 80 and 20 ms halve the time, but a run falls
+_TOLERANCE, _LAST = 0.01, 3  # iteration ends when the last 3 steps together lower the cost by less than 1 %
+_GOOD = 0.25  # ratio of actual to predicted decrease below which the next step is damped more
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
 _N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torques, wrench, slip, depth
@@ -40,7 +42,7 @@ _N, _W, _S, _D = np.cumsum((51, 6, 24, 8))  # ends of the blocks of errors: torq
 
 @dataclass(frozen=True)
 class FeasibleWeights:
-    """What one unit of error costs before it is squared, per sampled instant.
+    """Weights of the errors before squaring, per sampled instant.
 
     Chosen on three walks and a run of the tuning half (`docs/validation/prepared-captures.md`). The jerk's weight
     matters: with a smaller one two walks needed 21 and 9 % instead of 7 and 5, and with 5e-5 the run stood.
@@ -52,15 +54,15 @@ class FeasibleWeights:
     flight : float
         Factor on both while nothing pushes.
     slip, depth : float
-        Displacement of a standing sphere, depth of a swinging one [1/m].
+        Displacement of a standing sphere, depth of a swinging sphere below its clearance [1/m].
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     strain : float
-        Torque of a leg's joint beyond three quarters of its largest, as a share of it.
+        Excess of a leg torque over three quarters of its limit, as a share of the limit.
     place, root, spine, head, arm, leg, ankle : float
-        Change of the root's place [1/m], and of rotations [1/rad].
+        Change of the root's position [1/m], and of rotations [1/rad].
     sway, jerk : float
-        Third derivatives of the change [s³/m], [s³/rad].
+        Third derivative of the change of the root's position [s³/m] and of rotations [s³/rad].
     """
 
     force: float = 20.0
@@ -99,21 +101,21 @@ class Feasible(NamedTuple):
     clip : Clip
         The motion.
     residual : float
-        RMS of the residual force that is left, in body weights.
+        RMS of the remaining residual force [body weights].
     moved : float
-        RMS of the change of the root's place [m].
+        RMS of the change of the root's position [m].
     turned : float
         RMS over joints and time of the change of rotations [rad].
     furthest : float
-        Largest change of the root's place [m].
+        Largest change of the root's position [m].
     most_turned : float
-        Largest change of a joint's rotation [rad] ...
+        Largest change of a joint's rotation [rad].
     joint : str
-        ... which joint's ...
+        The joint of this largest change.
     when : float
-        ... and when [s].
+        The time of this largest change [s].
     costs : tuple of float
-        Before and after every iteration.
+        Cost at first and after every iteration.
     """
 
     clip: Clip
@@ -139,22 +141,22 @@ def feasible(
     clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, weights: FeasibleWeights = _WEIGHTS,
     passage: bool = False,
 ) -> Feasible:  # fmt: skip
-    """The nearest motion with these contacts that needs no help.
+    """The motion nearest to a clip that is feasible with a given contact schedule, as far as it can be found.
 
     Parameters
     ----------
     clip : Clip
-        A capture without noise, closed or open.
+        A smoothed capture, closed or open.
     schedule : Stances
-        Its contacts, frame by frame.
+        Its contact schedule, frame by frame.
     iterations : int
-        Of Gauss–Newton, at most.
+        Largest number of Gauss–Newton iterations.
     fps : float
-        Frames per second of the result.
+        Frame rate of the result [1/s].
     weights : FeasibleWeights
-        Of the errors.
+        Weights of the errors.
     passage : bool
-        Whether the clip is a part of a motion that goes on beyond its ends, and is left there as it is.
+        Whether the clip is a part of a longer motion that is unchanged beyond its ends.
     """
     change = Change(clip, _KNOT, _STEP, passage)
     problem = _Problem(change, schedule, weights)
@@ -201,7 +203,7 @@ class _Problem:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from no change, until `_LAST` steps lower the cost by less than `_TOLERANCE`."""
+        """Levenberg–Marquardt from δ = 0, until `_LAST` steps together lower the cost by less than `_TOLERANCE`."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
         costs = [self.cost(self.errors(x, False), x)]
@@ -214,7 +216,7 @@ class _Problem:
                 damping = max(8.0 * damping, 1e-4)
             else:
                 break
-            # Half of what the linearisation promises at most; where contacts change, it holds only nearby.
+            # g·step is the decrease that the linearisation predicts; where contacts change, it holds only nearby.
             good = costs[-1] - cost > _GOOD * (g @ step)
             damping = max(damping / 8.0, 1e-8) if good else max(8.0 * damping, 1e-4)
             x = x - step
@@ -237,14 +239,14 @@ class _Problem:
         return system, system.gradient(parts) + self.fixed.times(x)
 
     def _block(self, errors: _Errors, instants: npt.NDArray[np.intp], here: Mask) -> tuple[Array, Array]:
-        """JᵀJ and Jᵀe by the six control points of an interval, over its instants.
+        """JᵀJ and Jᵀe for the six control points of an interval, summed over its instants.
 
         With J = Σ_o b_o ⊗ J_o over the orders o of δ's derivatives, JᵀJ = Σ_op (b_o b_pᵀ) ⊗ (J_oᵀ J_p).
         """
         assert errors.jacobian is not None
         jacobian, weighted = errors.jacobian[here], errors.weighted[here]
         basis = np.stack([self.change.basis[order][instants[here]] for order in range(3)], axis=1)
-        moving = jacobian[:, :, :_W]  # places and limits do not depend on velocities
+        moving = jacobian[:, :, :_W]  # only torques and wrench depend on velocity and acceleration
         inner = moving.transpose(0, 1, 3, 2)[:, :, None] @ moving[:, None]
         inner[:, 0, 0] += jacobian[:, 0, _W:].transpose(0, 2, 1) @ jacobian[:, 0, _W:]
         pairs = np.einsum("koa,kpb->abkop", basis, basis).reshape((DEGREE + 1) ** 2, -1)
@@ -284,7 +286,7 @@ class _Problem:
         moving = dynamics.wrench
         arms = np.zeros((m, 6, N_TANGENT))
         for sphere in range(8):
-            # Moments of the forces change with their arms.
+            # Moments of the contact forces change with their lever arms.
             arms[:, 3:] -= cross_matrix(pushes[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
         moving[:, 0] -= arms
         jacobian[:, :, _N:_W] = scale[:, None, :, None] * np.einsum("mij,mojn->moin", projection, moving)
@@ -302,7 +304,7 @@ class _Problem:
 
 
 def contact_residual(clip: Clip, schedule: Stances, passage: bool = False) -> float:
-    """RMS of the force that these contacts cannot give a clip as it is [body weights]; a passage, as `feasible` has."""
+    """RMS residual force of a clip as it is, for a contact schedule [body weights]; `passage` as in `feasible`."""
     change = Change(clip, _KNOT, _STEP, passage)
     problem = _Problem(change, schedule, _WEIGHTS)
     errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)

@@ -1,7 +1,7 @@
-"""Inverse dynamics of many states, and how wrench, torques and places follow position, velocity and acceleration.
+"""Inverse dynamics of many states, with derivatives of wrench, torques and positions.
 
 Derivatives by position and velocity are forward differences of the recursive Newton–Euler algorithm (MuJoCo's
-`mj_rne`), that by acceleration is the mass matrix; all in the tangent of `Clip` poses.
+`mj_rne`); the derivative by acceleration is the mass matrix. All are in the tangent of `Clip` poses.
 """
 
 import mujoco
@@ -13,30 +13,30 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, N_TA
 from models.mocap.dynamics.floor_forces import Demand
 from models.mocap.preparation.change import State
 
-_ANGLE, _RATE = 1e-5, 1e-4  # of the differences of inverse dynamics [rad], [rad/s]
+_ANGLE, _RATE = 1e-5, 1e-4  # steps of the finite differences [rad], [rad/s]
 _LEGS = tuple(BODIES.index(f"{side}_{part}") for side in ("left", "right") for part in ("thigh", "shank", "foot"))
 
 
 class InverseDynamics:
-    """Inverse dynamics of m sampled states, and how they follow place, velocity and acceleration in the tangent.
+    """Inverse dynamics of m sampled states, and derivatives by position, velocity and acceleration in the tangent.
 
     Parameters
     ----------
     state : State
         The states.
     with_jacobian : bool
-        Whether to find derivatives.
+        Whether to compute derivatives.
 
     Attributes
     ----------
     demand : Demand
-        What the states ask of the floor.
+        Wrench that the floor must give, and the geometry of the contacts.
     wrench : array, shape (m, 3, 6, 57)
         Derivatives of the wrench about the centre of mass by position, velocity, acceleration.
     torque : array, shape (m, 3, 51, 57)
-        Of the joints' torques without floor.
+        Derivatives of the joint torques without contact, likewise.
     spheres, com : arrays, shapes (m, 8, 3, 57), (m, 3, 57)
-        Of the places of contact spheres and centre of mass, by position.
+        Derivatives by position of the contact spheres' centres and of the centre of mass.
     """
 
     def __init__(self, state: State, with_jacobian: bool) -> None:
@@ -103,7 +103,7 @@ class InverseDynamics:
         turning = cross_matrix(state.v[:, 3:].reshape(m, 18, 3))
         spinning = cross_matrix(state.a[:, 3:].reshape(m, 18, 3))
         for j in range(18):
-            # A change in a segment's own frame carries its velocity and acceleration with it.
+            # Tangents are in the segment's own frame, so a rotation of it also rotates its velocity and acceleration.
             c = slice(3 + 3 * j, 6 + 3 * j)
             by[:, 0, :, c] += by[:, 1, :, c] @ turning[:, j] + by[:, 2, :, c] @ spinning[:, j]
             by[:, 1, :, c] += by[:, 2, :, c] @ turning[:, j]
@@ -117,14 +117,14 @@ class InverseDynamics:
         self.torque = by[:, :, 6:]
 
     def leaning(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
-        """How the torques of forces that stay follow the place, d(Jᵀ)/dx f: shape (n, 51, 57).
+        """Derivative by position of the joint torques of constant contact forces, d(Jᵀ)/dx f: shape (n, 51, 57).
 
         Parameters
         ----------
         pushes : Array
-            Forces of the floor, shape (m, 8, 3) [N].
+            Contact forces, shape (m, 8, 3) [N].
         states : array of int, shape (n,)
-            Of which states.
+            Indices of the states.
         """
         demand, leaning = self.demand, np.zeros((len(states), 51, N_TANGENT))
         soles = demand.spheres[states] - (0.0, 0.0, CONTACT_RADIUS)
@@ -139,7 +139,7 @@ class InverseDynamics:
 
 
 def _full_mass(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
-    """M as a full matrix, whichever way this version of MuJoCo is asked for it."""
+    """The mass matrix M as a full matrix; the signature of mj_fullM differs between versions of MuJoCo."""
     try:
         mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
     except TypeError:

@@ -1,10 +1,11 @@
-r"""How a capture goes on: as a cycle, with a way back, or not at all; closed in pose and velocity.
+r"""Looping of captures: as a cycle, with a way back, or open and at rest at both ends.
 
-Two frames are as alike as `laps` has it. A part of the clip is its cycle if its ends are alike and the rest of the clip
-only repeats it; it is closed by fading over from what led to its start, so that poses and velocities agree at the seam.
-A gesture, which ends with the feet where they were, gets a way back. Half a stride of a gait, which ends as it began in
-a mirror, is gone on with by its mirror image. Everything else rests at both ends. What stands on a foot all the time
-comes back to its place: a lap that ended a centimetre beside its start would drag that foot by it for ever.
+The similarity d of two frames is that of `laps`. A part of the clip is its cycle if its ends are similar and the rest
+of the clip only repeats it; a cross-fade with the frames around its ends makes poses and velocities agree at the seam.
+A gesture, whose root ends about where it began, gets a way back to its first pose. Half a stride of a gait, whose end
+is the mirror image of its start, is continued by its mirror image. Everything else comes to rest at both ends. A closed
+motion with a foot that always stands returns exactly to its place: otherwise the foot would skate by the difference in
+every lap.
 """
 
 from typing import Literal, NamedTuple
@@ -20,39 +21,39 @@ from models.mocap.laps import lap_of, likeness
 from models.mocap.preparation.poses import inverse, plus, sole_points
 from models.mocap.preparation.stances import stances
 
-_GAIT, _PLACE = 0.38, 0.30  # d of the ends of a gait, of a cycle in place [rad]; walkers have 0.1 to 0.3
-_DIGITS = 1e-3  # by which the ends of a lap that was written with few digits differ [rad], [m]
-_WRAPS = 0.45  # d that is still closed where the file says that it wraps
-_COVERS, _NEAR = 0.7, 0.35  # a cycle has a frame within this distance [rad] of so large a share of the clip
-_LIVELY = 0.7  # a cycle moves at least so much, on the average, as the clip: standing still is no cycle of it
-_MIRRORED = 0.25  # d of the ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3
-_HALF = 0.25  # of half a stride, at least [s]: sprinters take 0.22
-_FAST = 1.0  # of the root at both ends [m/s]: such a motion cannot be brought to rest in a blink
-_SHORTEST = 0.6  # of a cycle in place [s]
-_SHARE = 0.3  # of the clip, the least that a cycle in place lasts: less is a tremble
-_FADE = 0.25  # over which the ends are brought together [s]
-_BACK = (0.6, 1.0)  # a way back lasts so long, and so much longer for each radian of the largest joint [s]
-_STEP, _YAW = 0.10, np.deg2rad(15.0)  # feet of a gesture end within this of where they began
-_REST = 0.35  # in which the limbs of a motion that ends come to rest [s]; its root has 0.2 s more for each m/s
+_GAIT, _PLACE = 0.38, 0.30  # largest d of the ends of a gait cycle, of a cycle in place [rad]; walks have 0.1 to 0.3
+_DIGITS = 1e-3  # gap between the ends of a closed lap that was written with few digits [rad], [m]
+_WRAPS = 0.45  # largest d of a clip that its file declares to be cyclic [rad]
+_COVERS, _NEAR = 0.7, 0.35  # share of the clip's frames that must have a frame of the cycle within this d [rad]
+_LIVELY = 0.7  # least mean speed of a cycle over that of the clip: standing still is not its cycle
+_MIRRORED = 0.25  # largest d of the mirrored ends of half a stride [rad]: a run has 0.18, a third of a stride 0.3
+_HALF = 0.25  # least duration of half a stride [s]: sprinters take 0.22
+_FAST = 1.0  # speed of the root at both ends above which a motion cannot be brought to rest quickly [m/s]
+_SHORTEST = 0.6  # least duration of a cycle in place [s]
+_SHARE = 0.3  # least duration of a cycle in place as a share of the clip: shorter ones are tremor
+_FADE = 0.25  # half width of the cross-fade at the ends [s]
+_BACK = (0.6, 1.0)  # duration of a way back [s], and what each radian of the largest joint rotation adds [s/rad]
+_STEP, _YAW = 0.10, np.deg2rad(15.0)  # a gesture's root ends within this of where it began [m], [rad]
+_REST = 0.35  # time in which limbs come to rest at an end [s]; the root has 0.2 s more for each m/s, 0.8 s at most
 _REST_LONGER, _REST_LONGEST = 0.2, 0.8
-_FRAMES = 500  # compared with each other
+_FRAMES = 500  # frames compared with each other, about
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
 
 
 class Looped(NamedTuple):
-    """A clip made to go on, or to rest.
+    """A looped clip.
 
     Attributes
     ----------
     clip : Clip
         Closed, or at rest at both ends.
     kind : {"cycle", "half stride", "way back", "open"}
-        What was done.
+        How it was looped.
     start, end : float
-        The part of the capture that it is [s].
+        The part of the capture that was used [s].
     gap : float
-        d of its ends before they were closed [rad].
+        d between its ends before closing [rad].
     """
 
     clip: Clip
@@ -72,9 +73,9 @@ def looped(clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bo
     wish : str
         ``auto``, ``open``, or the start and end of the cycle in seconds, such as ``1.2:2.4``.
     wraps : bool or None
-        What the file says of itself.
+        Whether the file declares itself to be cyclic; None if it says nothing.
     mirror : bool
-        Whether half a stride, or START:END, is to be gone on with by its mirror image.
+        Whether half a stride, or START:END, is to be continued by its mirror image.
 
     Raises
     ------
@@ -125,7 +126,7 @@ def _distances(clip: Clip, frames: npt.NDArray[np.int64]) -> Array:
 
 
 def _cycle(clip: Clip) -> tuple[int, int, float] | None:
-    """Start, end and gap of the part that the clip repeats: a lap of a gait, else a cycle in place."""
+    """First frame, last frame and gap of the part that the clip repeats: a gait cycle, or else a cycle in place."""
     every = -(-clip.n_frames // _FRAMES)
     frames = np.arange(0, clip.n_frames, every)
     apart = _distances(clip, frames)
@@ -149,21 +150,21 @@ def _cycle(clip: Clip) -> tuple[int, int, float] | None:
 
 
 def _fast(clip: Clip) -> bool:
-    """Whether the root runs at both ends."""
+    """Whether the root moves faster than `_FAST` at both ends."""
     speeds = np.linalg.norm(clip.velocities()[[0, -1], :2], axis=1)
     return bool(speeds.min() > _FAST)
 
 
 def _in_place(clip: Clip) -> bool:
-    """Whether the root ends where it began, looking where it did."""
+    """Whether the root ends about where it began, with about the same heading."""
     way = clip.poses[-1, :2] - clip.poses[0, :2]
     return bool(np.hypot(*way) < _STEP and abs(clip.displacement.yaw) < _YAW)
 
 
 def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> Looped:
-    """The frames from first to last, ends brought together from what leads to the first and follows the last.
+    """The frames from first to last as a closed lap, cross-faded with the frames before the first and after the last.
 
-    A half stride ends like its start in a mirror, and is followed by its own image there.
+    With `half`, the part ends like the mirror image of its start, and is continued by its own mirror image.
     """
     image = mirrored if half else _same
     opening, n = image(clip).poses, last - first
@@ -175,7 +176,7 @@ def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -
     lap = poses[first : last + 1].copy()
     if before + after >= 6:
         for k in range(-before, after + 1):
-            # 0: as at the end of the lap, 1: as at its start, both seen from the start's image.
+            # Share 0 is the motion at the lap's end, 1 that at its start (or its mirror image), both at the same place.
             share = _smooth((k + before) / (before + after))
             end = back.moved(poses[last + k])
             mixed = plus(end[None], share * pose_difference(end, opening[first + k])[None])
@@ -197,13 +198,13 @@ def _closed(clip: Clip, first: int, last: int, gap: float, half: bool = False) -
 
 
 def _stands(clip: Clip) -> bool:
-    """Whether a foot stands from the first frame to the last."""
+    """Whether one foot stands in every frame."""
     standing = stances(clip, clip).standing.reshape(clip.n_frames, 2, -1)
     return bool(standing.any(axis=2).all(axis=0).any())
 
 
 def _brought_back(clip: Clip) -> Clip:
-    """A lap without the displacement that it has, which is taken from it little by little."""
+    """The lap without its net displacement, which is removed linearly over the lap."""
     there, start = clip.displacement, clip.poses[0, :2]
     way = clip.poses[-1, :2] - start
     poses = clip.poses.copy()
@@ -222,17 +223,17 @@ def _same(clip: Clip) -> Clip:
 
 
 def _half_stride(clip: Clip) -> tuple[int, int, float] | None:
-    """Start, end and gap of the part whose end is most like its start in a mirror, if it is like it."""
+    """First frame, last frame and gap of the part whose end is most like its mirrored start; None if none is."""
     every = -(-2 * clip.n_frames // _FRAMES)
     frames = np.arange(0, clip.n_frames, every)
     both = Clip(np.vstack((clip.poses, mirrored(clip).poses)), clip.fps, clip.name)
-    # The frame at the joint has no velocity of its own.
+    # Frames at the junction of both halves have no valid velocity.
     inner = frames[(frames > 0) & (frames < clip.n_frames - 1)]
     apart = _distances(both, np.concatenate((inner, clip.n_frames + inner)))[: len(inner), len(inner) :]
     long = inner[:, None] - inner[None, :] >= _HALF * clip.fps
     if not long.any():
         return None
-    # Rows: ends, columns: starts, in the mirror.
+    # Rows are ends, columns mirrored starts.
     j, i = np.unravel_index(int(np.argmin(np.where(long, apart, np.inf))), apart.shape)
     return (int(inner[i]), int(inner[j]), float(apart[j, i])) if apart[j, i] < _MIRRORED else None
 
@@ -243,7 +244,7 @@ def _smooth(x: float) -> float:
 
 
 def _with_way_back(clip: Clip, gap: float) -> Looped:
-    """The clip and a smooth way from its last frame to its first one, velocities kept (a quintic in the tangent)."""
+    """The clip and a way back from its last frame to its first: a quintic in the tangent, with matching velocities."""
     first, last = clip.poses[0] if _stands(clip) else clip.displacement.moved(clip.poses[0]), clip.poses[-1]
     difference = pose_difference(last, first)
     largest = float(np.linalg.norm(difference[6:].reshape(-1, 3), axis=1).max())
@@ -260,7 +261,7 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
 
 
 def _rested(clip: Clip) -> Looped:
-    """The clip with its first and last velocities dying away, in poses before and after it that end on the floor."""
+    """The clip with frames added at both ends in which its velocities decay to rest, with the soles on the floor."""
     if clip.n_frames < 2 or clip.fps * _REST < 2.0:
         return Looped(clip, "open", 0.0, clip.duration, 0.0)
     velocities = clip.velocities()
@@ -271,9 +272,9 @@ def _rested(clip: Clip) -> Looped:
 
 
 def _dying(pose: Array, velocity: Array, fps: float) -> Array:
-    """Poses in which a velocity dies away as (1 − x)² (1 + 2x), while the lowest part of the soles comes to the floor.
+    """Poses in which a velocity decays as (1 − x)² (1 + 2x), x = t/T, while the soles come down to the floor.
 
-    The root has longer for it the faster it is, x = t/T; limbs would go past their limits if they had.
+    T grows with the root's speed for the root only: with a longer T limbs would pass their joint limits.
     """
     times = np.minimum(_REST + _REST_LONGER * float(np.linalg.norm(velocity[:2])), _REST_LONGEST), _REST
     n = round(times[0] * fps)
@@ -286,7 +287,7 @@ def _dying(pose: Array, velocity: Array, fps: float) -> Array:
 
 
 def mirrored(clip: Clip) -> Clip:
-    """The motion in a mirror: left and right exchanged."""
+    """The mirror image of a motion: left and right exchanged."""
     twins = [
         BODIES.index(body.replace("left_", "right_") if body.startswith("left_") else body.replace("right_", "left_"))
         for body in BODIES

@@ -1,15 +1,15 @@
-r"""The pace at which a capture's flights fall as they must.
+r"""Correction of a capture's frame rate, so that its flights are ballistic under gravity.
 
-Nothing but gravity moves the centre of mass in flight, so over a flight it is a parabola whose acceleration is −g. A
-clip played σ times as fast is accelerated σ² times as much: one whose flights fall with a is right at
+In flight the centre of mass moves on a parabola with acceleration −g. Playing a clip σ times as fast scales its
+accelerations by σ², so a clip whose flights fall with acceleration a is right at
 
 .. math:: \sigma = \sqrt{g / a} .
 
-Files are played at a wrong rate, and figures of another size fall with another time scale; a motion keeps its
-character at another pace, while flights that are bent to gravity one by one do not. Only what falls too fast is slowed:
-nothing pulls a body down, but one that falls too slowly may be borne by a foot that was captured too high. With several
-flights the acceleration is the mean with weights T⁴: that of a parabola through points with noise is known as well as
-T² is large.
+Files may have a wrong frame rate, and performers of another size another time scale. A motion keeps its character at
+another pace, which it does not if its flights are bent to gravity one by one. Only clips that fall too fast are slowed:
+nothing can pull a body down, but one that falls too slowly may be carried by a foot that was captured too high. Over
+several flights of durations T the acceleration is averaged with weights T⁴, since the error of a parabola's
+acceleration goes with T⁻².
 """
 
 from typing import NamedTuple
@@ -22,24 +22,24 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.preparation.poses import contact_points
 
 GRAVITY = 9.81  # [m/s²]
-_HIGH = 0.03  # of feet and hands in flight [m]: captured feet hover by 1 to 2 cm where they stand
-_CLEAR = 0.08  # that they reach in it [m]: dancers' feet hover higher than walkers'
-_SHORT = 0.09  # [s], of flights that tell an acceleration
-_RIGHT = 1.5  # [m/s²] beyond gravity that is kept, what `well_formed` allows
-_SLOWEST = 0.35  # below which something else is wrong
+_HIGH = 0.03  # least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand
+_CLEAR = 0.08  # height that all of them exceed once in a flight [m]: dancers' feet hover higher than walkers'
+_SHORT = 0.09  # least duration of a flight from which acceleration is estimated [s]
+_RIGHT = 1.5  # excess over gravity that is left uncorrected [m/s²], as `well_formed` allows
+_SLOWEST = 0.35  # least pace; a slower one would be due to another fault
 
 
 class Paced(NamedTuple):
-    """A clip at its pace.
+    """A clip with a corrected frame rate.
 
     Attributes
     ----------
     clip : Clip
         The same frames at another rate.
     pace : float
-        Times the file's.
+        Corrected rate over the file's.
     falls : float or None
-        With what the file's flights fall [m/s²], if it has any.
+        Downward acceleration in the file's flights [m/s²], if it has any.
     """
 
     clip: Clip
@@ -48,7 +48,7 @@ class Paced(NamedTuple):
 
 
 def paced(clip: Clip) -> Paced:
-    """The clip at the pace that its flights allow; as it is where they fall with g or less, or there are none."""
+    """The clip at the pace at which its flights are ballistic; unchanged if they fall with g or less, or none exist."""
     falls = falling(clip)
     if falls is None or falls < GRAVITY + _RIGHT or falls > GRAVITY / _SLOWEST**2:
         return Paced(clip, 1.0, falls)
@@ -57,7 +57,7 @@ def paced(clip: Clip) -> Paced:
 
 
 def falling(clip: Clip) -> float | None:
-    """With what the centre of mass falls while neither feet nor hands are near the floor [m/s²]."""
+    """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None."""
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     edges = np.flatnonzero(np.diff(np.concatenate(([0], (heights > _HIGH).astype(int), [0]))))
     spans = [

@@ -1,4 +1,4 @@
-"""Poses as points of a manifold: carried along tangents, resampled, smoothed; where the soles are in them."""
+"""Operations on poses: adding tangents, resampling, low-pass filtering, periodic extension; positions of the soles."""
 
 import mujoco
 import numpy as np
@@ -10,12 +10,12 @@ from models.mocap import quaternions
 from models.mocap.clip import Clip, PlanarDisplacement
 
 _PASSES = (
-    0.802  # a Butterworth filter of second order run both ways halves the power at this share of its corner (Winter)
+    0.802  # a second-order Butterworth filter run both ways has its −3 dB point at this share of its cut-off (Winter)
 )
 
 
 def plus(poses: Array, tangents: Array) -> Array:
-    """Poses carried along tangents for a unit of time, (..., 75) and (..., 57) → (..., 75); mj_integratePos."""
+    """Poses plus tangents, (..., 75) and (..., 57) → (..., 75): mj_integratePos over a unit of time."""
     carried = np.array(poses, dtype=np.float64)
     carried[..., :3] += tangents[..., :3]
     half = tangents[..., 3:].reshape(*tangents.shape[:-1], 18, 3) / 2.0
@@ -27,7 +27,7 @@ def plus(poses: Array, tangents: Array) -> Array:
 
 
 def resampled(clip: Clip, fps: float) -> Clip:
-    """The same motion at another rate, through a cubic spline."""
+    """The same motion at another frame rate [1/s], by a cubic spline."""
     if abs(clip.fps - fps) < 1e-6 or clip.n_frames < 2:
         return clip
     times = np.arange(int(np.floor(clip.duration * fps + 1e-9)) + 1) / fps
@@ -35,10 +35,10 @@ def resampled(clip: Clip, fps: float) -> Clip:
 
 
 def smoothed(clip: Clip, corner: float) -> Clip:
-    """The motion without what is faster than a corner frequency [Hz]; a closed one goes on over its ends."""
+    """The motion low-passed without phase lag at a cut-off frequency [Hz]; a closed clip is extended periodically."""
     if clip.n_frames < 8 or corner >= 0.4 * clip.fps:
         return clip
-    from scipy.signal import butter, sosfiltfilt  # brings scipy.stats with it; a run begins without them
+    from scipy.signal import butter, sosfiltfilt  # imported late: loads scipy.stats, slow for a run
 
     sections = np.asarray(butter(2, corner / (clip.fps / 2.0) / _PASSES, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
@@ -52,7 +52,10 @@ def smoothed(clip: Clip, corner: float) -> Clip:
 
 
 def around(clip: Clip, margin: int) -> tuple[Array, int]:
-    """Frames of a closed clip with `margin` of those before and after it, signs continuous, and where it begins."""
+    """A closed clip extended periodically by `margin` frames at both ends, and the index at which the clip begins.
+
+    The signs of its quaternions are continuous.
+    """
     lap, there = clip.poses[:-1], clip.displacement
     back = inverse(there)
     rows, first = [clip.poses], 0
@@ -71,7 +74,7 @@ def around(clip: Clip, margin: int) -> tuple[Array, int]:
 
 
 def inverse(there: PlanarDisplacement) -> PlanarDisplacement:
-    """The move that undoes a move over the floor."""
+    """The inverse of a displacement over the floor."""
     c, s = np.cos(there.yaw), np.sin(there.yaw)
     return PlanarDisplacement(-c * there.x - s * there.y, s * there.x - c * there.y, -there.yaw)
 

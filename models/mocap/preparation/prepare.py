@@ -1,4 +1,4 @@
-"""A capture made well-formed: calibrated and on the floor, looped or at rest, smooth, feasible on contact alone."""
+"""Pipeline from a motion file to a well-formed clip: load, correct pace, loop, low-pass, detect stances, optimise."""
 
 from pathlib import Path
 from time import process_time
@@ -14,35 +14,35 @@ from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.stances import rested, stances
 from models.mocap.retargeting.retarget import Hints, RetargetReport
 
-FPS = 120.0  # of prepared clips [1/s], CMU's: slower captures gain what the change adds
-_CORNER = 8.0  # low-pass [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
-_TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which it is another motion: the nearest feasible one is far
-_LACKS = 0.12  # body weights RMS of residual force, beyond which nothing feasible was found
-_LONGEST = 120.0  # [s]: of what repeats one lap is prepared; nothing else was tried longer
+FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
+_CORNER = 8.0  # low-pass cut-off [Hz]; 6 and 15 Hz gave the same residual to 2 points in the prototype's eight captures
+_TURNED, _MOVED = 0.2, 0.15  # RMS change [rad], [m] beyond which the result counts as another motion
+_LACKS = 0.12  # RMS residual force [body weights] beyond which nothing feasible was found
+_LONGEST = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
 
 class Prepared(NamedTuple):
-    """A capture and the well-formed clip that was made of it.
+    """A capture and the well-formed clip made of it.
 
     Attributes
     ----------
     clip : Clip
-        Well-formed.
+        The result.
     captured : Clip
-        As the file has it, on the figure and the floor.
+        The capture as retargeted to the figure and put on the floor.
     report : RetargetReport or None
-        What the file was taken for; None where it is on the figure's own skeleton.
+        How the file was interpreted; None for a file on the figure's own skeleton.
     paced : Paced
-        At what pace.
+        Result of the pace correction.
     looped : Looped
-        How it goes on, before it was made feasible.
+        Result of looping, before optimisation.
     feasible : Feasible
-        What that took.
+        Result of the optimisation.
     seconds : float
         Processor time [s].
     near : bool
-        Whether a feasible motion is near. If not, as where flights are not ballistic at the file's rate, `clip` is the
-        capture looped and smoothed, and the measures say what it lacks.
+        Whether a feasible motion was found near the capture. If not, as where flights are not ballistic at the file's
+        rate, `clip` is the capture looped and low-passed only, and its measures show the faults.
     """
 
     clip: Clip

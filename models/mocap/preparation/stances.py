@@ -1,10 +1,11 @@
-r"""Which parts of the soles stand when and where: the contact schedule of a capture, from its soles and its load.
+r"""Contact detection: the contact schedule of a capture, from motion of its soles and from its vertical load.
 
-Heel and toes of a foot stand while they are near the floor and slow; one flat place is taken for a whole stance. Toes
-at rest stand with the heels. Where nothing stands but the centre of mass accelerates as if
-something did, captures slide or hover: the stance next to it lasts longer, on its toes after it and on what is lower
-before it; where there is none, the lowest part of the feet bears, and slides. What ends upright rests on both feet: on
-the toes of one, as captures are cut, nobody stays.
+Heel and toes of a foot stand while they are near the floor and slow; each stance has one flat place on the floor. Toes
+at rest beside a standing heel stand as well. Where nothing stands although the centre of mass accelerates as if under
+load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the stance came before and on
+the lower part of the foot if it comes after. Without such a stance the lowest part of the feet bears load while
+sliding. An open clip with an upright end rests there on both feet, since nobody can rest on the toes of one, as
+captures may be cut.
 """
 
 from typing import NamedTuple
@@ -23,35 +24,35 @@ from models.mocap.preparation.poses import around, sole_points
 Mask = npt.NDArray[np.bool_]
 
 # Chosen on eight captures (../shared/prepare-prototype.md): ±1 cm and ±0.1 m/s move the residual by less than 1 point.
-_REACH = 0.045  # a part of a sole that stands is lower than this [m] ...
-_SLOW, _SHARE = 0.55, 0.3  # ... and slower [m/s], or than this share of the root's speed: legs slide with their length
-_LOW = 0.10  # toes that rest beside a standing heel, or a foot that bears though it seems not to stand, are lower [m]
-_REST, _FAR = 0.15, 0.15  # ... and slower [m/s]; and it is not further from where it stands [m]
+_REACH = 0.045  # largest height of a standing part of a sole [m]
+_SLOW, _SHARE = 0.55, 0.3  # its largest speed [m/s], or share of the root's speed: errors of leg length make feet skate
+_LOW = 0.10  # largest height of toes beside a standing heel, and of a foot whose stance is extended [m]
+_REST, _FAR = 0.15, 0.15  # largest speed of such toes [m/s]; largest travel of a foot whose stance is extended [m]
 _GAP, _SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
-_LAG = 0.012  # a sphere stands this long before and after it pushes [s]
-_LOADED = 0.35  # of body weight, above which something must bear
-_NEAR = 0.015  # over the lowest sphere [m]: they bear together
-_SMOOTHING = 0.02  # of the load [s]
-_SWING = 0.015  # least height of a swinging foot [m]: what tracks takes one below 8 mm for standing ...
-_RISE = 0.08  # ... reached so long before and after it stands [s]; captured feet swing at 2 to 5 cm
-_RESTS = 0.1  # at both ends of an open clip [s], in which both feet stand ...
-_UPRIGHT = 0.55  # ... where the root is higher than this [m]: who crawls or lies bears on something else
+_LAG = 0.012  # a sphere stands this long before and after it may bear load [s]
+_LOADED = 0.35  # vertical load above which something must bear [body weights]
+_NEAR = 0.015  # spheres within this height of the lowest one bear together [m]
+_SMOOTHING = 0.02  # standard deviation of the filter for the load [s]
+_SWING = 0.015  # least height of a swinging foot [m]: the tracking controller takes one below 8 mm for standing
+_RISE = 0.08  # time before and after stance in which this height is reached [s]; captured feet swing at 2 to 5 cm
+_RESTS = 0.1  # time at both ends of an open clip in which both feet stand [s]
+_UPRIGHT = 0.55  # least height of the root there [m]: a crawling or lying body is supported otherwise
 _GRAVITY = 9.81
 
 
 class Stances(NamedTuple):
-    """What the 8 contact spheres do in n frames.
+    """Contact schedule of the feet's 8 contact spheres over n frames.
 
     Attributes
     ----------
     standing : array of bool, shape (n, 8)
-        At rest at their places.
+        Whether a sphere rests at its place.
     pushing : array of bool, shape (n, 8)
-        May bear load.
+        Whether it may bear load.
     places : array, shape (n, 8, 3)
-        Where the centres of standing spheres belong [m]; level on the floor.
+        Target centres of standing spheres [m], level on the floor.
     sliding : array of bool, shape (n, 8)
-        On the floor and under load, but not at rest.
+        Whether it is on the floor and under load, but not at rest.
     """
 
     standing: Mask
@@ -61,14 +62,14 @@ class Stances(NamedTuple):
 
 
 def stances(clip: Clip, smooth: Clip) -> Stances:
-    """The contact schedule of a clip; of a closed one as it goes on over its ends.
+    """The contact schedule of a clip; a closed clip is extended periodically.
 
     Parameters
     ----------
     clip : Clip
-        As captured: filters wash contacts out.
+        The clip as captured, since low-pass filters blur contacts.
     smooth : Clip
-        The same without noise, from which the load is told.
+        The same low-passed, from which the vertical load is computed.
     """
     closed = clip.closes()
     if closed:
@@ -97,7 +98,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         firm[shift:] &= standing[:-shift]
         firm[:-shift] &= standing[shift:]
     pushing = firm | sliding
-    # Next to a stretch in which nothing pushes, standing spheres push to their very ends.
+    # In frames under load in which nothing else may bear, standing spheres bear without the lag.
     none = ~pushing.any(axis=1) & (load > _LOADED)
     pushing[none] |= standing[none]
     here = slice(first, first + clip.n_frames)
@@ -105,14 +106,14 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
 
 
 def rested(schedule: Stances, clip: Clip) -> Stances:
-    """The contact schedule of an open clip whose ends are at rest on both feet, flat where they are.
+    """The contact schedule with both feet flat on the floor at the upright ends of an open clip.
 
     Parameters
     ----------
     schedule : Stances
-        As `stances` tells it.
+        The schedule that `stances` gives.
     clip : Clip
-        Whose it is.
+        Its clip.
     """
     if clip.closes():
         return schedule
@@ -137,9 +138,9 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
 
 
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
-    """Least heights of the parts of the feet that swing [m], rising from where they stand, shape (n, 8).
+    """Least height of each contact sphere in swing phase [m], rising from 0 at stance, shape (n, 8).
 
-    A foot that swings a few millimetres over the floor is taken for a standing one by whatever follows the motion.
+    The tracking controller would take a foot that swings a few millimetres over the floor for a standing one.
     """
     grounded = schedule.standing | schedule.sliding
     n = len(grounded)
@@ -165,7 +166,7 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
 
 
 def _parts(points: Array, pace: Array, fps: float) -> Mask:
-    """Which of heel and toes of left and right foot stand, shape (n, 2, 2)."""
+    """Whether heel and toes of each foot stand, shape (n, 2 feet, 2 parts)."""
     middles = points.reshape(len(points), 2, 2, 2, 3).mean(axis=3)
     heights = middles[..., 2] - CONTACT_RADIUS
     speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
@@ -178,7 +179,7 @@ def _parts(points: Array, pace: Array, fps: float) -> Mask:
 
 
 def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
-    """Let a stance last over frames start to end in which nothing stands though something bears, where one is near."""
+    """Extend a neighbouring stance over frames start to end, in which nothing stands under load, if there is one."""
     span = slice(start, end)
     middles = points[span].reshape(end - start, 2, 2, 2, 3).mean(axis=3)
     heights = middles[..., 2].mean(axis=0) - CONTACT_RADIUS
@@ -193,7 +194,7 @@ def _bear(points: Array, parts: Mask, start: int, end: int) -> None:
 
 
 def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array) -> None:
-    """Write one foot's places: one flat one for each stance."""
+    """Write the places of one foot's spheres: one flat placement for each stance."""
     heel, toe = parts.T
     yaw = np.unwrap(_heading(turned))
     for start, end in _runs(heel | toe):
@@ -209,14 +210,14 @@ def _place(points: Array, turned: Array, sole: Array, parts: Mask, places: Array
 
 
 def _heading(turned: Array) -> Array:
-    """Of a foot's own forward axis about the vertical [rad]."""
+    """Heading of a foot's forward axis about the vertical [rad]."""
     x = 1.0 - 2.0 * (turned[..., 2] ** 2 + turned[..., 3] ** 2)
     y = 2.0 * (turned[..., 1] * turned[..., 2] + turned[..., 0] * turned[..., 3])
     return np.arctan2(y, x)
 
 
 def _lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
-    """A sole flat on the floor, its spheres where they are in the median of frames, shape (4, 3)."""
+    """Sphere centres of a sole flat on the floor, placed at the median of its spheres over frames, shape (4, 3) [m]."""
     c, s = np.cos(yaw), np.sin(yaw)
     level = sole[:, :2] @ np.array([[c, s], [-s, c]])
     place = np.median(points[:, spheres, :2] - level[spheres], axis=(0, 1))
@@ -224,7 +225,7 @@ def _lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
 
 
 def _load(poses: Array, fps: float) -> Array:
-    """What the ground must carry, in body weights, shape (n,)."""
+    """Vertical ground reaction force that the motion needs [body weights], shape (n,)."""
     if len(poses) < 3:
         return np.ones(len(poses))
     height = momentum(Clip(poses, fps, "load")).com[:, 2]
@@ -233,13 +234,13 @@ def _load(poses: Array, fps: float) -> Array:
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Starts and ends of the stretches that are true."""
+    """Start and end indices of the runs of True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _cleaned(mask: Mask, gap: int, short: int) -> Mask:
-    """With gaps filled and short stretches dropped, but for those at the ends."""
+    """The mask with gaps shorter than `gap` filled, except at its ends, and runs shorter than `short` dropped."""
     mask = mask.copy()
     for start, end in _runs(~mask):
         if end - start < gap and start > 0 and end < len(mask):

@@ -1,6 +1,6 @@
-"""How well-formed a clip is: what its users rely on, measured and reported.
+"""Quality measures of a clip: soles, foot skate, continuity, joint ranges and dynamics, with their bounds.
 
-The bounds are those of DESIGN 4.12; `WellFormed.faults` names what is not within them.
+The bounds are the constants below; `WellFormed.faults` names the measures that exceed them.
 """
 
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ from models.mocap.preparation.poses import around, resampled, smoothed, sole_poi
 from models.mocap.preparation.stances import stances
 from models.mocap.ranges import beyond_ranges
 
-LOWEST, HIGHEST = -0.003, 0.005  # of soles in stance [m]
-FLATTEST = np.deg2rad(2.0)
-SKATE = 0.005  # [m]
-RESIDUAL, FLYING = 0.05, 0.12  # body weights RMS, of gaits and gestures, and of what leaves the floor
-GAP, SEAM = 1e-3, 0.3  # of a closed clip's ends [rad, m], and of their velocities [rad/s, m/s]
-REST = 0.3  # of an open clip's ends [rad/s] RMS
-LIMIT = np.deg2rad(1.0)  # beyond a joint's range: what an Euler angle and a rotation vector differ by near limits
-FLIGHT = 1.5  # RMS of the centre of mass' acceleration beside gravity in flight [m/s²]
-_STANDS_OUT = 8.0  # times the median acceleration of half a second around: steps of walkers reach 4
-_JERKY = 200.0  # [rad/s²] RMS over the joints, below which nothing stands out: a kick has 60
-_AT_REST = 0.2  # [m/s], above which a part of a sole rolls on or off and is not at the floor
-_ON_FLOOR = 0.015  # [m]: what is higher does not rub
-_SHORT_FLIGHT = 0.08  # [s]
+LOWEST, HIGHEST = -0.003, 0.005  # heights of soles in stance [m]
+FLATTEST = np.deg2rad(2.0)  # largest tilt of soles in stance
+SKATE = 0.005  # [m] in a stance
+RESIDUAL, FLYING = 0.05, 0.12  # RMS residual force [body weights] of gaits and gestures, of motions with flights
+GAP, SEAM = 1e-3, 0.3  # differences of a closed clip's ends [rad, m], and of their velocities [rad/s, m/s]
+REST = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
+LIMIT = np.deg2rad(1.0)  # excess over a joint's range: Euler angles and rotation vectors differ by as much near limits
+FLIGHT = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
+_STANDS_OUT = 8.0  # over the median acceleration of the half second around: steps of walkers reach 4
+_JERKY = 200.0  # least RMS acceleration of an outlier over the joints [rad/s²]: a kick has 60
+_AT_REST = 0.2  # speed above which a part of a sole rolls on or off and is not on the floor [m/s]
+_ON_FLOOR = 0.015  # height above which a contact point does not skate [m]
+_SHORT_FLIGHT = 0.08  # least duration of a flight [s]
 _GRAVITY = 9.81
 
 
@@ -42,25 +42,25 @@ class WellFormed:
     Attributes
     ----------
     seconds : float
-        How long it lasts [s].
+        Duration [s].
     lowest, highest : float
-        Of the soles' contact points in stance over the floor, 1st and 99th percentile [m].
+        Heights of the soles' contact points in stance, 1st and 99th percentile [m].
     tilt : float
-        Of soles whose heel and toes are at rest, 95th percentile [rad].
+        Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Furthest that a contact point moves over the floor in one stance, 95th percentile over stances [m].
+        Largest distance of a contact point from its median place in a stance, 95th percentile over stances [m].
     outliers : int
-        Frames whose acceleration stands out.
+        Number of frames with outlying acceleration.
     closed : bool
-        Whether it goes on from its last pose with its first one.
+        Whether the first pose follows the last one.
     seam : float
-        Difference of the ends' velocities where it is closed, else the larger of them [rad/s] RMS over the joints.
+        RMS over the joints of the difference of the ends' velocities if closed, else of the larger velocity [rad/s].
     flights : int
         How often nothing touches the floor for more than 0.08 s.
     falling : float
-        RMS of the centre of mass' acceleration beside gravity in flights [m/s²].
+        RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
-        Furthest that a joint is beyond its range [rad].
+        Largest excess of a joint over its range [rad].
     residual : float
         RMS of the force that contact cannot give, by inverse dynamics of the clip [body weights].
     """
@@ -79,7 +79,7 @@ class WellFormed:
     residual: float
 
     def faults(self) -> tuple[str, ...]:
-        """What is not within bounds, a line each."""
+        """Measures that exceed their bounds, a line each."""
         found: list[str] = []
         if self.lowest < LOWEST or self.highest > HIGHEST:
             found.append(f"soles stand at {100 * self.lowest:.1f} to {100 * self.highest:.1f} cm; −0.3 to 0.5")
@@ -135,7 +135,7 @@ def well_formed(clip: Clip) -> WellFormed:
 
 
 def outliers(clip: Clip) -> int:
-    """How many frames stand out by their joints' acceleration from the half second around them."""
+    """Number of frames with a joint acceleration far above the median of the half second around them."""
     if clip.n_frames < 8:
         return 0
     poses = around(clip, 2)[0] if clip.closes(GAP) else clip.poses
@@ -158,7 +158,7 @@ def _tilt(clip: Clip, resting: npt.NDArray[np.bool_]) -> float:
 
 
 def _skate(points: Array, standing: npt.NDArray[np.bool_]) -> float:
-    """Travel of every contact point from the middle of each of its stances."""
+    """Largest distance of contact points from their median place in a stance, 95th percentile over stances [m]."""
     travels: list[float] = []
     for sphere in range(points.shape[1]):
         mask = standing[:, sphere].astype(int)

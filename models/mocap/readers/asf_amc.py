@@ -1,8 +1,8 @@
-"""ASF/AMC, Acclaim's pair of skeleton and motion, as CMU's database gives them.
+"""Reader for ASF/AMC, Acclaim's pair of skeleton and motion files, in the dialect of CMU's database.
 
 A bone's rotation is given about axes of its own, C = R_z R_y R_x for `axis … XYZ`: its local rotation in the file's
 axes is C M C⁻¹ with M composed of the bone's degrees of freedom in the same order (Lander, *Working with motion capture
-file formats*, 1998). The files hold no rate: CMU recorded at 120 frames per second.
+file formats*, 1998). The files state no frame rate: CMU recorded at 120 frames per second.
 """
 
 from array import array
@@ -189,7 +189,7 @@ def _read_bone_line(bone: _Bone, fields: list[str], path: Path, line: int) -> No
     elif keyword == "axis":
         bone.axis, bone.order = _vector(rest[:3], path, line), _axis_order(rest[3:], path, line)
     elif keyword == "dof":
-        # A bone that slides or stretches would need a different skeleton: no database gives one.
+        # Bones that translate or stretch are not supported; no database has any.
         bone.freedoms = _freedoms(rest, _FREEDOMS[3:], path, line)
 
 
@@ -257,7 +257,7 @@ def _read_frames(path: Path, skeleton: _Skeleton) -> tuple[bool, Array]:
 def _append(
     values: "array[float]", row: dict[str, list[float]], moving: dict[str, _Bone], path: Path, line: int
 ) -> None:
-    """A frame's row: bones that it does not mention are not turned, but where the body is has to be said."""
+    """Append a frame's row: bones that it does not mention have angles 0, but the root must be given."""
     if "root" in moving and "root" not in row:
         raise MotionFileError(path, line, "frame without 'root'", "the root in every frame")
     for name, bone in moving.items():

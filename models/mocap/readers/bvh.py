@@ -1,4 +1,4 @@
-"""BVH: a reader for files of any program."""
+"""Reader for BVH files of any program."""
 
 import re
 from array import array
@@ -29,7 +29,7 @@ _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 @dataclass
 class _Joint:
-    """A joint while its block is read; positions and rotations are pairs (axis, column of the frame's line)."""
+    """A joint while its block is read; positions and rotations list pairs (axis, column of the frame's line)."""
 
     name: str
     parent: int
@@ -193,7 +193,7 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int
         if len(tokens) != n_columns:
             raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
         values.extend(numbers(tokens, path, line))
-    # A skeleton without channels has nothing to say in its frames.
+    # The frames of a skeleton without channels are empty lines, which are skipped.
     if found < n_frames and n_columns:
         raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
     return np.array(values).reshape(n_frames, n_columns), fps

@@ -1,6 +1,6 @@
-"""DeepMimic's JSON motions: rows of duration, root position, and joint rotations as quaternions wxyz or hinge angles.
+"""Reader for DeepMimic's JSON motions: rows of duration, root position, and quaternions wxyz or hinge angles.
 
-The skeleton stands in a character file, ``NAME_character.txt`` beside ``NAME_motion.txt``; without one it is
+The skeleton is in a character file, ``NAME_character.txt`` beside ``NAME_motion.txt``; without one it is
 DeepMimic's own humanoid (metres, Y up, facing +X, arms hanging). A hinge turns about z (Peng et al. 2018,
 github.com/xbpeng/DeepMimic).
 """
@@ -26,11 +26,11 @@ from models.mocap.readers.motion_file import (
 from models.mocap.readers.source_motion import SourceMotion
 
 _WIDTH = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
-_JSON_LIMIT = 16_000_000  # bytes: parsed, a hostile file takes some thirty times its size
+_JSON_LIMIT = 16_000_000  # bytes: parsed, a malicious file takes some thirty times its size
 
 
 class _Joint(NamedTuple):
-    """A joint of a character: its place in the parent's frame [m]."""
+    """A joint of a character; `attach` is its position in the parent's frame [m]."""
 
     name: str
     kind: str
@@ -152,7 +152,7 @@ def _read_rows(text: str, document: dict[str, object], joints: tuple[_Joint, ...
 
 
 def _at_equal_steps(durations: Array, translations: Array, rotations: Array, path: Path) -> tuple[Array, Array, float]:
-    """Frames at a constant rate. The last row's duration has no frame after it and is not used."""
+    """Translations, rotations and rate resampled to equal steps; the last row's duration is not used."""
     steps = durations[:-1]
     if len(steps) == 0:
         # A single pose has no rate; DeepMimic plays at 30.

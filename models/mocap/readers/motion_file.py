@@ -1,4 +1,4 @@
-"""The text of a motion file, read within limits, and the error that says where it is wrong."""
+"""Reading of motion files as text within size limits, parsing of numbers, and the error for malformed files."""
 
 import math
 import re
@@ -24,7 +24,7 @@ _COUNT = re.compile(r"[0-9]{1,12}")
 class MotionFileError(ModelError):
     """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line.
 
-    Line 0 is that of what is wrong with the file as a whole, which is said without a line.
+    Line 0 means the file as a whole; the message then has no line number.
     """
 
     def __init__(self, path: Path | str, line: int, what: str, expected: str) -> None:
@@ -33,7 +33,7 @@ class MotionFileError(ModelError):
 
 
 def printable(text: str, limit: int) -> str:
-    """Text from a file on one line of at most `limit` characters, without anything that a terminal would obey."""
+    """Text from a file on one line of at most `limit` characters, without terminal control characters."""
     text = "".join(character if character.isprintable() else "?" for character in text)
     return text if len(text) <= limit else text[: limit - 1] + "…"
 
@@ -71,7 +71,7 @@ def read_text(path: Path, limit: int = FILE_LIMIT) -> bytes:
 
 
 def numbered_lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Lines of a text file, counted from 1, one at a time: a list of all their words would be ten times the file.
+    """Lines of a text file, numbered from 1; one at a time, since a list of all words takes ten times the file's size.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def numbers(tokens: list[str], path: Path, line: int) -> list[float]:
 
 
 def count(token: str, limit: int, what: str, path: Path, line: int) -> int:
-    """A count from 0 to `limit`, checked before anything of that size is made.
+    """A count from 0 to `limit`, checked before memory of that size is allocated.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def count(token: str, limit: int, what: str, path: Path, line: int) -> int:
 
 
 def check_size(n_frames: int, n_joints: int, n_values: int, path: Path, line: int) -> None:
-    """Refuse motions without frames, and those too large to hold, before anything of that size is made.
+    """Refuse motions without frames, or too large, before memory of that size is allocated.
 
     Raises
     ------

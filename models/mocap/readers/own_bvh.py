@@ -1,8 +1,8 @@
-"""BVH of the figure: a writer whose channels are exactly its 57, and what tells such a file from others.
+"""BVH on the figure's own skeleton: a writer with exactly its 57 channels, and recognition of such files.
 
 Files are Y up, facing +Z, left = +X, in centimetres, as most programs expect of BVH: with world (x, y, z) in metres,
-the file's (X, Y, Z) is 100 (y, z, x), an exchange of axes that loses no digit. The order of each joint's rotations is
-chosen so that its middle angle, which locks at ±90°, moves least; a locked pose is still written exactly.
+the file's (X, Y, Z) is 100 (y, z, x), a permutation of axes that loses no digit. The rotation order of each joint is
+chosen so that its middle angle, which has gimbal lock at ±90°, moves least; a locked pose is still written exactly.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ _AXES = {
     "own": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "Blender's": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),  # Z up, facing −Y
 }
-"""From a file's axes to the world's: as written here, and as Blender writes the same skeleton after it was imported."""
+"""Rotations from a file's axes to the world's: as written here, and as Blender exports the same skeleton."""
 
 
 def _rotation_order(joint: str) -> tuple[int, int, int]:
@@ -39,8 +39,8 @@ def _rotation_order(joint: str) -> tuple[int, int, int]:
 def _euler_angles(q: Array, order: tuple[int, int, int]) -> Array:
     """Angles [rad] of intrinsic rotations about three different axes, shape (n, 3).
 
-    Bernardes & Viollet (2022), without their threshold: where the middle angle locks, the split between the other two
-    is arbitrary but their product with it is still the rotation.
+    Bernardes & Viollet (2022), without their threshold: in gimbal lock the split between the outer two angles is
+    arbitrary, but the product of all three is still the rotation.
     """
     k, j, i = order  # intrinsic rotations are extrinsic ones in reverse
     sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
@@ -53,7 +53,7 @@ def _euler_angles(q: Array, order: tuple[int, int, int]) -> Array:
 
 
 def write_bvh(clip: Clip, path: Path) -> None:
-    """Write a clip, so that reading it again gives the same poses to 1e-9 rad.
+    """Write a clip; reading it again gives the same poses to 1e-9 rad.
 
     Raises
     ------
@@ -64,14 +64,14 @@ def write_bvh(clip: Clip, path: Path) -> None:
 
 
 def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Array]) -> None:
-    """Write a motion that is told block by block, in memory that does not grow with it.
+    """Write a motion given block by block, with memory independent of its length.
 
     Parameters
     ----------
     path : Path
         File to write.
     n_frames : int
-        Frames in all.
+        Total number of frames.
     fps : float
         Frames per second [1/s].
     blocks : iterable of array (k, 75)
@@ -98,7 +98,7 @@ def write_bvh_blocks(path: Path, n_frames: int, fps: float, blocks: Iterable[Arr
 
 
 def _angles(poses: Array, last: Array | None) -> Array:
-    """Angles of all joints [rad], shape (k, 54), without jumps, also from the frame before."""
+    """Angles of all joints [rad], shape (k, 54), unwrapped; `last` (1, 54) are those of the frame before, if any."""
     columns: list[Array] = []
     for index, segment in enumerate(SEGMENTS):
         quaternion = poses[:, 3 + 4 * index : 7 + 4 * index]
@@ -120,7 +120,7 @@ def _hierarchy() -> list[str]:
             lines.append("\t" * len(open_segments) + "}")
         channels = " ".join(f"{'XYZ'[axis]}rotation" for axis in _rotation_order(segment.joint))
         indent = "\t" * len(open_segments)
-        # The pelvis of the model stands at its rest height; a BVH root starts from the origin.
+        # The model's pelvis has an offset, its rest height; the offset of a BVH root is 0.
         offset = model.body(segment.body).pos if index else np.zeros(3)
         positions = "3" if index else "6 Xposition Yposition Zposition"
         lines += [f"{indent}{'JOINT' if index else 'ROOT'} {segment.joint}", f"{indent}{{",
@@ -137,7 +137,7 @@ def _vector(world: Array) -> str:
 
 
 def own_clip(motion: SourceMotion) -> Clip | None:
-    """The clip in a file that `write_bvh` wrote, or Blender of it (same joints and bones); None for any other."""
+    """The clip, if `write_bvh` wrote the file or Blender exported it again (same joints and bones); else None."""
     if motion.joints != tuple(segment.joint for segment in SEGMENTS):
         return None
     if motion.parents != tuple(segment.parent for segment in SEGMENTS):

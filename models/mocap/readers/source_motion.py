@@ -1,4 +1,4 @@
-"""A motion on the skeleton it was recorded or authored for: what the readers return, before any retargeting."""
+"""A motion on its source skeleton: what the readers return, before any retargeting."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,11 +35,11 @@ class SourceMotion:
     fps : float
         Frames per second [1/s].
     unit : float or None
-        The file's unit of length [m] where the format tells it.
+        The file's unit of length [m], if the format defines it.
     up : str or None
-        The file's axis that points up, such as ``+Y``, where the format tells it.
+        The file's axis that points up, such as ``+Y``, if the format defines it.
     loops : bool or None
-        Whether the motion goes on from its last frame with its first one, where the file tells it.
+        Whether the motion is cyclic, if the file states it.
     """
 
     path: Path

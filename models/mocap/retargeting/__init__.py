@@ -1,1 +1,1 @@
-"""From a foreign skeleton to the figure."""
+"""Retargeting: from a foreign skeleton to the figure."""

@@ -1,14 +1,14 @@
-r"""Twist shared along an arm: where it goes beyond a joint's range, the arm's next segment takes it.
+r"""Redistribution of twist along an arm: twist beyond a joint's range is moved to a neighbouring segment.
 
-No position tells the turn of a segment about its own bone. Rigs put pronation into the wrist, which cannot twist, and
-fits of captures to markers turn a nearly straight arm about its whole length at the shoulder and back at the wrist.
-With R_u, R_f, R_h of upper arm, forearm and hand, and turns about the bones,
+Joint positions do not determine the twist of a segment about its bone. Rigs put pronation into the wrist, which cannot
+twist, and marker fits turn a nearly straight arm about its whole length at the shoulder and back at the wrist. With the
+rotations R_u, R_f, R_h of upper arm, forearm and hand, and rotations R_y about the bones,
 
 .. math:: R_u' = R_u R_y(\varphi_u), \quad R_f' = R_f R_y(\varphi_f), \quad R_h' = R_h,
 
-every joint stays where it is and the hand as it is turned. φ_f takes what twists the wrist beyond its range, φ_u what
-twists the shoulder beyond its own, as far as the elbow is straight: about a bent one it would turn the hinge, which
-is told by positions. Both are zero within the ranges.
+leave all joint positions and the orientation of the hand unchanged. φ_f removes the twist of the wrist beyond its
+range, φ_u that of the shoulder, in proportion to how straight the elbow is: at a bent elbow it would turn the hinge
+axis, which positions do determine. Both are zero within the ranges.
 """
 
 import numpy as np
@@ -19,12 +19,12 @@ from models.mocap import quaternions
 from models.mocap.retargeting.body_lines import SIDES
 
 _Y = 1  # the arms' long axis
-_STRAIGHT, _BENT = np.cos(np.deg2rad([25.0, 50.0]))  # of an elbow that turns freely about the arm, and that does not
-_ROUNDS = 3  # a turn about the bone changes the rotation vector's part along it by nearly as much
+_STRAIGHT, _BENT = np.cos(np.deg2rad([25.0, 50.0]))  # elbow angles up to which φ_u is full, from which it is zero
+_ROUNDS = 3  # fixed-point iterations: a twist changes the rotation vector's y component by nearly as much
 
 
 def with_twist_shared(segments: Array) -> Array:
-    """Global rotations of the segments (n, 18, 4) whose arms twist within their ranges, where they can."""
+    """Global rotations of the segments (n, 18, 4) with the arms' twist brought within joint ranges where possible."""
     shared = segments.copy()
     for side in SIDES:
         clavicle, upper, forearm, hand = (
@@ -44,7 +44,7 @@ def with_twist_shared(segments: Array) -> Array:
 
 
 def _back(joint: Array, low: float, high: float) -> Array:
-    """Turn about the long axis that brings a joint (n, 4) into its range there [rad], shape (n,); 0 within it."""
+    """Rotation about the long axis that brings a joint (n, 4) within its range of twist [rad], shape (n,)."""
     turn = np.zeros(len(joint))
     for _ in range(_ROUNDS):
         along = _vectors(quaternions.product(joint, quaternions.about_axis(_Y, turn)))[:, _Y]
@@ -53,7 +53,7 @@ def _back(joint: Array, low: float, high: float) -> Array:
 
 
 def _vectors(joint: Array) -> Array:
-    """Rotation vectors [rad] that go on beyond half a turn, most of them the shortest, shape (n, 3)."""
+    """Rotation vectors [rad] continuous in time beyond half a turn, shape (n, 3); most are the shortest."""
     q = quaternions.sign_continuous(joint)
     q = q if np.median(q[:, 0]) >= 0.0 else -q
     sine = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)

@@ -1,7 +1,7 @@
-"""Where a captured body is in every frame: joints by the part they play, and the lines between them.
+"""Anatomical joint positions of a captured body in every frame, and the lines between them.
 
-Everything here comes from positions during the motion, so it does not depend on how a rig is drawn: on its zero pose,
-on the frames of its joints, or on joints in between.
+Everything here comes from joint positions during the motion, so it does not depend on how a rig is set up: on its rest
+pose, its joint frames, or extra joints in between.
 """
 
 from typing import NamedTuple
@@ -73,7 +73,7 @@ class BodyLines(NamedTuple):
 
 
 def unit(vectors: Array) -> Array:
-    """The directions of vectors, shape (..., 3); NaN where there is none."""
+    """Unit vectors along vectors of shape (..., 3); NaN where the length is 0."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0.0, length, np.nan)
 
@@ -94,7 +94,7 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
         return np.stack([positions[:, table[name]] if name in table else nowhere for name in names], axis=1)
 
     def either(part: str, child: str) -> Array:
-        """Where a segment ends: at its end, else at the joint of the next segment."""
+        """Positions at which a segment ends: its end joint, or else the joint of the next segment."""
         end = paired(part, end=True)
         return np.where(np.isnan(end), paired(child), end)
 
@@ -107,12 +107,12 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     elif other is not None:
         top = positions[:, other]
     else:
-        # Legs alone: their trunk is taken to go on straight.
+        # Legs alone: the trunk is taken to continue the thighs.
         top = hips.mean(axis=1) + (hips - knees).mean(axis=1)
     toes = paired("foot", end=True)
     for k, side in enumerate(SIDES):
         joint = roles.ends.get(f"{side}_foot", roles.segments.get(f"{side}_foot"))
-        # A foot without toes may still have a tip, and toes of their own beyond the ball of the foot do not matter.
+        # A foot without a toe joint may still have a tip; toes beyond the ball of the foot are not used.
         if np.isnan(toes[:, k]).any() and joint is not None and np.any(motion.tips[joint]):
             toes[:, k] = positions[:, joint] + quaternions.rotated(rotations[:, joint], motion.tips[joint])
     parts = [np.linalg.norm(knees - hips, axis=2)]
@@ -134,7 +134,7 @@ def _sine(a: Array, b: Array) -> Array:
 
 
 def joints_below(top: int, parents: tuple[int, ...]) -> list[int]:
-    """A joint and all that hang on it: a body without what a program puts above or beside it."""
+    """A joint and all its descendants: the body without nodes that programs put above or beside it."""
     below = {top}
     for joint, parent in enumerate(parents):
         if parent in below:

@@ -1,20 +1,21 @@
-r"""How the frames of a rig's joints lie in the body: told by where joints are during the motion.
+r"""Anatomical calibration of a rig: constant rotations from its joint frames to the figure's segments.
 
-A segment S of the figure is turned by a constant from the frame of its source joint J, R_S(t) = G_J(t) C_S, whatever
-the rig's zero pose is. As in the laboratory (Cappozzo et al. 1995, "anatomical frames"; Wu et al. 2002, 2005), C_S
-comes from frames T_S(t) built of positions alone:
+A segment S of the figure differs by a constant rotation from the frame of its source joint J, R_S(t) = G_J(t) C_S,
+whatever the rig's rest pose. As in the laboratory (Cappozzo et al. 1995, "anatomical frames"; Wu et al. 2002, 2005),
+C_S comes from anatomical frames T_S(t) built of joint positions alone:
 
 .. math:: C_S = \operatorname{mean}_t\, w(t)\, G_J(t)^{-1} T_S(t)
 
-- pelvis, abdomen, chest: the hip line, the shoulder line or both, and the trunk's line; w where trunk and thighs are
-  most nearly in line, for there the spine is straight;
-- upper and lower limbs: the bone, exactly, and for the turn about it the hinge, thigh × shank and upper arm × forearm
-  (w grows with the bend beyond 12°: a straight limb has no plane). Where a limb is never bent: its parent's axis;
-- feet: the floor's vertical while they stand, and ahead the toes;
-- the head is level on the average; clavicles and hands, of which not every rig shows a line, are on the average as
-  their parents.
+- pelvis, abdomen, chest: the hip line, the shoulder line or both, and the trunk line; w is large where trunk and
+  thighs are most nearly in line, since there the spine is straight;
+- upper and lower limbs: the bone, exactly, and for the twist about it the hinge axis, thigh × shank and upper arm ×
+  forearm (w grows with the bend beyond 12°, since a straight limb has no plane); for a limb that is never bent, the
+  axis of its parent;
+- feet: the floor's vertical during stance, and the direction of the toes;
+- the head is level on average; clavicles and hands, which many rigs do not define by positions, have on average the
+  orientation of their parents.
 
-Re-drawing a rig (other joint frames G_J D, other zero pose) changes C_S to D⁻¹ C_S and R_S not at all.
+Another set-up of the same rig (joint frames G_J D, another rest pose) changes C_S to D⁻¹ C_S, and R_S not at all.
 """
 
 from typing import NamedTuple
@@ -30,19 +31,19 @@ from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 _Z = np.array([0.0, 0.0, 1.0])
-_STRAIGHT = np.deg2rad(20.0)  # angle between trunk and thighs, beyond the least, at which a frame counts 0.6 as neutral
-_BEND = np.sin(np.deg2rad(12.0))  # limbs bent less have no plane: knees lie up to 12° beside the line of a straight leg
-_UNBENT = 0.01  # what a limb's parent counts beside its hinge: as much as a bend by 15°
-_STILL = 0.3  # legs per second, below which ankle and toes of a foot are at rest: walkers' feet pass at 3
-_TURNS = 1.5  # rad/s, above which a foot rolls over heel or toe: it does at 3 to 8 in a walk
-_PATIENCE = (1.0, 2.0, 4.0)  # times either, tried in turn: runners and 16 frames a second show no foot at rest
-_LOW = 0.05  # legs: an ankle that is so little above the lowest ones of the motion has its heel on the floor
-_ALIKE = np.deg2rad(5.0)  # soles that lie so much alike are the same stance: captured ones roll by 2 to 3° in it
-_UPRIGHT = np.cos(np.deg2rad(50.0))  # of a chest to the vertical, up to which a head can be level
-_ROUNDS = 5  # of laying the trunk line: each leaves a third of the angle, the pelvis being a third of the line
-_ANKLE = np.deg2rad(20.0)  # within which of the mean ankle a sole is likely to lie
-_POINTING = 0.3  # cosine between toes and sole, below which toes do not tell where a foot looks
-_LEAST = 3  # frames that tell how a sole lies
+_STRAIGHT = np.deg2rad(20.0)  # standard deviation of the weight w over the angle between trunk and thighs
+_BEND = np.sin(np.deg2rad(12.0))  # least bend that defines a plane: knees of straight legs are up to 12° off the line
+_UNBENT = 0.01  # weight of the parent's axis beside the hinge axis: that of a bend by 15°
+_STILL = 0.3  # speed below which ankle and toes are at rest [leg lengths/s]: a walker's swinging foot has 3
+_TURNS = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
+_PATIENCE = (1.0, 2.0, 4.0)  # factors on both, tried in turn: runs and 16 frames a second show no foot at rest
+_LOW = 0.05  # height of an ankle over the lowest ones of the motion, with the heel on the floor [leg lengths]
+_ALIKE = np.deg2rad(5.0)  # difference of sole normals that count as equal: captured soles roll by 2 to 3° in stance
+_UPRIGHT = np.cos(np.deg2rad(50.0))  # inclination of the chest up to which a head can be level
+_ROUNDS = 5  # iterations for the trunk line: each leaves a third of the error, as the pelvis is a third of the line
+_ANKLE = np.deg2rad(20.0)  # standard deviation of a sole's likely inclination about that of the mean ankle
+_POINTING = 0.3  # least component of the toes' direction along the sole from which a foot's heading is taken
+_LEAST = 3  # least number of frames from which a sole's orientation is taken
 
 
 class Calibration(NamedTuple):
@@ -51,11 +52,11 @@ class Calibration(NamedTuple):
     Attributes
     ----------
     segments : array of shape (n, 18, 4)
-        R_S of the figure's segments; of those without a source joint what they follow.
+        R_S of the figure's segments; a segment without a source joint follows another one.
     bend : float
-        Least angle between trunk and thighs [rad]: how straight the straightest frame was.
+        Least angle between trunk and thighs [rad]: that of the straightest frame.
     stances : tuple of int
-        Frames that told how the left and the right sole lie; 0 where none did.
+        Number of frames from which the left and the right sole were calibrated.
     """
 
     segments: Array
@@ -72,19 +73,19 @@ def calibrate(
     Parameters
     ----------
     roles : Roles
-        Which joint is what.
+        Which joint plays which part.
     parents : tuple of int
-        Of the joints.
+        Parent of each joint.
     lines : BodyLines
-        Where the body is.
+        Anatomical positions.
     rotations : array of shape (n, joints, 4)
-        Global, from whatever zero pose.
+        Global rotations of the joints, relative to any rest pose.
     up : array of shape (3,)
-        In the file's axes.
+        Vertical in the file's axes.
     fps : float
-        Frames per second [1/s].
+        Frame rate [1/s].
     rest_frame : int or None
-        A frame in which the body stands upright with level feet; without one it is found.
+        A frame in which the body stands upright with level feet; without one, frames are weighted as above.
     """
     n = len(rotations)
     segments = np.empty((n, len(SEGMENTS), 4))
@@ -103,7 +104,7 @@ def calibrate(
         return segments[:, BODIES.index(body)]
 
     def joint(body: str) -> Array | None:
-        """Rotations of what carries a segment: of the last joint before its end, for twist joints may lie between."""
+        """Global rotations of a segment's source: the last joint before its end, since twist joints may lie between."""
         index = roles.segments.get(body)
         if index is None:
             return None
@@ -123,7 +124,7 @@ def calibrate(
         wanted = quaternions.product(_frames(left, trunk), quaternions.conjugate(own_trunk))
         turned = _carried(source, wanted, straight)
         if body == "pelvis":
-            # Rigs with hip joints of their own, beside the pelvis, turn the hip line in it.
+            # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
             turned = quaternions.product(_arcs(quaternions.rotated(turned, np.array([0.0, 1.0, 0.0])), hips), turned)
         put(body, turned)
     if "abdomen" not in roles.segments:
@@ -167,7 +168,7 @@ def calibrate(
 
 
 def _own_trunk(has_arms: bool) -> Array:
-    """Frame of the figure's own trunk line at rest, as `_frames` makes it of a source's."""
+    """Frame of the figure's own trunk line in the rest pose, built like a source's by `_frames`."""
     model = figure_model()
     top = model.body("abdomen").pos + model.body("chest").pos
     top = top + (model.body("left_clavicle").pos + model.body("left_upper_arm").pos if has_arms else 0.0)
@@ -175,9 +176,10 @@ def _own_trunk(has_arms: bool) -> Array:
 
 
 def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
-    """R of the head: level on the average of the frames in which the body is upright, looking where the chest does.
+    """R of the head: on average of the upright frames level, with the heading of the chest.
 
-    Eyes are kept level whatever the trunk does (Pozzo et al. 1990). A body that is never upright looks ahead.
+    People keep the eyes level whatever the trunk does (Pozzo et al. 1990). The head of a body that is never upright
+    has the orientation of the chest on average.
     """
     upright = straight * (quaternions.rotated(chest, _Z) @ up > _UPRIGHT)
     if upright.sum() < 1e-6:
@@ -189,10 +191,10 @@ def _head(source: Array, chest: Array, up: Array, straight: Array) -> Array:
 
 
 def _set_lines(segments: Array, trunk: Array, shoulders: Array, clavicled: bool) -> None:
-    """Lay the figure's trunk and shoulder lines on the source's: its spine is not jointed where the source's is.
+    """Align the figure's trunk and shoulder lines with the source's, whose spine has joints in other places.
 
-    Abdomen and chest, with all they carry but the arms, turn as one by some degrees, then the
-    clavicles, where the source has them.
+    Abdomen, chest, head and clavicles turn together by some degrees; then the clavicles turn, if the source has them.
+    Changes `segments`.
     """
     model = figure_model()
     abdomen, chest = model.body("abdomen").pos, model.body("chest").pos
@@ -219,7 +221,7 @@ def _frames(left: Array, along: Array) -> Array:
     """Rotations that turn y into `left` and z as nearly as possible into `along`, shape (n, 4)."""
     x = unit(np.cross(left, along))
     matrices = np.stack((x, left, np.cross(x, left)), axis=-1)
-    # Where the two are parallel there is no frame; what stands in has no weight, for such a trunk is not straight.
+    # Where both are parallel, the frame is undefined; the substitute has no weight, since such a trunk is not straight.
     matrices[np.isnan(matrices).any(axis=(1, 2))] = np.eye(3)
     return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
 
@@ -234,7 +236,7 @@ def _carried(source: Array, wanted: Array, weights: Array) -> Array:
 def _limb(
     source: Array | None, bone: Array, hinge: Array, parent: Array, along: tuple[int, float], across: int
 ) -> Array:
-    """R of a limb's segment: axis `along` on its bone in every frame, axis `across` on its hinge on the average."""
+    """R of a limb's segment: axis `along` is on its bone in every frame, axis `across` on its hinge on average."""
     axis, sign = along
     if np.isnan(bone).any():
         return parent if source is None else _carried(source, parent, np.ones(len(parent)))
@@ -254,12 +256,12 @@ def _limb(
     third = 3 - axis - across
     columns[:, third] = np.cross(columns[:, (third + 1) % 3], columns[:, (third + 2) % 3])
     turned = quaternions.product(source, np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True)))
-    # Files that stretch bones, or bend them at joints in between, turn them beside their joints.
+    # In files that stretch bones, or bend them at joints in between, bones turn relative to the joint frames.
     return quaternions.product(_arcs(sign * quaternions.rotated(turned, np.eye(3)[axis]), bone), turned)
 
 
 def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
-    """Frames in which a foot stands on heel and toes: at rest, and its ankle as low as any gets."""
+    """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion."""
     n = len(source)
     if n == 1:
         return np.array([0])
@@ -280,16 +282,16 @@ def _flat(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt
 def _foot(
     source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
 ) -> tuple[Array, int]:  # fmt: skip
-    """R of a foot: sole level where it stands, looking where its toes do; and how many frames told.
+    """R of a foot, with a level sole in stance and the heading of its toes; and the number of stance frames used.
 
-    Where no frame tells, the sole lies as with an ankle at rest on the average.
+    Without stance frames, the sole has the orientation of an ankle in rest pose on average.
     """
     back = quaternions.conjugate(source)
     resting = _carried(source, shank, straight)
     vertical = quaternions.rotated(back[flat], up)
     alike = vertical[:: 1 + len(vertical) // 500] @ vertical.T > np.cos(_ALIKE)
     neutral = quaternions.rotated(back, quaternions.rotated(resting, _Z))[0]
-    # In captures whose feet roll with spread legs the sole lies in two ways: the one nearer to a level ankle is right.
+    # Captured feet that roll with spread legs give two clusters of normals: the one nearer to a neutral ankle is right.
     likely = np.exp(-((np.arccos(np.clip(vertical @ neutral, -1.0, 1.0)) / _ANKLE) ** 2) / 2.0)
     told = alike[np.argmax(alike @ likely)] if len(flat) else np.zeros(0, dtype=bool)
     if told.sum() < min(_LEAST, len(source)):
@@ -302,7 +304,7 @@ def _foot(
         ahead = quaternions.rotated(back, unit(toes)).mean(axis=0)
         x = ahead - normal * (ahead @ normal)
     if np.linalg.norm(x) < _POINTING or np.isnan(toes).any():
-        # Without toes, or with toes drawn below the ankle, a foot looks where its shank does.
+        # Without toes, or with toes below the ankle, a foot has the heading of its shank.
         ahead = quaternions.rotated(back, quaternions.rotated(resting, np.array([1.0, 0.0, 0.0])))[0]
         x = ahead - normal * (ahead @ normal)
     x = unit(x)
@@ -312,7 +314,7 @@ def _foot(
 
 
 def _arcs(u: Array, v: Array) -> Array:
-    """The smallest rotations that turn unit vectors u into v, (n, 3) → (n, 4); opposite ones about any axis."""
+    """The smallest rotations from unit vectors u to v, (n, 3) → (n, 4); for opposite vectors about any normal axis."""
     q = np.concatenate([1.0 + np.sum(u * v, axis=1, keepdims=True), np.cross(u, v)], axis=1)
     length = np.linalg.norm(q, axis=1, keepdims=True)
     aside = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])

@@ -1,10 +1,10 @@
-"""Where the floor is under a retargeted motion, how it slopes, and toes that do not go through it.
+"""Floor of a retargeted motion: its height and slope, and ankle rotations that keep toes above it.
 
-A volume calibrated askew gives a floor that slopes. Where the body stands at places far enough from each other,
-a plane through its level soles tells; it is believed where it is significant, and its rotation levels the motion.
+A capture volume that was calibrated askew has a sloping floor. If the body stands at places far enough from each other,
+the slope is estimated by a plane through its level soles; where it is significant, the motion is rotated level.
 
-The figure's foot is one rigid piece. A foot that rolls off over bent toes would push the figure's through the floor, so
-where the toes' contact points are too low the ankle bends them up, about its own lateral axis, until they touch.
+The figure's foot is one rigid body. At push-off over bent toes it would penetrate the floor, so where contact points of
+the toes are too low, the ankle is rotated about its lateral axis until they touch.
 """
 
 import numpy as np
@@ -14,20 +14,20 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model
 from models.mocap import quaternions
 
-_LEVEL = 0.06  # the four contact points of a sole that is level differ by less in height [m]
-_SHARE = 0.25  # of the supporting, level soles are at or below the floor
-_STILL = 0.4  # m/s, of a sole that stands
-_SPREAD = 0.25  # RMS distance of standing soles along a direction, from which its slope is told [m]: a stride has 0.4
-_STEPS, _SURE = 4, 3.0  # stances at least, and standard errors that a slope is from level
-_SLOPE = np.deg2rad((0.5, 8.0))  # what is no slope, and what is none of a floor that was meant to be level
-_UNEVEN = 0.025  # RMS of the soles about the plane, beyond which they stand on stairs or boxes [m]
-_SMOOTHING = 0.02  # standard deviation of the window that smooths the bend of the toes [s]
+_LEVEL = 0.06  # largest height difference of the four contact points of a level sole [m]
+_SHARE = 0.25  # quantile of the heights of level soles that is the floor
+_STILL = 0.4  # largest speed of a standing sole [m/s]
+_SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
+_STEPS, _SURE = 4, 3.0  # least number of stances; least slope in standard errors
+_SLOPE = np.deg2rad((0.5, 8.0))  # smaller slopes are none, larger ones are not due to calibration
+_UNEVEN = 0.025  # RMS deviation of the soles from the plane above which they stand on stairs or boxes [m]
+_SMOOTHING = 0.02  # standard deviation of the Gaussian filter for the ankles' correction [s]
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 _PLACES = ("heel_out", "heel_in", "toe_out", "toe_in")
 
 
 def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array]:
-    """The motion shifted vertically, by one constant, onto the floor, with toes bent up where they would go through it.
+    """The motion shifted vertically by a constant onto the floor, with feet pitched up where toes would penetrate it.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     segments : array of shape (frames, 18, 4)
         Rotations of the segments in the world.
     fps : float
-        Frames per second [1/s].
+        Frame rate [1/s].
 
     Returns
     -------
     root, segments : arrays
-        The same after the shift and the bending of the ankles.
+        Positions and rotations after the shift and the rotation of the ankles.
     """
     ankles = root[:, None, 2] + _ankles(segments)[..., 2]
     feet = segments[:, _FEET]
@@ -49,7 +49,7 @@ def on_the_floor(root: Array, segments: Array, fps: float) -> tuple[Array, Array
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
     floor = _floor(heights)
     bend = _toe_bend(ankles - floor - CONTACT_RADIUS, feet, points)
-    # A foot that points straight down leaves the floor at once, and its bend with it: faster than any ankle.
+    # The correction of a foot that points straight down ends abruptly when it leaves the floor, so it is smoothed.
     bend = gaussian_filter1d(bend, _SMOOTHING * fps, axis=0, mode="nearest")
     segments = segments.copy()
     segments[:, _FEET] = quaternions.product(feet, quaternions.about_axis(1, bend))
@@ -63,7 +63,7 @@ def _contact_points() -> Array:
 
 
 def _ankles(segments: Array) -> Array:
-    """The ankles from the pelvis [m], shape (frames, 2, 3)."""
+    """Positions of the ankles relative to the pelvis, in world axes [m], shape (frames, 2, 3)."""
     model = figure_model()
     places = np.zeros((len(segments), len(_FEET), 3))
     for column, body in enumerate(_FEET):
@@ -74,7 +74,7 @@ def _ankles(segments: Array) -> Array:
 
 
 def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, float]:
-    """The motion turned so that the floor on which it stands is level, and by what angle [rad]; 0 where none is told.
+    """The motion rotated so that its floor is level, and the angle [rad]; 0 where no slope can be estimated.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
 
 
 def _slopes(points: Array, stances: int) -> Array:
-    """dz/dx, dz/dy of the plane through points of so many stances, in the directions in which they tell it."""
+    """Slopes dz/dx, dz/dy of the plane through points of standing soles; 0 in directions without significance."""
     flat = points[:, :2] - points[:, :2].mean(axis=0)
     height = points[:, 2] - points[:, 2].mean()
     _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
@@ -115,18 +115,18 @@ def _slopes(points: Array, stances: int) -> Array:
 
 
 def _floor(heights: Array) -> float:
-    """Height of the floor from the contact points', shape (frames, 2, 4): where the lower foot's level sole is."""
+    """Height of the floor [m] from heights of contact points (frames, 2, 4): that of the lower foot's level soles."""
     lower = np.argmin(heights.min(axis=2), axis=1)
     sole = heights[np.arange(len(heights)), lower]
     level = np.ptp(sole, axis=1) < _LEVEL
-    # Where no foot is ever put down flat, the lowest points are taken instead.
+    # If no foot is ever put down flat, the lowest contact points are used.
     return float(np.quantile(sole[level].mean(axis=1) if level.any() else sole.min(axis=1), _SHARE))
 
 
 def _toe_bend(ankles: Array, feet: Array, points: Array) -> Array:
     """Rotations about the feet's y axis [rad], ≤ 0, after which no toe is below the floor, shape (frames, 2).
 
-    A point p of a foot whose frame has the vertical r is, after a bend by δ, at the height
+    After a rotation by δ, a point p of a foot, with the vertical r in the foot's frame and the ankle's height h, is at
     h + r_y p_y + (r_x p_x + r_z p_z) cos δ + (r_x p_z − r_z p_x) sin δ.
     """
     r = quaternions.rotated(quaternions.conjugate(feet), np.array([0.0, 0.0, 1.0]))[:, :, None]
@@ -136,6 +136,6 @@ def _toe_bend(ankles: Array, feet: Array, points: Array) -> Array:
     sine = r[..., 0] * p[..., 2] - r[..., 2] * p[..., 0]
     turn = np.arctan2(sine, cosine) + np.arccos(np.clip(-constant / np.hypot(cosine, sine), -1.0, 1.0))
     turn = np.where(turn > np.pi, turn - 2.0 * np.pi, turn)
-    # A foot that points straight down, or a little further, still bends forwards: its toes got there from ahead.
+    # The tolerance on `sine` includes feet that point straight down or a little further back.
     needed = (constant + cosine < 0.0) & (sine < 0.05)
     return np.where(needed, np.clip(turn, -np.pi / 3, 0.0), 0.0).min(axis=2)

@@ -1,9 +1,9 @@
-"""Carries a motion from any human skeleton to the figure.
+"""Retargeting of a motion from any human skeleton to the figure.
 
-Where the body's axes lie in the rig, what is up and where the floor is come from the motion itself (`calibration`,
-`upright`, `footing`), never from the rig's zero pose. So limbs point exactly where the source's do. The root is the
-middle of the hips, scaled by the length of the legs; one vertical shift sets the feet on the floor, so flights keep
-their parabolas.
+Segment axes in the rig, the vertical and the floor are estimated from the motion itself (`calibration`, `upright`,
+`footing`), never from the rig's rest pose, so limbs point exactly where the source's do. The root is the middle of the
+hips, scaled by the length of the legs. A constant vertical shift puts the feet on the floor, so flights remain
+parabolas.
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ from models.mocap.retargeting.skeleton_roles import Roles, missing, unused
 from models.mocap.retargeting.upright import AXES, check_sides, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
-_BENT = np.deg2rad(60.0)  # a body that never stands straighter does not tell how its spine is at rest
-_RANGE = np.deg2rad(15.0)  # beyond the figure's joint ranges: people's differ by 5 to 9° (SD, Boone & Azen 1979)
+_BENT = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
+_RANGE = np.deg2rad(15.0)  # least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979)
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -42,7 +42,7 @@ _UNITS = (
 
 @dataclass(frozen=True)
 class Hints:
-    """What a person knows better than the motion tells.
+    """Facts about a file that the user states in place of estimates.
 
     Parameters
     ----------
@@ -71,31 +71,30 @@ _NO_HINTS = Hints()
 
 
 class RetargetReport(NamedTuple):
-    """What a motion was taken for.
+    """How a motion file was interpreted.
 
     Attributes
     ----------
     taken : dict from figure body to source joint
         The joint that moves each segment.
     unused : tuple of str
-        Source joints that move nothing.
+        Source joints that move no segment.
     missing : tuple of str
-        Segments without a joint, and what they follow.
+        Segments without a joint, and which segment they follow.
     up : str
         The file's axis that points up, such as ``+Y``.
     facing : str
-        The file's axis nearest to where the body faces at first.
+        The file's axis nearest to the body's first heading.
     unit : str
-        The file's unit of length, worked out from the legs unless the format tells it.
+        The file's unit of length, estimated from the legs unless the format defines it.
     scale : float
         Metres of the figure per unit of the file.
     dropped : int
-        Frames in front that were a pose of its own, such as a T-pose, and are left out.
+        Number of frames of a calibration pose in front, such as a T-pose, that are left out.
     confidence : float
-        Lead of what is up over the next axis; infinite where the format or a person says it. 0.25 is the least that
-        is believed.
+        Lead of the score of `up` over the next axis, at least 0.25; infinite where the format or the user states it.
     remarks : tuple of str
-        What could not be told, and what was taken instead.
+        What could not be determined, and what was assumed instead.
     """
 
     taken: dict[str, str]
@@ -125,13 +124,13 @@ class RetargetReport(NamedTuple):
 
 
 def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tuple[Clip, RetargetReport]:
-    """The motion on the figure, starting over the world's origin and facing +x, and what it was taken for.
+    """The motion on the figure, starting over the world's origin and facing +x, and how it was interpreted.
 
     Raises
     ------
     MotionFileError
-        If the skeleton's legs or hips have no extent, the file moves joints by positions instead of rotations, or what
-        the motion shows contradicts itself.
+        If the skeleton's legs or hips have no extent, the file moves joints by positions instead of rotations, or
+        estimates from the motion contradict each other.
     """
     if (
         np.all(motion.rotations == motion.rotations[0, 0])
@@ -143,7 +142,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         raise MotionFileError(motion.path, 0, f"there is no frame {rest}", f"--rest-frame below {motion.n_frames}")
     whole = motion
     motion, dropped = without_leading_pose(motion)
-    # The pose in front is no part of the motion, but a person may point at it as the body at rest.
+    # The pose in front is no part of the motion, but the user may name it as the rest frame.
     calibrating = whole if rest is not None and rest < dropped else motion
     skipped = calibrating.n_frames - motion.n_frames
     rotations = calibrating.global_rotations()
@@ -169,7 +168,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     hips = lines.middle[skipped:]
     root = own_leg / lines.leg * quaternions.rotated(axes, hips - hips[0])
     root, segments, slope = levelled(root, segments, motion.fps)
-    if slope:  # which turns a body that does not look straight up or down the slope
+    if slope:  # levelling changes the heading of a body that does not face along the slope
         ahead = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(ahead, root), quaternions.product(ahead, segments)
     clip = Clip(_poses(*on_the_floor(root, segments, motion.fps)), motion.fps, motion.path.stem)
@@ -196,7 +195,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
 
 
 def _world_axes(body: Array, up: Array) -> Array:
-    """A: the file's axes → the world's, with `up` to z and the body's forward axis (its head's, when it lies) to +x."""
+    """Rotation from the file's axes to the world's: `up` to z, the body's heading (its head's, if it lies) to +x."""
     forward, head = quaternions.rotated(body, _X), quaternions.rotated(body, _Z)
     x = forward - up * (forward @ up)
     if np.linalg.norm(x) < 0.3:
@@ -207,7 +206,7 @@ def _world_axes(body: Array, up: Array) -> Array:
 
 
 def _own_leg(ankles: bool) -> float:
-    """Length of the figure's leg [m], hip to ankle, or to the knee where the source has no ankles."""
+    """Length of the figure's leg [m] from hip to ankle, or to the knee if the source has no ankles."""
     model = figure_model()
     children = ("left_shank", "left_foot") if ankles else ("left_shank",)
     return sum(float(np.linalg.norm(model.body(child).pos)) for child in children)
@@ -222,7 +221,7 @@ def _poses(root: Array, segments: Array) -> Array:
 
 
 def _named_beyond_ranges(poses: Array) -> str:
-    """Which joints are further beyond their ranges than ranges of people differ; empty if none is."""
+    """Remark on joints that exceed their ranges by more than people's ranges differ; empty if there is none."""
     excess = beyond_ranges(poses)
     most = excess.max(axis=0)
     told = [

@@ -1,9 +1,9 @@
-"""Which joint of a foreign skeleton plays which part of the figure, found by its name and its place in the tree.
+"""Assignment of a foreign skeleton's joints to the figure's segments, by name and by position in the joint tree.
 
-Names known: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max Biped,
-Unreal, Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with sides
-before or after, namespaces and numbers. Pelvis, chest and abdomen go by many names, so they are taken by place: the
-pelvis is where the legs meet, the chest where the arms meet, the abdomen halfway between.
+Known naming schemes: CMU (ASF and both BVH conversions), Mixamo and HumanIK, MotionBuilder, SFU, Biovision, 3ds Max
+Biped, Unreal, Xsens, Rokoko, Vicon, OptiTrack, Bandai Namco, SMPL, Rigify, DeepMimic, Daz and the figure's own, with
+sides before or after, namespaces and numbers. Pelvis, chest and abdomen have many names, so they are found in the tree:
+the pelvis is where the legs meet, the chest where the arms meet, the abdomen halfway between.
 """
 
 import re
@@ -49,7 +49,7 @@ class Roles(NamedTuple):
 
 
 def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
-    """The roles of a skeleton's joints, or the part of a leg that is lacking when it cannot be a human's."""
+    """The roles of a skeleton's joints; or, if it cannot be a human's, the name of the missing pelvis or leg part."""
     named = _by_name(joints, parents)
     for part in ("left_thigh", "right_thigh", "left_shank", "right_shank"):
         if part not in named:
@@ -64,7 +64,7 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
     if spine:
         segments["chest"] = spine[-1]
         if len(spine) > 1:
-            # Of three vertebrae the second, of two the first: the figure's abdomen ends where the ribs begin.
+            # The middle joint below the chest, rounded down: the figure's abdomen ends where the ribs begin.
             segments["abdomen"] = spine[(len(spine) - 1) // 2]
     if (head := named.get("head", named.get("neck"))) is not None:
         segments["head"] = head
@@ -73,7 +73,7 @@ def roles_of(joints: tuple[str, ...], parents: tuple[int, ...]) -> Roles | str:
         for part in ("clavicle", "upper_arm", "forearm", "thigh", "shank", "foot"):
             if f"{side}_{part}" in named:
                 segments[f"{side}_{part}"] = named[f"{side}_{part}"]
-        # Where both exist the wrist is the end of the forearm, and the hand beyond it (CMU) has all of the rotation.
+        # If both exist, the wrist is the end of the forearm, and the hand beyond it (CMU) carries all the rotation.
         wrist, hand = named.get(f"{side}_wrist"), named.get(f"{side}_hand")
         if (last := hand if hand is not None else wrist) is not None:
             segments[f"{side}_hand"] = last
@@ -109,7 +109,7 @@ def _base(name: str) -> tuple[str, str]:
 
 
 def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int]:
-    """Parts found by name alone; joints without children, such as markers of a rig's meshes, come last."""
+    """Joint index of each part found by name alone; joints with children take precedence over leaves."""
     bases: dict[tuple[str, str], int] = {}
     leaves = set(range(len(joints))) - set(parents)
     for index in sorted(range(len(joints)), key=lambda joint: joint in leaves):
@@ -133,7 +133,7 @@ def _by_name(joints: tuple[str, ...], parents: tuple[int, ...]) -> dict[str, int
             # SMPL's foot is the ball of the foot.
             found[f"{side}_foot"] = ankle
             found.setdefault(f"{side}_toe", foot)
-        # A shoulder is the clavicle where the skeleton has an arm beside it, and the arm where it has not.
+        # A "shoulder" is the clavicle if there is an arm joint as well, and otherwise the upper arm.
         if found.get(f"{side}_clavicle") == found.get(f"{side}_upper_arm"):
             found.pop(f"{side}_clavicle", None)
     return found
@@ -148,13 +148,13 @@ def ancestry(joint: int, parents: tuple[int, ...]) -> list[int]:
 
 
 def _meeting_point(one: int, other: int, parents: tuple[int, ...]) -> int | None:
-    """The nearest joint above both, neither of the two itself."""
+    """The nearest common ancestor of two joints, other than themselves."""
     above = set(ancestry(other, parents)[1:])
     return next((joint for joint in ancestry(one, parents)[1:] if joint in above), None)
 
 
 def _path(top: int, bottom: int, parents: tuple[int, ...]) -> list[int]:
-    """Joints from below `top` down to `bottom`; none where `bottom` is not below it."""
+    """Joints from below `top` down to `bottom`; empty if `bottom` is no descendant of `top`."""
     chain = ancestry(bottom, parents)
     return chain[: chain.index(top)][::-1] if top in chain else []
 
@@ -166,7 +166,7 @@ def unused(roles: Roles, joints: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def missing(roles: Roles) -> tuple[str, ...]:
-    """Segments of the figure that no joint moves, each with what it follows instead."""
+    """Segments of the figure that no joint moves, each with the segment that it follows instead."""
     bodies = (segment for segment in SEGMENTS if segment.body not in roles.segments)
     return tuple(
         f"{segment.body} (follows {'pelvis and chest' if segment.body == 'abdomen' else BODIES[segment.parent]})"

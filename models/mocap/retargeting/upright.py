@@ -1,13 +1,13 @@
-r"""Which axis of a file points up, and whether left is left: told by what the body does, with a confidence.
+r"""Estimation of a file's vertical axis from the motion, with a confidence, and a check for mirrored bodies.
 
-Of the file's six axes that one points up along which the body stands, which it does not climb, and over whose lowest
-joints its weight is:
+Each of the file's six axes u is scored: the body should stand along u, not climb along u, and have its weight over its
+lowest joints,
 
 .. math:: s(u) = \overline{\hat b \cdot u} - \sigma(\min_j p_j \cdot u)/l - 2\,\overline{d(u)}/l + \beta(u)
 
-b from the feet to the trunk's upper end; σ the spread (5 to 95 %) of the lowest joint's height; d how far the middle of
-hips and shoulders is outside of the hull of the joints nearest to the floor, seen along u; l the length of the legs;
-β = 0.1 for +Y and +Z, the only ones that programs write.
+with b from the feet to the trunk's upper end; σ the spread (5 to 95 %) of the lowest joint's height; d the distance of
+the middle of hips and shoulders outside the hull of the joints nearest to the floor, seen along u; l the length of the
+legs; and β = 0.1 for +Y and +Z, the only axes that programs write.
 """
 
 from typing import NamedTuple
@@ -25,21 +25,21 @@ _CUSTOM = 0.1  # β
 _CERTAIN = (
     0.25  # least lead of the best axis over the next; over the files of ../shared/mocap the least is said in docs
 )
-_BEARING = 0.12  # joints within this share of a leg of the lowest one may bear load: an ankle is so high over its toes
-_SAMPLES = 200  # frames that are looked at
-_DIRECTIONS = 16  # in which the hull of the bearing joints is bounded
-_SURE = 0.15  # sine of the mean bend of knees, cosine of the toes: what tells left from right
+_BEARING = 0.12  # height over the lowest joint up to which joints may bear load [leg lengths], as ankles over toes
+_SAMPLES = 200  # number of frames that are evaluated
+_DIRECTIONS = 16  # directions in which the hull of the bearing joints is bounded
+_SURE = 0.15  # least mean sine of the knees' bend, and cosine of the toes' direction, that tell left from right
 
 
 class Up(NamedTuple):
-    """What is up.
+    """The vertical of a file.
 
     Attributes
     ----------
     axis : array of shape (3,)
-        Unit vector in the file's axes.
+        Upward unit vector in the file's axes.
     confidence : float
-        Lead of its score over the next axis'; infinite where the format or a person says it.
+        Lead of its score over that of the next axis; infinite where the format or the user states it.
     """
 
     axis: Array
@@ -47,12 +47,12 @@ class Up(NamedTuple):
 
 
 def up_axis(motion: SourceMotion, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
-    """The file's axis that points up: as said, as the format has it, else as the body's joints (n, m, 3) tell.
+    """The file's axis that points up: as the user or the format states it, or estimated from joint positions (n, m, 3).
 
     Raises
     ------
     MotionFileError
-        If the motion does not tell.
+        If the estimate is not clear.
     """
     if (name := said or motion.up) is not None:
         return Up(np.array(AXES[name], dtype=np.float64), np.inf)
@@ -86,12 +86,12 @@ def _score(name: str, lines: BodyLines, positions: Array, frames: npt.NDArray[np
 
 
 def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
-    """Refuse a body whose left is not on its left: toes and knees tell what is ahead, hips and trunk what is left.
+    """Refuse a mirrored body: hips and trunk define left, which toes and the bend of the knees must confirm.
 
     Raises
     ------
     MotionFileError
-        If toes and knees say that the body is mirrored, or one says so and the other does not know.
+        If toes and knees show a mirrored body, or one of them does while the other is unclear or contradicts it.
     """
     left = unit(lines.left)
     ahead = unit(np.cross(left, unit(lines.trunk)))
