@@ -74,7 +74,7 @@ def _found(config: RunConfig, hands: HandRange) -> Stability:
     if missing:
         verdicts = [leaving_out(verdict, missing) for verdict in verdicts]
     worst = max(verdicts, key=lambda verdict: _SEVERITY.index(verdict.verdict))
-    margin = min(verdict.margin for verdict in verdicts if verdict.margin is not None)
+    margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)
 
 

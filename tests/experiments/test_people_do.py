@@ -18,12 +18,14 @@ CURVE = hvf.circle(radius=RADIUS, lap=LAP)
 STRONG, LIGHT = (150.0, 8.0), (20.0, 2.0)  # k_r [N/m] and b_d [N s/m] of a river that leads, and of one that yields
 
 
-def done(intent: PersonIntent, seconds: float, river: tuple[float, float] = LIGHT) -> dict[str, np.ndarray]:
+def done(
+    intent: PersonIntent, seconds: float, river: tuple[float, float] = LIGHT, seed: int = 3
+) -> dict[str, np.ndarray]:
     """Channels of the ticks of a person who does something on a circle with FOLLOW, without a figure."""
     sim = hvf.Simulation(
         field=hvf.Follow(CURVE, k_r=river[0], b_d=river[1]),
         haptic_map=hvf.Cylindrical(hvf.clips("squat_dance"), around=CURVE),
-        user=hvf.User(person=hvf.persona("median"), intent=intent), figure=hvf.Figure(kind="none"), seed=3,
+        user=hvf.User(person=hvf.persona("median"), intent=intent), figure=hvf.Figure(kind="none"), seed=seed,
     )  # fmt: skip
     run = sim.run(seconds)
     return {name: run.ticks[name] for name in ("t", "p", "v", "user", "force", "distance")}
@@ -85,9 +87,10 @@ def test_who_resists_stays_and_then_goes_on() -> None:
 
 
 def test_who_gets_lost_leaves_the_curve_and_comes_back() -> None:
-    found = done(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0)
-    assert np.max(within(found, "distance", 1.5, 3.5)) > 8e-3
-    assert np.median(within(found, "distance", 5.5, 7.0)) < 4e-3
+    found = [done(hvf.intents.GetLost(at=1.0, seconds=3.0, away=0.015), 7.0, seed=seed) for seed in (3, 4, 5)]
+    assert min(np.max(within(one, "distance", 1.5, 3.5)) for one in found) > 8e-3
+    # One person comes back to within 0.9 to 2.9 mm, as the seed has it; eight were tried.
+    assert np.median([np.median(within(one, "distance", 5.5, 7.0)) for one in found]) < 4e-3
 
 
 def test_who_presses_is_led_and_pushes_when_she_means_to() -> None:
@@ -113,18 +116,23 @@ def test_an_intent_of_one_s_own_is_done_in_python_and_compiled() -> None:
 
 
 def summary_of(folder: Path, **words: object) -> RunSummary:
+    folder.mkdir(exist_ok=True)
     session = wire(run_config(**words))  # pyright: ignore[reportArgumentType]
     return record(session, folder, {}, float(str(words["seconds"])), 0.0, Console(quiet=True))
 
 
 @pytest.mark.slow
 def test_who_bends_a_tube_takes_hold_carries_it_and_lets_go(tmp_path: Path) -> None:
-    editing = summary_of(tmp_path, mode="stretch", map="composite", clips=("squat_dance",), person="median",
-                         figure="kinematic", seconds=6.0).editing  # fmt: skip
-    assert editing is not None
-    held = [press for press in editing.presses if press.what == "held"]
-    assert held
-    assert max(press.dragged_mm for press in held) > 5.0
+    dragged = []
+    for seed in (1, 2, 3):
+        editing = summary_of(tmp_path / str(seed), mode="stretch", map="composite", clips=("squat_dance",), seed=seed,
+                             person="median", figure="kinematic", seconds=6.0).editing  # fmt: skip
+        assert editing is not None
+        held = [press.dragged_mm for press in editing.presses if press.what == "held"]
+        assert held
+        dragged.append(max(held))
+    # One person drags by 8 to 35 mm, as the seed has it.
+    assert np.median(dragged) > 5.0
 
 
 @pytest.mark.slow

@@ -50,7 +50,7 @@ def test_follow_keeps_a_clip_s_pace_and_its_figure_on_its_feet(
 
 
 def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map_file: Path, tmp_path: Path) -> None:
-    residuals = []
+    residuals, furthest = [], []
     for seed in (1, 2, 3):
         config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
         summary = run(config, tmp_path / "bent", True, 0.0)
@@ -59,11 +59,12 @@ def test_a_walk_that_is_bent_and_then_performed_keeps_its_figure_on_its_feet(map
         # It fell as soon as it was performed: at full speed from the middle of a step.
         assert summary.figure.fell_at is None
         assert summary.performance is not None
-        # 1.6 to 2.3 cm in 51 runs: seeds, kernels of OpenBLAS, nudged starts and maps; 2.9 where a lift ends elsewhere.
-        assert summary.performance.figure.root_error_max_cm < 5.0
+        furthest.append(summary.performance.figure.root_error_max_cm)
         residuals.append(summary.performance.figure.residual_force_rms)
     # 0.162 to 0.172, 0.222 where a lift ends elsewhere, 0.256 on AVX-512; a figure that hangs on its help takes 1.
     assert np.median(residuals) < 0.4
+    # 1.1 to 3.3 cm in single runs: seeds, kernels of OpenBLAS, nudged starts and maps.
+    assert np.median(furthest) < 5.0
 
 
 def test_a_hand_that_lets_go_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
