@@ -1,8 +1,8 @@
-"""Arrays that compiled code borrows for the length of a call: it counts no references to them.
+"""Borrowed arrays in compiled code: arrays without reference counting, valid for the duration of a call.
 
-numba counts a reference, by an atomic instruction, for every array of a tuple that a function is handed, and for every
-array that it takes out of one. For a loop that hands on a hundred arrays a tick these cost a tenth of its time, and
-they guard what the caller keeps alive anyway.
+numba counts a reference, by an atomic instruction, for every array of a tuple that is passed to a function or taken out
+of a tuple. For a loop that passes on a hundred arrays per tick this costs a tenth of its time, although the caller
+keeps the arrays alive anyway.
 """
 
 from typing import Any, Protocol, TypeVar, cast
@@ -24,7 +24,7 @@ def _borrowed(typingctx: Any, value: Any) -> Any:
 
 
 def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """The value of a type, in which no array knows whose memory it is in."""
+    """LLVM value of a numba type in which arrays have no owner (`meminfo`), so that references are not counted."""
     if isinstance(kind, types.Array):
         array = make_array(kind)(context, builder, value)
         array.meminfo = cgutils.get_null_value(array.meminfo.type)
@@ -42,8 +42,8 @@ class _Borrowed(Protocol):
 
 
 borrowed = cast(_Borrowed, _borrowed)
-"""An array, or a tuple with arrays in it, whose references are not counted; for compiled code only.
+"""An array, or a tuple that contains arrays, without reference counting; for compiled code only.
 
-What it is made from must outlive every use of it: compiled code may neither return it nor keep it. It is to be handed
-on to a function at once: numba takes assignments to what is made in the same function for dead, and drops them.
+The original must outlive every use: compiled code may neither return nor store a borrowed array. It must be passed on
+to a function at once, since numba regards assignments to an array made in the same function as dead code.
 """

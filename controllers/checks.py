@@ -1,4 +1,4 @@
-"""Checks of a law's numbers and names when it is made."""
+"""Validation of a law's numbers and names in its constructor."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from controllers.errors import ParameterError
 
 
 def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bool = False) -> float:
-    """Gain or length that must be finite (or may be infinite) and not below `least`."""
+    """The value, a gain or length, if it is at least `least` and finite (or infinite, where allowed); else raises."""
     if np.isnan(value) or value < least or (np.isinf(value) and not infinite):
         raise ParameterError(
             f"{name} must be {'' if infinite else 'finite and '}at least {least:g} {unit}, got {value}"
@@ -15,7 +15,7 @@ def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bo
 
 
 def one_of(name: str, value: str, names: tuple[str, ...]) -> str:
-    """Name that must be one of those known."""
+    """The value if it is one of the known names; else raises."""
     if value not in names:
         raise ParameterError(f"{name} must be one of {', '.join(names)}, got {value!r}")
     return value

@@ -1,4 +1,4 @@
-"""The smooth step by which kernels go from one thing to another."""
+"""The quintic smooth step used by the kernels for transitions."""
 
 import numpy as np
 from numba import njit

@@ -1,4 +1,4 @@
-"""What goes wrong with a curve, a field, a map or a gain."""
+"""Errors raised for invalid curves, fields, maps and gains."""
 
 
 class ControllerError(ValueError):

@@ -1,7 +1,7 @@
-"""Calls of compiled kernels by their address: what calls one is compiled without it, and whatever it will be.
+"""Calls of compiled kernels by their address, so that a caller is compiled independently of the kernels.
 
-A kernel is one of several with the same arguments. A call by name would link all of them into the caller; by address
-each is compiled, and kept, by itself. Calling convention and errors are those of any other compiled call.
+A kernel is one of several functions with the same signature. A call by name would link all of them into the caller; by
+address each is compiled, and cached, by itself. Calling convention and errors are those of any other numba call.
 """
 
 from collections.abc import Callable
@@ -21,12 +21,12 @@ def kernel_call(arguments: tuple[types.Type, ...]) -> Callable[[int, tuple[Any, 
     Parameters
     ----------
     arguments : tuple of numba types
-        Of the kernels, which return nothing.
+        Argument types of the kernels, which return nothing.
 
     Returns
     -------
     callable
-        Its address must be that of a kernel compiled for these types and alive; nothing checks it.
+        The address must be that of a kernel compiled for these types and still alive; nothing checks it.
     """
 
     @intrinsic
@@ -42,7 +42,7 @@ def _call_as_given(typingctx: Any, address: Any, given: Any) -> Any:
 
 
 call_as_given = cast(Callable[[int, tuple[Any, ...]], None], _call_as_given)
-"""`kernel_call` of kernels whose arguments have the very types of those given."""
+"""`kernel_call` of kernels compiled for exactly the types of the given arguments."""
 
 
 @intrinsic
@@ -55,8 +55,8 @@ def _lend(typingctx: Any, value: Any) -> Any:
 
 
 lend = cast(Callable[[tuple[Any, ...]], Any], _lend)
-"""Where a tuple lies in the compiled caller's frame, for kernels that it calls: they are handed one number in the place
-of all its arrays, number by number. Valid as long as the caller runs."""
+"""Pointer to a tuple in the compiled caller's stack frame, for kernels that it calls: they get one pointer instead of
+all the tuple's arrays, field by field. Valid as long as the caller runs."""
 
 
 @intrinsic
@@ -70,7 +70,8 @@ def _lent(typingctx: Any, place: Any) -> Any:
 
 
 lent = cast(Callable[[Any], Any], _lent)
-"""The tuple that was lent, its references not counted (`controllers.borrowed`); nothing checks that it still is."""
+"""The tuple behind a pointer from `lend`, without reference counting (`controllers.borrowed`); nothing checks that it
+is still valid."""
 
 
 def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -87,7 +88,7 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 
 @cache
 def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
-    """Address of a kernel, an ``njit`` function, compiled in this process for these types; it stays alive."""
+    """Address of a kernel (an ``njit`` function) after compiling it in this process for these types; kept alive."""
     kernel.compile(arguments)
     compiled = kernel.get_compile_result(types.void(*arguments))
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

@@ -56,7 +56,7 @@ def exponential(x: float, y: float, z: float) -> tuple[float, float, float, floa
 
 @njit
 def logarithm(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Shortest rotation vector [rad] of a unit quaternion: its angle is at most π, whichever sign q has."""
+    """Shortest rotation vector [rad] of a unit quaternion: its angle is at most π, for either sign of q."""
     sine = np.sqrt(x * x + y * y + z * z + 1e-60)
     # atan instead of acos: accurate at small angles; the quotient by w makes q and −q the same.
     angle = 2.0 * np.arctan2(sine, np.fabs(w))
@@ -66,13 +66,13 @@ def logarithm(w: float, x: float, y: float, z: float) -> tuple[float, float, flo
 
 @njit
 def angular_velocity(x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
-    """Local angular velocity of exp(v) as v changes: ω = J_r(v) v̇; in the frame that is not turned it is J_r(−v) v̇.
+    """Local angular velocity of exp(v) as v changes: ω = J_r(v) v̇; in the fixed frame it is J_r(−v) v̇.
 
     J_r(v) v̇ = v̇ − (1 − cos α)/α² v × v̇ + (α − sin α)/α³ v × (v × v̇), α = |v| (Chirikjian 2012, section 10.6).
     """
     angle = np.sqrt(x * x + y * y + z * z + 1e-60)
     first = 2.0 * (np.sin(0.5 * angle) / angle) ** 2
-    # Small angles lose digits here, and the factor v × (v × v̇) makes up for them.
+    # Digits are lost at small angles, where the factor v × (v × v̇) is negligible.
     second = (angle - np.sin(angle)) / (angle * angle * angle)
     cx, cy, cz = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
     return (
@@ -86,7 +86,7 @@ def angular_velocity(x: float, y: float, z: float, dx: float, dy: float, dz: flo
 def rotation_vector_rate(x: float, y: float, z: float, a: float, b: float, c: float) -> tuple[float, float, float]:
     """Rate of a rotation vector v, |v| ≤ π, whose rotation turns with the local angular velocity ω: v̇ = J_r(v)⁻¹ ω.
 
-    J_r(v)⁻¹ ω = ω + v × ω / 2 + (1 − (α/2) cot(α/2))/α² v × (v × ω); for an ω that is not local it is J_r(−v)⁻¹ ω.
+    J_r(v)⁻¹ ω = ω + v × ω / 2 + (1 − (α/2) cot(α/2))/α² v × (v × ω); for ω in the fixed frame it is J_r(−v)⁻¹ ω.
     """
     half = 0.5 * np.sqrt(x * x + y * y + z * z + 1e-60)
     second = 0.25 * (1.0 - half * np.cos(half) / np.sin(half)) / (half * half)

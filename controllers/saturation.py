@@ -1,9 +1,9 @@
-r"""Smooth saturation: what leaves a domain is led back onto its edge, with two continuous derivatives.
+r"""Smooth saturation at the edge of a domain, with two continuous derivatives.
 
 .. math:: f(x) = x \;(x \le a), \qquad
           f(x) = a + m\,(u - u^3 + \tfrac12 u^4),\; u = \min\Bigl(\frac{x - a}{m}, 1\Bigr) \;(x > a)
 
-f leaves the identity at a with f' = 1 and f'' = 0, and is constant, a + m/2, from a + m on.
+f departs from the identity at a with f' = 1 and f'' = 0, and is constant, a + m/2, from a + m on.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from controllers.state import Array
 
 @njit
 def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, float]:
-    """A coordinate held near an interval, and its derivative: x within, constant from a margin beyond on; C²."""
+    """A coordinate saturated at an interval, and its derivative: x within, constant from a margin beyond; C²."""
     beyond = max(x - high, low - x)
     if beyond <= 0.0:
         return x, 1.0
@@ -26,12 +26,12 @@ def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, fl
 
 @njit
 def saturate_vector(v: Array, inner: float, outer: float, slope: Array) -> None:
-    """Shorten a vector (3,) in place to the length f(|v|); `slope` (3, 3) is written: the derivative by it.
+    """Shorten a vector (3,) in place to the length f(|v|), at most `outer`; writes its derivative `slope` (3, 3).
 
     With n = v/|v|: ∂/∂v = (f/|v|) (1 − n nᵀ) + f' n nᵀ.
     """
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    # From twice the width on the length is the outer one.
+    # With a margin of twice the width, the largest length is `outer`.
     value, rate = clamped(length, 0.0, inner, 2.0 * (outer - inner))
     share = value / length if length > inner else 1.0
     square = max(length * length, 1e-300)

@@ -1,4 +1,4 @@
-"""What a controller is given and what it gives back, and how both lie in plain arrays.
+"""Input and output of a controller (hand state, wrench), and their layout in plain arrays.
 
 The compiled loop passes a hand as one vector of `HAND_SIZE` numbers, in the hand frame H (z up, origin at the
 device's zero configuration): ``[t, p (3), quaternion wxyz (4), v (3), ω (3), switch]``; a wrench as ``[F (3), τ
@@ -26,14 +26,14 @@ HAND_ANGULAR_VELOCITY = 11
 HAND_SWITCH = 14
 HAND_SIZE = 15
 
-# The same for slicing the vector outside compiled code; a haptic map's argument is the stylus pose.
+# Slices of the vector for use outside compiled code; a haptic map's argument is the stylus pose.
 POSITION = slice(HAND_POSITION, HAND_QUATERNION)
 STYLUS_POSE = slice(HAND_POSITION, HAND_VELOCITY)
 VELOCITY = slice(HAND_VELOCITY, HAND_ANGULAR_VELOCITY)
 
 
 class HandState(NamedTuple):
-    """What the device measures of the hand at one tick.
+    """State of the hand as measured by the device at one tick.
 
     In compiled code (`hand_state`) vectors are tuples of floats.
 
@@ -68,7 +68,7 @@ class HandState(NamedTuple):
 
     @staticmethod
     def of(vector: Array) -> "HandState":
-        """Hand of a vector of `HAND_SIZE` numbers."""
+        """Hand state from a vector of `HAND_SIZE` numbers."""
         p, q, v = vector[HAND_POSITION:HAND_QUATERNION], vector[HAND_QUATERNION:HAND_VELOCITY], vector[HAND_VELOCITY:]
         w = vector[HAND_ANGULAR_VELOCITY:HAND_SWITCH].copy()
         return HandState(float(vector[HAND_TIME]), p.copy(), q.copy(), v[:3].copy(), w, vector[HAND_SWITCH] > 0.0)
@@ -80,7 +80,7 @@ class HandState(NamedTuple):
 
 @njit
 def hand_state(vector: Array) -> HandState:
-    """Hand of a vector of `HAND_SIZE` numbers, in compiled code: p, q, v and w are tuples."""
+    """Hand state from a vector of `HAND_SIZE` numbers, in compiled code: p, q, v and w are tuples."""
     return HandState(
         vector[HAND_TIME],
         (vector[1], vector[2], vector[3]),  # pyright: ignore[reportArgumentType]
@@ -92,7 +92,7 @@ def hand_state(vector: Array) -> HandState:
 
 
 class Wrench(NamedTuple):
-    """What the hand shall feel.
+    """Force and moment on the hand.
 
     Attributes
     ----------

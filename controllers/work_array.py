@@ -1,8 +1,8 @@
-"""Work arrays of a compiled kernel on its stack: a servo's tick takes nothing from the heap.
+"""Work arrays on the stack of a compiled kernel, so that a servo tick allocates nothing on the heap.
 
-`numpy.empty` in compiled code takes memory from the heap in every call. A work array lies in the frame of the function
-that asks for it, as a local array does in C: it must not be returned, nor kept beyond that call. In Python, and so
-where a kernel is evaluated on symbols, it is `numpy.empty`.
+`numpy.empty` in compiled code allocates heap memory in every call. A work array lies in the stack frame of the function
+that creates it, like a local array in C: it must not be returned, nor stored beyond that call. In Python, and so where
+a kernel is evaluated on symbols, it is `numpy.empty`.
 """
 
 from typing import Any
@@ -17,23 +17,23 @@ from controllers.state import Array, IntArray
 
 
 def work_array(shape: int | tuple[int, ...]) -> Array:
-    """Array of numbers that are not set, on the stack of the compiled caller.
+    """Uninitialised array of floats on the stack of the compiled caller.
 
     Parameters
     ----------
     shape : int or tuple of int
-        Where it is not a constant, the caller must not ask again in a loop: the stack would grow with each turn.
+        If not a compile-time constant, the call must not be in a loop: the stack would grow with each iteration.
     """
     return np.empty(shape)
 
 
 def work_integers(shape: int | tuple[int, ...]) -> IntArray:
-    """`work_array` of whole numbers."""
+    """`work_array` of integers."""
     return np.empty(shape, np.int64)
 
 
 def _on_stack(kind: types.Type) -> Any:
-    """Array on the caller's stack, of a kind of numbers."""
+    """Intrinsic that allocates an array of a number type on the caller's stack."""
 
     @intrinsic(prefer_literal=True)
     def array(_: Any, shape: Any) -> Any:
@@ -45,7 +45,7 @@ def _on_stack(kind: types.Type) -> Any:
             if constant:
                 shapes = [index(size.literal_value) for size in sizes]
                 count = index(int(np.prod([size.literal_value for size in sizes])))
-                # In the function's first block: one place, however often it is asked for in a loop.
+                # Allocated in the function's entry block: one array, even if requested in a loop.
                 data = cgutils.alloca_once(builder, number, count)
             else:
                 parts = cgutils.unpack_tuple(builder, given[0]) if isinstance(shape, types.BaseTuple) else [given[0]]

@@ -1,1 +1,1 @@
-"""Blends of aligned motions: one pose of several, and its derivative."""
+"""Blends of time-aligned motions: weighted mean poses and their derivatives."""

@@ -1,4 +1,4 @@
-"""Alignment of loops in time: a shift of the phase, then, where it pays, a smooth monotone warp that closes."""
+"""Time alignment of loops: a shift of the phase, then, if it is worth it, a smooth, monotone, periodic time warp."""
 
 from collections.abc import Sequence
 
@@ -13,15 +13,15 @@ from controllers.state import Array, IntArray
 _SAMPLES = 128
 _BAND = _SAMPLES // 8  # the warp leads or lags by at most an eighth of the lap
 _STEEPEST = 0.25  # and changes the pace by at most a quarter
-_STANCE = 2.0  # what standing counts beside rotations
-_LOW, _SLOW = 0.02, 0.5  # [m], [m a lap] an end so high, or so fast, stands by half
-_WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it bends flights and steps for nothing
+_STANCE = 2.0  # weight of stance relative to rotations
+_LOW, _SLOW = 0.02, 0.5  # [m], [m per lap] height, or speed, at which an end counts half as in stance
+_WORTH = 0.9  # a warp that leaves more of the mismatch is not made: it would distort flights and steps for little gain
 
 
 def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
-    """Rotation matrices of root and joints, which know no sign, the root's height, and which ends stand.
+    """Features to be aligned, shape (samples, features): rotation matrices, height of the root, stance of the ends.
 
-    Shape (samples, features).
+    Matrices instead of quaternions, since those have no ambiguous sign.
     """
     channels = loop.channels(np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES))
     w, x, y, z = np.moveaxis(channels[:, 3:].reshape(_SAMPLES, -1, 4), -1, 0)
@@ -35,18 +35,18 @@ def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
 
 
 def _stands(channels: Array, drift: Array, limb: Limb) -> Array:
-    """From 0 to 1, how much an end stands: low, and slow over the ground; shape (samples,)."""
+    """Degree from 0 to 1 to which an end is in stance (low, and slow over the ground); shape (samples,)."""
     place, _, height = (part[:, 0] for part in end_poses(channels[:, None], limb))
     ahead, behind = (np.roll(place, shift, axis=0) for shift in (-1, 1))
     across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
-    # Over the ground an end moves with the drift of its clip, and in its frame.
+    # The velocity over the ground is that of the drift plus that in the frame of the drift.
     speed = np.linalg.norm(0.5 * _SAMPLES * (ahead - behind)[:, :2] + drift[:2] + across, axis=1)
     low = 1.0 / (1.0 + ((height - height.min()) / _LOW) ** 2)
     return low / (1.0 + (speed / _SLOW) ** 2)
 
 
 def _best_shift(reference: Array, features: Array) -> int:
-    """Circular shift [samples] that correlates best; none for a motion that does not tell one phase from another."""
+    """Circular shift [samples] of best correlation; 0 if the correlation hardly depends on the shift."""
     spectra = np.conj(np.fft.rfft(reference, axis=0)) * np.fft.rfft(features, axis=0)
     correlation = np.fft.irfft(spectra.sum(axis=1), _SAMPLES)
     spread = float(np.sqrt((reference.var(axis=0).sum()) * (features.var(axis=0).sum()))) * _SAMPLES
@@ -57,12 +57,12 @@ def _best_shift(reference: Array, features: Array) -> int:
 def _warp(reference: Array, features: Array) -> Array:
     """Lead of the loop's phase over the reference's at each sample [samples], by dynamic time warping in a band.
 
-    The lead changes by at most one sample a sample, and is zero at the lap's ends.
+    The lead changes by at most one sample per sample, and is zero at the lap's ends.
     """
     leads = np.arange(-_BAND, _BAND + 1)
     index: IntArray = (np.arange(_SAMPLES)[:, None] + leads) % _SAMPLES
     cost = ((features[index] - reference[:, None, :]) ** 2).sum(axis=2)
-    # Where the motions do not tell, the shortest path is the straight one.
+    # A small cost of the lead, so that without a difference in mismatch there is no warp.
     cost = cost / (cost.mean() + 1e-12) + 0.05 * np.abs(leads / _BAND)
     total = np.full(len(leads), np.inf)
     total[_BAND] = 0.0
@@ -81,7 +81,7 @@ def _warp(reference: Array, features: Array) -> Array:
 
 
 def _smoothed(lead: Array) -> Array:
-    """Low-pass of a periodic lead by a Gaussian of a sixteenth of the lap, no steeper than allowed."""
+    """Periodic lead smoothed by a Gaussian of a sixteenth of the lap, and scaled to the steepest slope allowed."""
     frequency = np.fft.rfftfreq(_SAMPLES)
     spectrum = np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _SAMPLES / 16.0) ** 2)
     smooth = np.fft.irfft(spectrum, _SAMPLES)
@@ -90,7 +90,7 @@ def _smoothed(lead: Array) -> Array:
 
 
 def _lead(reference: Array, features: Array) -> Array:
-    """Lead of a loop over the reference at each sample [laps]: the smoothed warp, or none where it gains little."""
+    """Lead of a loop over the reference at each sample [laps]: the smoothed warp, or zero if it gains little."""
     lead = _smoothed(_warp(reference, features))
     at = np.arange(_SAMPLES) + lead
     first = np.floor(at).astype(int)
@@ -112,12 +112,12 @@ def aligned_channels(loops: list[Loop], samples: int, limbs: Sequence[Limb] = ()
     samples : int
         N, phases 0, 1/N, … of the lap.
     limbs : sequence of Limb
-        Limbs whose standing is aligned to standing.
+        Limbs whose stance phases are aligned.
 
     Returns
     -------
     Array, shape (N, m, nq)
-        Signs of quaternions agree with the first loop's as far as they can.
+        Signs of quaternions agree with the first loop's as far as possible.
     """
     reference = _features(loops[0], limbs)
     phase = np.arange(samples) / samples

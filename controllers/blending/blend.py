@@ -50,7 +50,7 @@ def blend(
     params : Array
         `packed_blend`.
     angle, weights, changes, chain, memory, pose, jacobian
-        As `combine` takes them.
+        As in `combine`.
     """
     blend_corrected(params, angle, weights, changes, work_array((4, 0)), chain, memory, pose, jacobian)
 
@@ -60,7 +60,7 @@ def blend_corrected(
     params: Array, angle: float, weights: Array, changes: Array, correction: Array, chain: Array, memory: Array,
     pose: Array, jacobian: Array,
 ) -> None:  # fmt: skip
-    """`blend`, with a correction as `combine` takes it."""
+    """`blend` with a correction, see `combine`."""
     samples, clips = int(params[_SAMPLES]), int(params[_CLIPS])
     drifts = params[_DRIFTS : _DRIFTS + 3 * clips].reshape(clips, 3)
     figure = params[_DRIFTS + 3 * clips :]
@@ -75,7 +75,7 @@ def blend_corrected(
 
 
 def _closing_signs(channels: Array, rotations: int) -> Array:
-    """Signs (m, channels) with which channels (N, m, ·) close: −1 for a quaternion that comes back as −q."""
+    """Signs (m, channels) with which channels (N, m, ·) close: −1 for a quaternion that returns as −q."""
     signs = np.ones(channels.shape[1:])
     for first in range(3, 3 + 4 * rotations, 4):
         dots = (channels[-1, :, first : first + 4] * channels[0, :, first : first + 4]).sum(axis=1)
@@ -84,16 +84,16 @@ def _closing_signs(channels: Array, rotations: int) -> Array:
 
 
 def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Sequence[Limb]) -> Array:
-    """What `blend` reads: the loops, aligned in time to the first, as splines through equal steps of the lap.
+    """Parameters of `blend`: the loops, aligned in time to the first, as splines through equal steps of the lap.
 
     Parameters
     ----------
     loops : list of Loop
         Clips as closed loops.
     samples : int
-        Of a lap.
+        Number of samples of a lap.
     groups : IntArray, shape (1 + joints,)
-        Which group of weights blends the root and each joint.
+        Group of weights that blends the root and each joint.
     limbs : sequence of Limb
         Limbs whose ends are blended; their joints belong to group 0.
 

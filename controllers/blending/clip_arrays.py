@@ -1,4 +1,4 @@
-"""Clips and limbs of a map as plain arrays that can be kept, and back, to the last bit."""
+"""Clips and limbs of a map as plain arrays for storage, and back, bit for bit."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limb
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second.
     names : sequence of str
-        Of the clips, all different.
+        Names of the clips, all different.
     limbs : sequence of Limb
     """
     arrays: dict[str, Array] = {}
@@ -31,12 +31,12 @@ def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limb
 
 
 def kept(arrays: Mapping[str, Array], key: str, shape: tuple[int | None, ...]) -> Array:
-    """The array of a key, as numbers of a shape in which None is any length.
+    """The array of a key, as floats of a given shape, in which None stands for any length.
 
     Raises
     ------
     ParameterError
-        If it is missing or is none.
+        If the array is missing, does not hold numbers or has another shape.
     """
     if key not in arrays:
         raise ParameterError(f"the map lacks {key!r}")
@@ -55,12 +55,12 @@ def kept_names(arrays: Mapping[str, Array]) -> tuple[str, ...]:
 
 
 def kept_clips(arrays: Mapping[str, Array]) -> list[tuple[Array, float]]:
-    """Clips of what `clip_arrays` gave.
+    """Clips restored from the output of `clip_arrays`.
 
     Raises
     ------
     ParameterError
-        If one of their arrays is missing or has another shape.
+        If an array is missing or has another shape.
     """
     return [
         (kept(arrays, f"clip/{name}/poses", (None, None)), float(kept(arrays, f"clip/{name}/fps", (1,))[0]))
@@ -69,7 +69,7 @@ def kept_clips(arrays: Mapping[str, Array]) -> list[tuple[Array, float]]:
 
 
 def kept_limbs(arrays: Mapping[str, Array]) -> list[Limb]:
-    """Limbs of what `clip_arrays` gave; raises as `kept_clips` does, and as `Limb`."""
+    """Limbs restored from the output of `clip_arrays`; raises as `kept_clips` and `Limb` do."""
     limbs: list[Limb] = []
     while any(key.startswith(f"limb/{len(limbs)}/") for key in arrays):
         key = f"limb/{len(limbs)}/"

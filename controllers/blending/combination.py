@@ -1,10 +1,10 @@
-r"""One pose of several: the weighted mean of clips' channels at a phase, and its derivative.
+r"""Weighted mean pose of several clips at a phase, and its derivative.
 
 .. math:: h = A \cdot \exp\bigl(\tfrac{\theta}{2\pi} \textstyle\sum_i w_i \xi_i\bigr) \cdot \bar{\rho}_w(\theta)
 
 θ is the phase of the lap. Positions are blended linearly, rotations by their chordal mean (`mean`), the drift over
-the ground by its twist ξ (`loops`); the ends of limbs are blended as the root is, and the limbs follow (`limbs`,
-`support`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
+the ground by its twist ξ (`loops`); the ends of limbs are blended like the root, and the limbs follow by inverse
+kinematics (`limbs`, `support`). A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`).
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _WAYS = 3  # parameters of a pose: θ, and two by which only the weights change
 
 @njit
 def figure_size(figure: Array) -> int:
-    """Numbers that `packed_figure` takes at the start of an array."""
+    """Length of the `packed_figure` at the start of an array."""
     return _GROUPS + int(figure[_ROTATIONS]) + LIMB * int(figure[_LIMBS])
 
 
@@ -108,21 +108,21 @@ def combine(
     angle : float
         θ in [0, 2π].
     weights : Array, shape (groups, clips)
-        Of sum 1; group 0 is the root's. Slightly negative ones are taken (see `mean`).
+        Sum 1; group 0 is that of the root. Slightly negative weights are allowed (see `mean`).
     changes : Array, shape (groups, 3, clips)
-        Their derivatives by θ and two other parameters.
+        Derivatives of the weights by θ and two other parameters.
     correction : Array, shape (4, 2 + 4 limbs)
-        By which root and ends are moved (see `inbetween`), and its derivatives by the three; (4, 0) for none.
+        Displacements of root and ends (see `inbetween`), and the derivatives by the three parameters; (4, 0) for none.
     chain : Array, shape (3, 6)
-        Derivatives of the three by the stylus.
+        Derivatives of the three parameters by the stylus.
     memory : Array
         The frame of the lap; updated.
     footing : Array
-        Memory of the ends' footing (see `footing`); updated. Empty: they have none.
+        Memory of the ends' footing (see `footing`); updated. If empty, ends are not held.
     soles : Array, shape (limbs, k, 3)
-        Points of each end that may touch, from their centre [m]. None: they go wherever they go.
+        Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
     ground, floor : float
-        Height at which they touch, and below which none goes [m].
+        Height of ground contact, and the height below which no sole point is allowed [m].
     pose, jacobian : Array, shapes (nq,), (nv, 6)
         Written.
     """
@@ -152,7 +152,7 @@ def _combine(
             for way in range(_WAYS):
                 drift[1 + way, k] += changes[0, way, i] * drifts[i, k]
     update_lap(memory, angle, drift[0])
-    # The root is in the frame of the drift, and that in the frame of the lap.
+    # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
     frame, ahead, mixture = work_array(3), 0.0, 0.0
     if footing.shape[0] > 0:
@@ -227,7 +227,7 @@ def _combine(
 
 
 def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:
-    """What `combine` reads: which group of weights blends the root and each joint (1 + joints,), and the limbs."""
+    """Parameters of `combine`: the group of weights of the root and each joint (1 + joints,), and the limbs."""
     return np.concatenate([[len(groups), len(limbs)], groups, *(limb.packed() for limb in limbs)])
 
 

@@ -1,9 +1,9 @@
-r"""What in-betweens of any number of clips are corrected by: for every two neighbours, a polynomial of their weights.
+r"""Corrections of in-betweens of any number of clips: for every pair of neighbours, a polynomial in their weights.
 
 .. math:: D(\theta, w) = \textstyle\sum_{i<j} w_i w_j \sum_k (w_i - w_j)^k\, C_{ijk}(\theta)
 
-It has the channels of `inbetween`, passes through what `footfalls` finds at some mixtures of each two, and vanishes
-where a clip is alone. C is periodic in θ, by cubic B-splines.
+D has the channels of `inbetween`, interpolates the corrections of `footfalls` at some mixtures of each pair, and
+vanishes where one clip has all the weight. C is periodic in θ, by cubic B-splines.
 """
 
 from collections.abc import Sequence
@@ -18,12 +18,15 @@ from controllers.motion.inbetween import FOOT, ROOT
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
 
-_TERMS = 3  # as many mixtures of two are met exactly
+_TERMS = 3  # terms of the polynomial, and mixtures of each pair that are interpolated exactly
 _ROWS, _CLIPS, _PAIRS, _CHANNELS, _INDEX = range(5)
 
 
 def neighbouring_pairs(sites: Array) -> list[tuple[int, int]]:
-    """Pairs of sites (rows, m, 2) between which, at some row, there is no other (Gabriel & Sokal 1969)."""
+    """Pairs of sites (rows, m, 2) that are Gabriel neighbours at some row (Gabriel & Sokal 1969).
+
+    No other site lies in the circle whose diameter is the segment between the two.
+    """
     clips = sites.shape[1]
     found: list[tuple[int, int]] = []
     for j in range(clips):
@@ -37,18 +40,18 @@ def neighbouring_pairs(sites: Array) -> list[tuple[int, int]]:
 
 
 def packed_pairs(channels: Array, drifts: Array, limbs: Sequence[Limb], pairs: Sequence[tuple[int, int]]) -> Array:
-    """What `pair_correction` reads.
+    """Parameters of `pair_correction`.
 
     Parameters
     ----------
     channels : Array, shape (n, m, nq + 5 limbs)
-        Of the clips at equal steps of the lap, limbs by their ends (`limb_ends`).
+        Channels of the clips at equal steps of the lap, limbs given by their ends (`limb_ends`).
     drifts : Array, shape (m, 3)
-        Their drifts ξ.
+        Drifts ξ of the clips.
     limbs : sequence of Limb
-        None: nothing is corrected.
+        If empty, nothing is corrected.
     pairs : sequence of (int, int)
-        Clips to correct the in-betweens of, the lower number first.
+        Pairs of clips with corrected in-betweens, the lower number first.
     """
     rows, clips = channels.shape[:2]
     size = ROOT + FOOT * len(limbs)
@@ -83,11 +86,11 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
     angle : float
         θ in [0, 2π].
     clips : IntArray, shape (count,)
-        Those that are near.
+        Numbers of the nearby clips.
     w, changes : Array, shapes (count,), (3, count)
-        Their weights, and the derivatives of these by θ and two other parameters.
+        Their weights, and the derivatives of the weights by θ and two other parameters.
     d : Array, shape (4, channels)
-        Written: D [m, rad], and its derivatives by the three.
+        Written: D [m, rad], and its derivatives by the three parameters.
     """
     rows, total, pairs, channels = (
         int(numbers[_ROWS]), int(numbers[_CLIPS]), int(numbers[_PAIRS]), int(numbers[_CHANNELS]),

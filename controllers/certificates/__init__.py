@@ -1,1 +1,1 @@
-"""Certificates: proofs about the laws that run, by CasADi; the only place that imports it."""
+"""Certificates: verification of the executed laws and motions, by CasADi; the only package that imports it."""

@@ -1,4 +1,4 @@
-"""What a certificate says: verdicts with margin, reason and counterexample, and the hash of all that they depend on."""
+"""Format of certificates: verdicts with margin, reason and counterexample, and the hash of all their inputs."""
 
 import hashlib
 import math
@@ -19,33 +19,33 @@ class CertificateError(ControllerError):
 
 
 class ChangedInputs(CertificateError):
-    """A certificate that is of other inputs than those at hand."""
+    """A certificate whose inputs differ from the present ones."""
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What is known of one property.
+    """Verification result of one property.
 
     Parameters
     ----------
     verdict : {"certified", "refuted", "unknown"}
-        Proved within the assumptions; broken, as the counterexample shows; or neither.
+        Proved under the assumptions; violated, as the counterexample shows; or neither.
     reason : str
-        Why, in one sentence with numbers.
+        Explanation in one sentence with numbers.
     margin : float, optional
-        How far the property is from being lost, in the unit that `reason` names; negative when refuted. None when
-        there is no such number.
+        Distance from losing the property, in the unit that `reason` names; negative when refuted. None if there is no
+        such number.
     assumptions : tuple of str
-        What has to hold for the verdict.
+        Conditions of the verdict.
     counterexample : mapping
-        Initial state and whatever else a simulation needs to show the failure; only of a refuted property.
+        Initial state and whatever else a simulation needs to show the failure; only for a refuted property.
     figures : mapping
-        Numbers and arrays worth keeping beside the verdict: boundaries, spectra, bounds per phase.
+        Additional numbers and arrays: boundaries, spectra, bounds per phase.
 
     Raises
     ------
     CertificateError
-        If the verdict is not one of the three, or refuted without a counterexample, or the reverse.
+        If the verdict is not one of the three, or if it is refuted without a counterexample or has one otherwise.
     """
 
     verdict: Outcome
@@ -63,9 +63,9 @@ class Verdict:
 
 
 def leaving_out(verdict: Verdict, laws: Sequence[str]) -> Verdict:
-    """A verdict on a part of a program, as one on the whole that also executes these laws: no longer certified.
+    """Verdict on a whole program from that on a part without some `laws`: certified becomes unknown.
 
-    What is refuted stays so, where the other laws give no force.
+    Refuted stays refuted, under the assumption that the omitted laws give no force there.
     """
     named = " and ".join(laws)
     if verdict.verdict == "refuted":
@@ -82,9 +82,9 @@ class Certificate:
     verdicts : mapping of str to Verdict
         Such as ``stability``, ``passivity``, ``ballistic``.
     inputs : str
-        `hash_of` gains, curve, device, period, hand, clip: whatever the verdicts depend on, the code included.
+        `hash_of` all inputs of the verdicts: gains, curve, device, period, hand, clip, and the code.
     parts : mapping of str to str
-        `hashes_of` the inputs one by one, so that a change can be named.
+        `hashes_of` the inputs one by one, so that a changed input can be named.
     """
 
     verdicts: Mapping[str, Verdict]
@@ -92,7 +92,7 @@ class Certificate:
     parts: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def to_json(self) -> dict[str, Json]:
-        """The certificate as JSON takes it: ``inputs``, ``parts`` and an entry a verdict. Not finite becomes null."""
+        """The certificate for JSON: ``inputs``, ``parts`` and one entry per verdict. Non-finite numbers become null."""
         hashes: dict[str, Json] = {"inputs": self.inputs, "parts": {**self.parts}}
         return hashes | {name: _json(verdict) for name, verdict in self.verdicts.items()}
 
@@ -103,7 +103,7 @@ class Certificate:
         Raises
         ------
         CertificateError
-            If it is not a certificate.
+            If the values are not a certificate.
         """
         try:
             entries = dict(cast(Mapping[str, dict[str, object]], values))
@@ -122,12 +122,12 @@ class Certificate:
         return Certificate(verdicts, inputs, cast(Mapping[str, str], parts))
 
     def check(self, inputs: object) -> None:
-        """Whether this certificate is of these inputs.
+        """Check that this certificate belongs to these inputs.
 
         Raises
         ------
         ChangedInputs
-            If any of them has changed.
+            If any input has changed.
         """
         found = hash_of(inputs)
         if found == self.inputs:
@@ -139,7 +139,7 @@ class Certificate:
 
 
 def hash_of(inputs: object) -> str:
-    """Hash of inputs to the last bit, 16 hex digits.
+    """Hash of the exact values of inputs, 16 hex digits.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def hash_of(inputs: object) -> str:
     Raises
     ------
     CertificateError
-        If there is something else among them, whose text need not be its value.
+        If there is a value of another type.
     """
     return hashlib.sha256(_canonical(inputs)).hexdigest()[:16]
 
@@ -160,7 +160,7 @@ def hashes_of(inputs: Mapping[str, object]) -> dict[str, str]:
 
 
 def _canonical(value: object) -> bytes:
-    """Bytes that differ whenever the values do: every part is preceded by its kind and length."""
+    """Bytes that are different for different values: every part is preceded by its kind and length."""
     if isinstance(value, np.ndarray):
         array = np.ascontiguousarray(value)
         if array.dtype.hasobject:

@@ -1,1 +1,1 @@
-"""Curves in the space of stylus poses, and the closest point on them."""
+"""Curves in the space of stylus poses: splines, closest point, branches, deformation."""

@@ -1,19 +1,19 @@
-"""Bounds of a spline for the search of its closest point: a binary tree of capsules."""
+"""Bounding volumes of a spline for the search of its closest point: a binary tree of capsules."""
 
 import numpy as np
 
 from controllers.state import Array
 
-NODE = 8  # numbers a node: start of the chord, chord, 1/|chord|², radius
-_NOWHERE = 1e150  # [m] where the nodes without a piece lie: always the last to be searched
+NODE = 8  # numbers per node: start of the chord (3), chord (3), 1/|chord|², radius
+_NOWHERE = 1e150  # [m] position of nodes without a piece, so that they are always out of reach
 
 
 def capsule_tree(coefficients: Array, step: Array) -> tuple[Array, int]:
-    """Capsules that hold every piece, every pair of pieces, every four, and so on to the whole curve.
+    """Capsules that contain every piece, every pair of pieces, every four, and so on to the whole curve.
 
     A capsule is the chord from the first to the last point of its run of pieces, thickened by the largest distance
-    of a Bézier control point from it: being convex, it holds the pieces. Its radius shrinks with the *square* of
-    the run's length, so even the bounds of very short pieces tell which one is nearest.
+    of a Bézier control point from it: being convex, it contains the pieces. Its radius shrinks with the *square* of
+    the run's length, so that the bounds of very short pieces still separate the nearest one.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def capsule_tree(coefficients: Array, step: Array) -> tuple[Array, int]:
         share = np.clip(np.einsum("nkx,nx->nk", offset, chord[owner]) * inverse[owner][:, None], 0.0, 1.0)
         distance = np.linalg.norm(offset - share[..., None] * chord[owner][:, None], axis=2).max(axis=1)
         nodes = slice(2**level, 2**level + len(firsts))
-        # The kernel projects on the chord anew: its rounding must not make the bound a wrong one.
+        # A small margin, so that rounding in the kernel's own projection on the chord cannot invalidate the bound.
         radius = np.maximum.reduceat(distance, firsts) + 1e-14
         tree[nodes] = np.column_stack([start, chord, inverse, radius])
     return tree, levels

@@ -1,8 +1,8 @@
 """Branches of a curve near a point: every part of it that passes through a ball, with its own closest point.
 
 A branch is a connected part of φ⁻¹(B(p, ε)). Where the radius of curvature exceeds ε, d² is convex along a branch, so
-each has exactly one closest point, and it moves continuously with p. So a curve that crosses itself gives two
-branches at the crossing, and neither can take the place of the other.
+each has exactly one closest point, which moves continuously with p. A curve that crosses itself thus has two distinct
+branches at the crossing.
 """
 
 import math
@@ -16,7 +16,7 @@ from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
 
-BRANCHES = 8  # of one curve at most; further ones are not seen
+BRANCHES = 8  # largest number of branches of one curve; further ones are ignored
 
 
 @njit
@@ -36,7 +36,7 @@ def _runs(blob: Array, at: int, px: float, py: float, pz: float, radius: float, 
         if chord - thickness >= radius:
             continue
         if node < first_leaf:
-            # The left child comes off the stack first, so pieces come in the order of their phases.
+            # The left child is popped first, so that pieces are visited in the order of their phases.
             nodes[top], nodes[top + 1] = 2 * node + 1, 2 * node
             top += 2
             continue

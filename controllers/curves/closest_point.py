@@ -1,11 +1,12 @@
-"""Closest point of a curve: global and exact on the spline, at a cost that hardly grows with the number of pieces.
+"""Closest point on a curve: the global minimum, exact on the spline, at a cost that hardly grows with its pieces.
 
 On a cubic piece, d² = |φ(u) − p|² has degree 6 and its minima are roots of the quintic f = (φ − p)·φ̇. Pieces are
-found by branch and bound over the tree of capsules; on a piece, Bernstein's sign variations tell how many roots
-there are, the piece is halved until each is alone, and safeguarded Newton finishes it. So no root is missed.
+found by branch and bound over the tree of capsules. On a piece, sign variations of the Bernstein coefficients bound the
+number of roots; the piece is halved until the roots are isolated, and a safeguarded Newton iteration refines each. So
+no root is missed.
 
-A warm start only tightens the first bound: it makes the search faster and cannot hold it in a local minimum. Of
-equally near points (within 1e-11 m) the one found first stays, which is the warm one.
+A warm start only tightens the first bound: it speeds the search up and cannot trap it in a local minimum. Of equally
+near points (within 1e-11 m) the one found first is kept, which is that of the warm start.
 """
 
 import math
@@ -30,7 +31,7 @@ from controllers.curves.trajectory import (
 from controllers.state import Array
 from controllers.work_array import work_array, work_integers
 
-_TIE = 1e-11  # [m] a bound that promises less than this is not followed
+_TIE = 1e-11  # [m] a branch is searched only if it may improve the distance by more than this
 
 
 @njit
@@ -81,7 +82,7 @@ def _root(blob: Array, row: int, low: float, high: float, px: float, py: float, 
 
 @njit
 def _variations(b: Array) -> int:
-    """Sign variations of six Bernstein coefficients: an upper bound, of the same parity, of the roots inside."""
+    """Sign variations of six Bernstein coefficients: an upper bound on the number of roots, of the same parity."""
     count, sign = 0, 0.0
     for k in range(6):
         if b[k] != 0.0:
@@ -124,7 +125,7 @@ def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: 
         largest = 0.0
         for k in range(6):
             largest = max(largest, abs(row_b[k]))
-        # On an arc about p the quintic is all rounding error: stop once it can no longer change the distance.
+        # On an arc about p the quintic is only rounding error: stop once it can no longer change the distance.
         flat = 6.0 * largest * (high - low) <= 1e-20 + 1e-12 * best
         if variations == 1 or flat or top > 44:
             u = h * 0.5 * (low + high) if flat else _root(blob, row, h * low, h * high, px, py, pz)
@@ -132,7 +133,7 @@ def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: 
             if square < best:
                 best, best_u = square, u
             continue
-        # De Casteljau at the middle: the left half stays in place, the right half goes above it.
+        # De Casteljau at the middle: the left half stays in place, the right half goes above it on the stack.
         right = b[top + 1]
         for k in range(6):
             right[k] = row_b[k]
@@ -158,7 +159,7 @@ def chord_square(blob: Array, node: int, px: float, py: float, pz: float) -> flo
 
 @njit
 def _out_of_reach(blob: Array, node: int, square: float, best: float) -> bool:
-    """Whether nothing in the capsule at ``blob[node]`` can be nearer than `best`, for its chord's squared distance."""
+    """Whether no point of the capsule at ``blob[node]`` can be nearer than `best`; `square` is that to its chord."""
     reach = max(best - _TIE + blob[node + 7], 0.0)
     return square >= reach * reach
 
@@ -174,8 +175,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
     px, py, pz : float
         p_H [m].
     guess : float
-        Phase to start from, such as the last t*; NaN when there is none. It decides the cost and ties, not the
-        answer.
+        Initial phase, such as the last t*; NaN for none. It affects the cost and ties, not the result.
 
     Returns
     -------
@@ -190,7 +190,8 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
     nodes, squares = work_integers(64), work_array(64)
     best: float = math.inf
     best_t = float(blob[at + START])
-    # From the warm leaf upwards, each sibling of an ancestor is searched if it is in reach; without one, the root.
+    # From the leaf of the guess upwards, the sibling of each ancestor is searched if it is in reach; without a guess,
+    # the search starts at the root.
     below = 1
     if np.isfinite(guess):
         guess = wrap_phase(blob, at, guess)
@@ -235,7 +236,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         nodes[0], top = sibling, 1
         head = tree + NODE * sibling
         if (px - blob[head]) ** 2 + (py - blob[head + 1]) ** 2 + (pz - blob[head + 2]) ** 2 < best * best:
-            # The guess is far off, for another run of pieces starts nearer: search from the root, with that bound.
+            # Another run of pieces starts nearer, so the guess is far off: search from the root, with this bound.
             nodes[0], squares[0], below = 1, 0.0, 1
     return best_t, best
 

@@ -1,4 +1,4 @@
-"""The hand in cylindrical coordinates about the z axis of H: an angle that is the phase, and intervals that blend."""
+"""Cylindrical coordinates of the hand about the z axis of H: the angle is the phase, radius and height blend clips."""
 
 import numpy as np
 from numba import njit
@@ -6,13 +6,13 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_MARGIN = 0.15  # share of the interval at each edge over which the blend eases in
-_AXIS = 1e-3  # [m] nearer to the axis the derivative stops growing
+_MARGIN = 0.15  # share of the interval at each edge over which the blend is eased
+_AXIS = 1e-3  # [m] distance from the axis below which the derivatives are those at this distance
 
 
 @njit
 def eased(s: float, margin: float = _MARGIN) -> tuple[float, float]:
-    """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between but for the eased edges; C²."""
+    """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between except for eased edges; C²."""
     if s <= 0.0:
         return 0.0, 0.0
     if s >= 1.0:
@@ -28,7 +28,7 @@ def eased(s: float, margin: float = _MARGIN) -> tuple[float, float]:
 
 @njit
 def blend_weight(x: float, low: float, high: float, margin: float = _MARGIN) -> tuple[float, float]:
-    """Weight of what lies at the upper end of an interval, and its derivative by x."""
+    """Weight u of the upper end of an interval, 1 − u being that of the lower end, and its derivative by x."""
     u, slope = eased((x - low) / (high - low), margin)
     return u, slope / (high - low)
 
@@ -52,7 +52,7 @@ def cylinder(x: Array, chain: Array) -> tuple[float, float]:
 
 
 def checked_interval(name: str, interval: tuple[float, float], least: float) -> tuple[float, float]:
-    """An interval [m] that increases from more than `least`, or what is wrong with it."""
+    """Validated interval [m], increasing and above `least`; raises `ParameterError`."""
     low, high = interval
     if not (least < low < high < np.inf):
         raise ParameterError(f"{name} must increase{' from 1 mm or more' * (least > 0.0)}, got {low, high} m")

@@ -1,15 +1,15 @@
-r"""Curves that are bent by hand: compact C² bumps on a spline, in place, with undo and redo.
+r"""Deformable curves: compact C² bumps added to a spline in place, with undo and redo.
 
 .. math:: \varphi'(t) = \varphi(t) + \sum_j w\bigl((t - \hat t_j)/h_j\bigr)\,\hat\delta_j, \qquad
           \hat\delta_j = \delta_j / w\bigl((t_j - \hat t_j)/h_j\bigr)
 
 w is the cubic B-spline, so φ′ is a cubic spline on the *same* pieces as φ, provided that the breaks of w are breaks of
-φ. So the curve is refined once, exactly, by a grid of phases; a bump is centred at the point t̂_j of the grid next to
-the grabbed phase t_j, and δ̂_j is such that φ′(t_j) = φ(t_j) + δ_j all the same. A bump then changes coefficients of the
-pieces under it and nothing else, and laws and searches run on the bent curve as on any other.
+φ. Therefore the curve is refined once, exactly, by a grid of phases; a bump is centred at the grid point t̂_j nearest
+to the grasped phase t_j, and δ̂_j is scaled so that still φ′(t_j) = φ(t_j) + δ_j. A bump changes only the coefficients
+of the pieces under it, and laws and searches run on the bent curve as on any other.
 
-A *record* is all of that in one array: a header, the table of edits [t̂, h, δ̂ (3)], coefficients of the curve before
-all of them and after those that are committed, and the packed curve itself, on which the pending edit lies as well.
+A *record* holds all this in one array: a header, the table of edits [t̂ [s], h [s], δ̂ (3) [m]], the coefficients of
+the curve before all edits and after the committed ones, and the packed curve itself, which includes the pending edit.
 """
 
 import numpy as np
@@ -32,10 +32,11 @@ from controllers.curves.trajectory import (
 )
 from controllers.state import Array
 
-# The record's header; TABLE to WORK are offsets from its start.
+# The record's header: step of the grid [s]; h/2 [steps]; number of edits in force, and including those undone; most
+# edits in the table; TABLE to WORK are offsets from the start; then the grasped phase, its point (3), the pending edit.
 STEP, HALF, COUNT, TOTAL, DEPTH, TABLE, BASE, COMMITTED, WORK, PHASE, ANCHOR, PENDING = *range(10), 10, 13
 RECORD_HEADER = 18
-EDIT = 5  # numbers an edit
+EDIT = 5  # numbers per edit
 
 
 @njit
@@ -47,13 +48,13 @@ def bump(s: float) -> float:
 
 @njit
 def work_curve(record: Array, at: int) -> int:
-    """Where the bent curve is packed in the array that holds a record at ``record[at:]``."""
+    """Offset of the packed bent curve in the array that contains a record at ``record[at:]``."""
     return at + int(record[at + WORK])
 
 
 @njit
 def _lay_bump(record: Array, at: int, edit: int, source: int, target: int) -> tuple[int, int]:
-    """Write source + bump into target on the pieces under the edit at ``record[edit:]``: the first, and how many."""
+    """Write source + bump to target on the pieces under the edit at ``record[edit:]``; returns first and count."""
     curve = work_curve(record, at)
     breaks, n = curve + int(record[curve + BREAKS]), int(record[curve + PIECES])
     centre, width = record[edit], record[edit + 1]
@@ -71,7 +72,7 @@ def _lay_bump(record: Array, at: int, edit: int, source: int, target: int) -> tu
         inner = 4.0 if abs(middle) < 0.5 * width else 0.0
         outside = 1.0 - side * (middle - half) / width
         inside = outside - 0.5
-        # Taylor's coefficients of w at the break: the pieces of w end at breaks of the curve, so each is one cubic.
+        # Taylor coefficients of w at the break: the pieces of w end at breaks of the curve, so w is one cubic here.
         taylor = (
             2.0 * outside**3 - 2.0 * inner * inside**3,
             -side * 6.0 * (outside**2 - inner * inside**2) / width,
@@ -124,7 +125,7 @@ def _bound_piece(record: Array, node: int, row: int, h: float) -> None:
 
 @njit
 def _join(record: Array, node: int, left: int, right: int) -> None:
-    """Capsule that holds those of two runs, the second of which begins where the first ends."""
+    """Capsule that contains those of two runs, the second of which begins where the first ends."""
     for i in range(3):
         record[node + i] = record[left + i]
     x, y, z = record[right], record[right + 1], record[right + 2]
@@ -138,10 +139,10 @@ def _join(record: Array, node: int, left: int, right: int) -> None:
 
 @njit
 def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
-    """Renew the capsules (see `controllers.curves.bounds`) of some pieces, and of all runs that hold one of them.
+    """Update the capsules (see `controllers.curves.bounds`) of some pieces, and of all runs that contain one of them.
 
-    A run's capsule is thickened by how far the joint of its halves lies off its chord, and by the thicker half: at
-    most a third thicker than need be on a smooth curve, for an effort proportional to the number of pieces.
+    The radius of a run's capsule is the distance of the joint of its halves from its chord plus the larger radius of
+    the halves: at most a third larger than necessary on a smooth curve, at a cost proportional to the number of pieces.
     """
     tree, rows = curve + int(record[curve + TREE]), curve + int(record[curve + COEFFICIENTS])
     breaks, leaf = curve + int(record[curve + BREAKS]), 1 << int(record[curve + LEVELS])
@@ -162,7 +163,7 @@ def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
 
 @njit
 def _bound_run(record: Array, curve: int, first: int, count: int) -> None:
-    """`bound_pieces` of a run that may go on beyond the seam."""
+    """`bound_pieces` for a run that may continue beyond the seam of a periodic curve."""
     before = min(count, int(record[curve + PIECES]) - first)
     bound_pieces(record, curve, first, before)
     if count > before:
@@ -177,7 +178,7 @@ def _copy_pieces(record: Array, at: int, source: int, target: int) -> None:
 
 @njit
 def let_go(record: Array, at: int) -> None:
-    """Forget the pending edit: the curve is again as the committed edits left it, to the last bit."""
+    """Discard the pending edit: the curve is restored, bit for bit, to the state after the committed edits."""
     curve = work_curve(record, at)
     rows = curve + int(record[curve + COEFFICIENTS])
     _copy_pieces(record, at, at + int(record[at + COMMITTED]), rows)
@@ -186,9 +187,9 @@ def let_go(record: Array, at: int) -> None:
 
 @njit
 def take_hold(record: Array, at: int, phase: float) -> bool:
-    """Begin an edit at a phase t_j; False if an open curve's end, which stays put, is too near.
+    """Begin an edit at a phase t_j; returns False if an end of an open curve, which stays fixed, is too near.
 
-    The half width is h, or, near an open end, the distance to it, but not below h/4.
+    The half width is h, or near an end of an open curve the distance to it, but not below h/4.
     """
     curve, step = work_curve(record, at), record[at + STEP]
     phase = wrap_phase(record, curve, phase)
@@ -210,7 +211,7 @@ def take_hold(record: Array, at: int, phase: float) -> bool:
 
 @njit
 def carry_to(record: Array, at: int, x: float, y: float, z: float) -> None:
-    """Bend the curve such that φ′(t_j) is at a place [m], and nowhere but under the bump."""
+    """Bend the curve under the bump so that φ′(t_j) is at a given position in H [m]."""
     edit, curve = at + PENDING, work_curve(record, at)
     weight = bump((record[at + PHASE] - record[edit]) / record[edit + 1])
     record[edit + 2] = (x - record[at + ANCHOR]) / weight
@@ -223,9 +224,9 @@ def carry_to(record: Array, at: int, x: float, y: float, z: float) -> None:
 
 @njit
 def commit(record: Array, at: int) -> None:
-    """Make the pending edit one of the curve; what was undone can no longer be redone.
+    """Commit the pending edit; edits that were undone can no longer be redone.
 
-    With a full table the oldest edit becomes part of the curve before all edits: it can no longer be undone.
+    If the table is full, the oldest edit becomes part of the base curve and can no longer be undone.
     """
     table, committed, base = (
         at + int(record[at + TABLE]),
@@ -246,7 +247,7 @@ def commit(record: Array, at: int) -> None:
 
 @njit
 def _replay(record: Array, at: int, count: int) -> None:
-    """Lay the first edits of the table on the curve before them all, in the order in which they were made."""
+    """Apply the first `count` edits of the table to the base curve, in their original order."""
     committed = at + int(record[at + COMMITTED])
     _copy_pieces(record, at, at + int(record[at + BASE]), committed)
     for edit in range(count):
@@ -257,7 +258,7 @@ def _replay(record: Array, at: int, count: int) -> None:
 
 @njit
 def undo(record: Array, at: int) -> bool:
-    """Take the last edit back, to the last bit; False if there is none."""
+    """Undo the last edit, bit for bit; returns False if there is none."""
     count = int(record[at + COUNT])
     if count > 0:
         _replay(record, at, count - 1)
@@ -266,7 +267,7 @@ def undo(record: Array, at: int) -> bool:
 
 @njit
 def redo(record: Array, at: int) -> bool:
-    """Make again the edit that was undone last; False if there is none."""
+    """Redo the edit that was undone last; returns False if there is none."""
     count, again = int(record[at + COUNT]), record[at + TOTAL] > record[at + COUNT]
     if again:
         _replay(record, at, count + 1)

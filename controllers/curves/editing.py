@@ -1,6 +1,6 @@
-"""The record of `controllers.curves.deformation`, made of a curve, and read back as one.
+"""Conversion between curves and the editing record of `controllers.curves.deformation`.
 
-The kernels there take hold, carry, commit, undo and redo.
+The kernels there grasp, bend, commit, undo and redo.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from controllers.curves.trajectory import BREAKS, CHANNELS, COEFFICIENTS, PIECE,
 from controllers.errors import CurveError
 from controllers.state import Array
 
-_GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grabbed phase
-_LONGEST = 10_000  # half widths in a curve: 160 000 steps, a hundred megabytes
-_SAME = 1e-9  # of a step of the grid: breaks nearer than that are one
+_GRID = 16  # steps of the grid in a half width h: a bump's centre is at most h/32 beside the grasped phase
+_LONGEST = 10_000  # most half widths in a curve: 160 000 steps, a hundred megabytes
+_SAME = 1e-9  # of a step of the grid: breaks nearer than this coincide
 
 
 def _of_pieces(times: Array, coefficients: Array, like: Trajectory) -> Trajectory:
-    """Curve of given pieces: of *these* coefficients, not of a spline laid through its samples again."""
+    """Curve of given pieces: with exactly these coefficients instead of a new spline through its samples."""
     u = (times[-1] - times[-2]) ** np.arange(4)
     samples = np.vstack([coefficients[:, 0], u @ coefficients[-1]])
     if like.periodic:
@@ -60,13 +60,12 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     width : float
         h, half the width of a bump [s]; it becomes an even number of steps of a grid, which changes it by up to h/16.
     depth : int
-        How many edits can be undone.
+        Number of edits that can be undone.
 
     Raises
     ------
     CurveError
-        If h is not positive, or a bump would be longer than the curve or shorter than 1/10 000 of it, or nothing could
-        be undone.
+        If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is below 1.
     """
     if not 0.0 < width <= 0.5 * curve.duration:
         raise CurveError(
@@ -80,7 +79,7 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     if depth < 1:
         raise CurveError(f"at least 1 edit must be undoable, got {depth}")
     steps = np.diff(np.asarray(curve.times, dtype=float))
-    # A grid that holds the breaks of a curve of equal steps keeps its steps equal.
+    # For a curve of equal steps the grid is a refinement of its breaks, so that steps stay equal.
     multiple = len(steps) if np.ptp(steps) <= _SAME * steps[0] else 1
     cells = multiple * int(np.ceil(_GRID * curve.duration / (width * multiple)))
     step = curve.duration / cells
@@ -102,7 +101,7 @@ def curve_of(record: Array, at: int, like: Trajectory) -> Trajectory:
     record, at
         Array and offset of the record.
     like : Trajectory
-        The curve it was made of.
+        The curve that the record was made from.
     """
     blob = record[work_curve.py_func(record, at) :]  # pyright: ignore[reportFunctionMemberAccess]
     pieces, breaks, rows = (int(blob[i]) for i in (PIECES, BREAKS, COEFFICIENTS))

@@ -1,4 +1,4 @@
-"""The orientation along a curve and how it turns, for compiled laws."""
+"""Orientation and angular velocity along a curve, for compiled laws."""
 
 import numpy as np
 from numba import njit
@@ -15,8 +15,8 @@ _Quat = tuple[float, float, float, float]
 def curve_orientation(blob: Array, at: int, t: float) -> tuple[_Quat, tuple[float, float, float]]:
     """Orientation R_H(t), unit quaternion wxyz, and its angular velocity ω_H [rad/s], of the curve at ``blob[at:]``.
 
-    With s the spline through the quaternions, q = s/|s| and ω = 2 Im(ṡ ⊗ s*)/|s|². Where an open curve's phase is held
-    at an end, the velocity is still that of the end, as `curve_velocity` is.
+    With s the spline through the quaternions, q = s/|s| and ω = 2 Im(ṡ ⊗ s*)/|s|². Where the phase of an open curve is
+    clamped to an end, ω is that at the end, as for `curve_velocity`.
     """
     t = wrap_phase(blob, at, t)
     piece = find_piece(blob, at, t)

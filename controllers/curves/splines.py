@@ -1,4 +1,4 @@
-"""Uniform cubic B-splines round a lap: C² through samples, four rows to read wherever one is."""
+"""Uniform cubic B-splines round a lap: C², interpolating samples, four control points at every phase."""
 
 import numpy as np
 from numba import njit
@@ -31,13 +31,13 @@ def round_lap(samples: Array, angles: Array) -> Array:
 
 
 def control_points(samples: Array, signs: Array) -> Array:
-    """Control points of the splines that meet samples at equal steps of the lap.
+    """Control points of the splines that interpolate samples at equal steps of the lap.
 
     Parameters
     ----------
     samples : Array, shape (n, ...)
     signs : Array
-        1 where the lap closes, −1 where it comes back with the opposite sign (a quaternion may); broadcasts.
+        1 where the lap closes, −1 where it returns with the opposite sign (as a quaternion may); broadcasts.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def control_points(samples: Array, signs: Array) -> Array:
         Rows k to k + 3 belong to the interval from sample k to the next.
     """
     n = len(samples)
-    # Twice round the lap everything is periodic, and (c₋₁ + 4 c₀ + c₁)/6 = sample is a circular convolution.
+    # Over two laps everything is periodic, and (c₋₁ + 4 c₀ + c₁)/6 = sample is a circular convolution.
     response = (4.0 + 2.0 * np.cos(np.pi * np.arange(n + 1) / n)) / 6.0
     spectrum = np.fft.rfft(np.concatenate([samples, signs * samples]), axis=0)
     spectrum /= response.reshape(-1, *[1] * (samples.ndim - 1))

@@ -1,4 +1,4 @@
-"""Curves φ: I → SE(3) or S¹ → SE(3): C² cubic splines through samples, and their array for compiled laws."""
+"""Curves φ: I → SE(3) or S¹ → SE(3): C² cubic splines through samples, and their packed form for compiled laws."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +15,7 @@ from controllers.state import Array
 # The packed curve: a header, then three blocks; every offset counts from the start of the header.
 SIZE, PIECES, PERIODIC, START, END, LEVELS, BREAKS, COEFFICIENTS, TREE, HEADER = range(10)
 CHANNELS = 7  # position (3) and quaternion (4), the quaternion not yet of unit length
-PIECE = 4 * CHANNELS  # numbers a piece: rows 1, u, u², u³ with u = t − break
+PIECE = 4 * CHANNELS  # numbers per piece: rows 1, u, u², u³ with u = t − break
 
 # Gauss-Legendre on [0, 1]: arc length of a piece, the integral of |φ̇|.
 _nodes, _weights = np.polynomial.legendre.leggauss(6)
@@ -25,7 +25,7 @@ _GAUSS_WEIGHTS: Array = 0.5 * _weights
 
 @njit
 def wrap_phase(blob: Array, at: int, t: float) -> float:
-    """Phase in [start, end] for any t: wrapped if the curve at ``blob[at:]`` is periodic, else held at the ends."""
+    """Phase in [start, end] for any t: wrapped if the curve at ``blob[at:]`` is periodic, else clamped."""
     start, end = blob[at + START], blob[at + END]
     if blob[at + PERIODIC] > 0.0:
         period = end - start
@@ -35,11 +35,11 @@ def wrap_phase(blob: Array, at: int, t: float) -> float:
 
 @njit
 def find_piece(blob: Array, at: int, t: float) -> int:
-    """Index of the piece that holds the phase t of [start, end]: at once for equal steps, else by bisection."""
+    """Index of the piece that contains the phase t of [start, end]: directly for equal steps, else by bisection."""
     breaks = at + int(blob[at + BREAKS])
     low, high = 0, int(blob[at + PIECES])
     share = (t - blob[at + START]) / (blob[at + END] - blob[at + START])
-    # The bounds also hold for what int() makes of NaN.
+    # The bounds also protect against the integer that int() gives for NaN.
     likely = max(0, min(int(share * high), high - 1))
     if blob[breaks + likely] <= t < blob[breaks + likely + 1]:
         return likely
@@ -114,7 +114,7 @@ def _samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def _sign_continuous(quaternions: Array) -> Array:
-    """Flip signs such that neighbours agree; refuses samples too coarse to tell which way the curve turns."""
+    """Flip signs so that neighbours agree; raises if samples are too coarse for an unambiguous direction of turning."""
     dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
     if dots.size and np.abs(dots).min() < 0.5:
         at = int(np.abs(dots).argmin())
@@ -138,9 +138,9 @@ class Trajectory:
     times : array_like, shape (n,)
         Strictly increasing phases of the samples [s].
     positions : array_like, shape (n, 3)
-        In the hand frame H [m]. A periodic curve repeats its first sample as its last.
+        Positions in the hand frame H [m]. A periodic curve repeats its first sample as its last.
     quaternions : array_like, shape (n, 4), optional
-        R_H, unit, wxyz; neighbours less than 120° apart. Without them the stylus stays upright.
+        R_H, unit, wxyz; neighbours less than 120° apart. By default the stylus stays upright.
     periodic : bool
         Whether φ closes (C²) and repeats.
     ends : {"natural", "clamped"}
@@ -205,7 +205,7 @@ class Trajectory:
     ) -> "Trajectory":
         """Circle about an axis parallel to z of H, counter-clockwise from +x, once in `period` seconds.
 
-        With a wave it also goes up and down, z = a sin 3φ, so that every joint of a Phantom turns both ways.
+        With a wave it also goes up and down, z = a sin 3θ, so that every joint of a Phantom turns both ways.
 
         Parameters
         ----------
@@ -229,13 +229,13 @@ class Trajectory:
     @cached_property
     def coefficients(self) -> Array:
         """Powers of u = t − break, shape (pieces, 4, 7): rows 1, u, u², u³; columns position and quaternion."""
-        # SciPy's splines take a quarter of a second to import: not for a curve that is only compared.
+        # Imported here, since SciPy's splines take a quarter of a second to import and not every curve needs them.
         from scipy.interpolate import CubicSpline
 
         times, positions, quaternions = (cast("Array", a) for a in (self.times, self.positions, self.quaternions))
         if self.periodic:
             position = CubicSpline(times, np.vstack([positions[:-1], positions[:1]]), bc_type="periodic").c
-            # An orientation that comes back as −q has turned once; twice round it is periodic in R⁴ too.
+            # An orientation that returns as −q has turned once; over two laps it is periodic in R⁴ too.
             sign = float(np.sign(quaternions[-1] @ quaternions[0]))
             twice = np.vstack([quaternions[:-1], sign * quaternions[:-1], quaternions[:1]])
             knots = np.concatenate([times[:-1], times + times[-1] - times[0]])
@@ -252,12 +252,12 @@ class Trajectory:
 
     @property
     def end(self) -> float:
-        """Phase of the last sample [s]; for a periodic curve that of the first again, one period later."""
+        """Phase of the last sample [s]; for a periodic curve, of the repeated first sample, one period later."""
         return float(cast("Array", self.times)[-1])
 
     @property
     def duration(self) -> float:
-        """Time of one lap, or from end to end [s]."""
+        """Duration of one lap, or from end to end [s]."""
         return self.end - self.start
 
     def _values(self, t: npt.ArrayLike, derivative: int) -> Array:
@@ -328,7 +328,7 @@ class Trajectory:
             chord = points - points[i]
             square = np.einsum("ij,ij->i", chord, chord)
             off = np.sqrt(np.maximum(square - (chord @ tangent[i]) ** 2, 0.0))
-            # Pairs closer than a few samples only repeat the curvature, with rounding errors.
+            # Pairs closer than a few samples only measure the curvature again, with rounding errors.
             near = np.abs(np.arange(len(t)) - i)
             far = (np.minimum(near, len(t) - near) if self.periodic else near) > 4
             radius = np.divide(square, 2.0 * off, out=np.full_like(off, np.inf), where=far & (off > 1e-12))

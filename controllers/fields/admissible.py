@@ -17,9 +17,9 @@ def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tup
     params : Array
         ``params[first:]`` holds `rows` ≥ 2 pairs, equally spaced from the curve's start to its end.
     first, rows : int
-        Where they begin, and how many they are.
+        Index of the first pair in `params`, and number of pairs.
     share : float
-        Share of the curve's phase that is over, 0 to 1.
+        Phase along the curve as a fraction of its duration, 0 to 1.
     """
     place = share * (rows - 1)
     i = min(int(place), rows - 2)
@@ -30,7 +30,7 @@ def admissible_speeds(params: Array, first: int, rows: int, share: float) -> tup
 
 
 def checked_speeds(name: str, values: npt.ArrayLike) -> Array:
-    """Pairs of speeds as an array of shape (m, 2), or what is wrong with them."""
+    """Pairs of least and greatest speed [m/s] as an array of shape (m, 2); raises `ParameterError` if malformed."""
     speeds = np.array(values, dtype=np.float64)
     if speeds.ndim != 2 or speeds.shape[1] != 2 or len(speeds) < 2 or not np.isfinite(speeds).all():
         raise ParameterError(

@@ -1,4 +1,4 @@
-"""Weights, and what they do to wrenches: gate, blend, limit. With the sum these are the algebra of fields."""
+"""Weights, and the operations on wrenches that use them: gate, blend, limit. With the sum: the algebra of fields."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
 
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
-WEIGHT_SIZE = 6  # kind, whether 1 − s is meant, four numbers
+WEIGHT_SIZE = 6  # kind, flag for the complement 1 − s, four numbers
 
 
 @njit
@@ -46,7 +46,7 @@ def gate(params: Array, at: int, hand: Array, wrench: Array) -> None:
 
 @njit
 def blend(params: Array, at: int, hand: Array, wrench: Array, other: Array) -> None:
-    """Instruction BLEND: F ← (1 − s) F + s F', F' the wrench above it on the stack."""
+    """Instruction BLEND: F ← (1 − s) F + s F', with F' the wrench above F on the stack."""
     s = weight_of(params, at, hand)
     for i in range(6):
         wrench[i] = (1.0 - s) * wrench[i] + s * other[i]
@@ -57,7 +57,7 @@ def limit(params: Array, at: int, wrench: Array) -> None:
     """Instruction LIMIT: F ← F min(1, L/|F|), and the moment likewise; parameters [L of the force, L of the moment]."""
     for part in range(2):
         x, y, z = wrench[3 * part], wrench[3 * part + 1], wrench[3 * part + 2]
-        # Scaled by its largest component, so that squares do not overflow.
+        # Scaled by the largest component, so that the squares do not overflow.
         largest = max(abs(x), abs(y), abs(z), 1e-300)
         norm = largest * np.sqrt((x / largest) ** 2 + (y / largest) ** 2 + (z / largest) ** 2)
         if norm > params[at + part]:
@@ -77,12 +77,12 @@ class Weight:
 
     @staticmethod
     def constant(s: float) -> "Weight":
-        """The same everywhere; any finite number, so that it also scales and turns round a field."""
+        """Constant weight: any finite number, so that it can also scale a field or reverse its sign."""
         return _weight(_CONSTANT, s)
 
     @staticmethod
     def ball(centre: npt.ArrayLike, radius: float) -> "Weight":
-        """1 at a point of H [m], 0 from a radius [m] on: the window w(|p − c|/r)."""
+        """Window w(|p − c|/r) about a centre c in H [m]: 1 at the centre, 0 from the radius r [m] on."""
         x, y, z = np.asarray(centre, dtype=float)
         if not radius > 0.0:
             raise ParameterError(f"the radius of a ball must be positive, got {radius} m")
@@ -90,7 +90,7 @@ class Weight:
 
     @staticmethod
     def speed(low: float, high: float) -> "Weight":
-        """0 up to one speed of the hand, 1 from another on [m/s]."""
+        """0 up to the hand speed `low`, 1 from `high` on [m/s], with a smooth step between."""
         if not 0.0 <= low < high:
             raise ParameterError(f"speeds of a weight must be 0 ≤ low < high, got {low} and {high} m/s")
         return _weight(_SPEED, low, 1.0 / (high - low))

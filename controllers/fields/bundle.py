@@ -1,4 +1,4 @@
-"""A bundle of rivers: named, summed as a flow and as a force, saved as plain arrays."""
+"""Bundles of rivers: named rivers that are summed, as a flow and as a force, and saved as plain arrays."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ class RiverBundle(Law):
 
     .. math:: V = \sum_i V_i, \qquad F = \sum_i F_i
 
-    This is the static sum of section 2.3: where tubes cross, the hand feels both rivers. `HigherOrder` makes of the
-    same bundle a field in which it feels the one that it moves with.
+    This is the static sum of section 2.3: where tubes cross, the hand feels both rivers. In a `HigherOrder` field of
+    the same bundle the hand feels only the river whose direction and speed it moves with.
 
     Parameters
     ----------
     rivers : tuple of River
         At least one.
     names : tuple of str
-        One for each, all different.
+        One name for each river, all different.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class RiverBundle(Law):
         return reduce(add, (river.program() for river in self.rivers))
 
     def arrays(self) -> dict[str, Array]:
-        """The bundle as arrays by key, ``name/what``; `from_arrays` makes the same bundle of them, to the last bit."""
+        """The bundle as arrays with keys ``name/what``; `from_arrays` restores it from them bit for bit."""
         arrays: dict[str, Array] = {}
         for name, river in zip(self.names, self.rivers, strict=True):
             curve = river.curve
@@ -75,12 +75,12 @@ class RiverBundle(Law):
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "RiverBundle":
-        """Bundle of what `arrays` gave.
+        """Bundle restored from the output of `arrays`.
 
         Raises
         ------
         ControllerError
-            If an array is missing, or its values make no river.
+            If an array is missing, or its values are not those of a river.
         """
         names = tuple(dict.fromkeys(key.rpartition("/")[0] for key in arrays))
         rivers: list[River] = []

@@ -1,4 +1,4 @@
-"""The bunny: an attractor that runs along the curve, felt only near it (Donald & Henle 2000, section 7.3)."""
+"""The bunny: a moving attractor on the curve, felt only in its neighbourhood (Donald & Henle 2000, section 7.3)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +15,7 @@ from controllers.fields.instructions import leave_trace
 from controllers.fields.law import Law, Program
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 
-_LONGEST_TICK = 0.05  # [s] a bunny that waits does not leap after a pause
+_LONGEST_TICK = 0.05  # [s] bound on one time step, so that a waiting bunny does not jump after a pause
 
 
 @njit
@@ -31,7 +31,7 @@ def _square_to(params: Array, curve: int, phase: float, p: Array) -> float:
 
 
 class BunnyGains(NamedTuple):
-    """Parameters of `bunny_wrench`: k_r [N/m], b_d [N s/m], 1/δ² [1/m²], and whether it pulls along, and waits."""
+    """Parameters of `bunny_wrench`: k_r [N/m], b_d [N s/m], 1/δ² [1/m²], flags for attraction "along", pace "wait"."""
 
     k_r: float
     b_d: float
@@ -42,7 +42,7 @@ class BunnyGains(NamedTuple):
 
 @njit
 def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `Bunny`: parameters `BunnyGains`, memory [t*, t_b, time of the last tick]."""
+    """Kernel of `Bunny`: parameters `BunnyGains`, memory [t*, phase t_b of the bunny, time of the last tick] [s]."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     gains = BunnyGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4])
     time = hand[HAND_TIME]
@@ -75,7 +75,7 @@ class FeltBunny(NamedTuple):
 
 
 def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> FeltBunny:
-    """The weighted form that a bunny's attraction comes to: its own, or the convolution's in closed form."""
+    """Gains of the weighted form that is executed: those given, or for "convolution" its closed form."""
     if attraction != "convolution":
         return FeltBunny(k_r, b_d, delta)
     return FeltBunny(k_r * 2.0**-2.5, b_d * 2.0**-1.5, delta * 2.0**0.5)
@@ -83,7 +83,7 @@ def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> FeltBun
 
 @dataclass(frozen=True, eq=False)
 class Bunny(Law):
-    r"""Attractor φ(t_b) that keeps its own pace and pulls the hand near it.
+    r"""Attractor φ(t_b) that moves along the curve at its own pace and pulls a hand that is near.
 
     .. math:: L = G_\delta(p - \varphi(t_b))\,\bigl(k_r\,(\varphi(s) - p) + b_d\,(\dot\varphi(s) - \dot p)\bigr)
 
@@ -108,13 +108,13 @@ class Bunny(Law):
     b_d : float
         Damping [N s/m].
     delta : float
-        δ, how far the bunny is felt [m]; may be infinite.
+        δ, standard deviation of the Gaussian about the bunny [m]; may be infinite.
     attraction : {"point", "along", "convolution"}
-        To the bunny itself (s = t_b), or along the curve by FOLLOW's own force (s = t*, the nearest phase), or to the
-        bunny, convolved.
+        "point": to the bunny itself (s = t_b); "along": FOLLOW's force towards the nearest point of the curve and along
+        it (s = t*); "convolution": to the bunny, convolved with the Gaussian.
     pace : {"clock", "wait"}
-        t_b is the hand's time; or it starts nearest to the hand and runs at the rate G_δ, thus stops for a hand
-        that is held.
+        "clock": t_b is the hand's time. "wait": t_b starts at the phase nearest to the hand and advances at the rate
+        G_δ, so the bunny waits for a hand that is held back.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A law of force of one's own, compiled: it costs what the built-in ones cost."""
+"""User-defined laws of force compiled by numba: as cheap to evaluate as the built-in ones."""
 
 import re
 from collections.abc import Callable
@@ -34,8 +34,8 @@ _HAND = types.NamedTuple(
 class CompiledLaw(FunctionLaw):
     """Field computed by a function that numba compiles when the law is made.
 
-    The function is given numbers only: vectors of the hand are tuples, and it returns a tuple. What it divides by zero
-    is not finite, as NumPy has it. Parameters are those of `FunctionLaw`.
+    The function gets numbers only: vectors of the hand are tuples, and it returns a tuple. A division by zero gives
+    inf or NaN, as in NumPy, and raises nothing. Parameters are those of `FunctionLaw`.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class CompiledLaw(FunctionLaw):
 
 @cache
 def _kernel(function: Callable[..., Any], count: int) -> Kernel:
-    """The function as a law's kernel; its parameters are `count` numbers in their order."""
+    """The function as a law's kernel; its parameters are `count` numbers, in the order of its arguments."""
     compiled: Any = njit(error_model="numpy")(function)
     signature = (_HAND, *[_NUMBER] * count)
     try:
@@ -94,7 +94,7 @@ def _is_number(kind: Any) -> bool:
 
 
 def _reader(count: int) -> Callable[[Array, int], tuple[float, ...]]:
-    """Compiled function that takes so many numbers from an array."""
+    """Compiled function that reads `count` consecutive numbers of an array as a tuple."""
     if count == 0:
 
         @njit

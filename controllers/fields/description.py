@@ -1,4 +1,4 @@
-"""What a law is, in plain data: names and values that can be hashed, compared and read."""
+"""Description of laws in plain data: names and values that can be hashed, compared and read."""
 
 import hashlib
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.base import HapticMap
 from controllers.state import Array
 
-_SHORT = 16  # numbers that are told one by one
+_SHORT = 16  # an array of more numbers than this is described by a hash
 
 
 def digest(*parts: Array | bytes) -> str:
@@ -27,8 +27,8 @@ def digest(*parts: Array | bytes) -> str:
 def described(value: object) -> object:
     """A parameter as plain data.
 
-    Numbers, words and short arrays are told as they are; of curves, maps and long arrays a hash is told; of a
-    dataclass, or a named tuple, what it is made of by name.
+    Numbers, strings and short arrays stay as they are; curves, maps and long arrays become a hash; a dataclass becomes
+    its fields by name, a tuple or list (also a named tuple) a list of its described parts.
     """
     if isinstance(value, Trajectory):
         return {"curve": digest(value.packed())}
@@ -55,7 +55,8 @@ def parts_of(value: Any) -> dict[str, object]:
 def code_digest(function: object) -> str:
     """Hash of what a function computes: its code, the constants that it reads, and the functions that it calls.
 
-    Of a name that is neither a number, a word, a tuple nor a function in Python only the name is in the hash.
+    Numbers, strings, tuples, arrays and Python functions that the code reads enter with their content; of anything else
+    only the name is in the hash.
     """
     return digest(*_told(function, set()))
 

@@ -1,4 +1,4 @@
-"""V + U: a river, and what a user did to it, as one field (Donald & Henle 2000, section 2.3)."""
+"""Edited rivers V + U: a river V plus a field U recorded from a user's motion on it (Donald & Henle 2000, 2.3)."""
 
 import math
 from collections.abc import Mapping
@@ -21,19 +21,19 @@ from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_TIME, Array
 from controllers.work_array import work_array
 
-_SPACING = 0.01  # [s] between samples of a performance: finer than a hand moves, coarser than encoders count
-_LONGEST_TICK = 0.05  # [s] a recording that waits does not leap after a pause
+_SPACING = 0.01  # [s] between samples of a performance: short for the motion of a hand, long for encoder quantisation
+_LONGEST_TICK = 0.05  # [s] bound on one time step, so that a waiting recording does not jump after a pause
 
 
 @njit
 def _nearness(params: Array, performed: int, s: float, inverse_square: float, p: Array) -> float:
-    """Window w(|p − φ'(s)|/ε) about the place that the performance has come to."""
+    """Window w(|p − φ'(s)|/ε) about the current point φ'(s) of the performance."""
     x, y, z = curve_point(params, performed, s)
     return window(((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2) * inverse_square)
 
 
 class RecordedGains(NamedTuple):
-    """Parameters of `recorded_wrench`, before the packed curve φ': FOLLOW's gains, α, 1/ε², and whether it waits."""
+    """Parameters of `recorded_wrench`, before the packed curve φ': FOLLOW's gains, α, 1/ε², flag for pace "wait"."""
 
     k_r: float
     b_d: float
@@ -61,7 +61,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
             s = memory[slot + 1]
             step = min(max(time - memory[slot + 2], 0.0), _LONGEST_TICK)
             s += _nearness(params, performed, s, inverse_square, p) * step
-        # At its end it waits at its beginning for the hand to come round.
+        # After its end the performance returns to its start and waits there for the hand to come round.
         s = start if s > end else s
     memory[slot + 1], memory[slot + 2] = s, time
     wrench[:] = 0.0
@@ -99,14 +99,14 @@ def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
     Parameters
     ----------
     times : array_like, shape (n,)
-        [s], increasing; the clock of the performance starts at the first.
+        [s], increasing; the time of the performance counts from the first.
     points : array_like, shape (n, 3)
         p_H of the hand [m].
 
     Raises
     ------
     CurveError
-        If the hand did not move, or the samples are no curve.
+        If the hand did not move, or the samples do not make a curve.
     """
     t, p = np.asarray(times, dtype=float), np.asarray(points, dtype=float)
     t = t - t[0]
@@ -117,7 +117,7 @@ def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
 
 @dataclass(frozen=True, eq=False)
 class Performance(Law):
-    """One performance of a user on a river as a field, α U: parameters as `Edited`'s."""
+    """One performance of a user on a river as a field α U; parameters as in `Edited`."""
 
     river: River
     performed: Trajectory
@@ -141,15 +141,15 @@ class Performance(Law):
 
 @dataclass(frozen=True, eq=False)
 class Edited(Law):
-    r"""River V, and performances of a user as fields U_j on top of it, weighted.
+    r"""River V plus a weighted sum of a user's performances as fields U_j.
 
     .. math:: V + \sum_j \alpha_j U_j, \qquad
               U_j(s, p) = w(|p - \varphi'_j(s)|/\varepsilon)\,\bigl(\dot\varphi'_j(s) - V(\varphi'_j(s))\bigr)
 
-    U is what the user added to the river in moving along φ'. So φ' is an integral curve of V + U (α = 1). As a force
-    it is the user's push as the river felt it, U = −F(φ', φ̇'): a hand that moves along φ' feels nothing, and a light
-    one that is let go on it traces φ' by itself; a heavy one departs from it by what its inertia does, and nothing
-    brings it back along the curve. U holds the push, inertia and friction together, and needs no force sensor.
+    U is the velocity that the user added to the river by moving along φ', so φ' is an integral curve of V + U (α = 1).
+    As a force, U = −F(φ', φ̇') is the opposite of the river's force on that motion: a hand that moves along φ' feels
+    nothing, and a light hand released on φ' traces it by itself; a heavy hand departs from φ' by its inertia, and
+    no force returns it to its phase. U contains push, inertia and friction together, and needs no force sensor.
 
     Parameters
     ----------
@@ -158,17 +158,17 @@ class Edited(Law):
     performed : tuple of Trajectory
         φ'_j, from `performance`.
     weights : tuple of float
-        α_j: 1 what was done, 0.5 half of it, −1 the opposite.
+        α_j: 1 repeats the performance, 0.5 half of it, −1 its opposite.
     epsilon : float
-        ε [m], how far from the performance U is felt.
+        ε [m], distance from the performance at which U ends.
     pace : {"clock", "wait"}
-        s is the hand's time, and U is over at the end; or it runs at the rate w(|p − φ'(s)|/ε), thus waits for the
-        hand to come by, and begins again after the end.
+        "clock": s is the hand's time, and U is zero after the end. "wait": s advances at the rate w(|p − φ'(s)|/ε), so
+        the performance waits for the hand to come by, and begins again after its end.
 
     Raises
     ------
     ParameterError
-        If weights and performances are not as many, a number is not finite, or ε below 1e-4 m.
+        If weights and performances differ in number, a number is not finite, or ε is below 1e-4 m.
     """
 
     river: River
@@ -196,7 +196,7 @@ class Edited(Law):
         return reduce(Program.__add__, laws, self.river.program())
 
     def program(self) -> Program:
-        """Compiled form of the force of V + Σ α U; a recording that waits begins with the run."""
+        """Compiled form of the force of V + Σ α U; with pace "wait", s starts at φ's start in each run."""
         return self._program
 
     def flow(self, t: float, p: Array) -> Array:
@@ -210,7 +210,7 @@ class Edited(Law):
         return total
 
     def arrays(self) -> dict[str, Array]:
-        """The field as arrays by key; `from_arrays` makes the same field of them, to the last bit."""
+        """The field as arrays by key; `from_arrays` restores it from them bit for bit."""
         numbers = np.array([self.epsilon, float(self.pace == "wait"), *self.weights])
         arrays = RiverBundle((self.river,), ("river",)).arrays() | {"edited": numbers}
         for i, curve in enumerate(self.performed):
@@ -219,12 +219,12 @@ class Edited(Law):
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Edited":
-        """Field of what `arrays` gave.
+        """Field restored from the output of `arrays`.
 
         Raises
         ------
         ControllerError
-            If an array is missing, or its values make no field.
+            If an array is missing, or its values are not those of a field.
         """
         numbers = arrays.get("edited", np.zeros(0))
         names = [f"performed {i}" for i in range(numbers.size - 2)]

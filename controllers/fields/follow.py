@@ -32,7 +32,7 @@ class FollowGains(NamedTuple):
 
 @njit
 def follow_gains(params: Array, at: int) -> FollowGains:
-    """Those that begin at ``params[at]``."""
+    """Gains stored at ``params[at:]``."""
     return FollowGains(params[at], params[at + 1], params[at + 2])
 
 
@@ -61,14 +61,14 @@ def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, 
 
 @dataclass(frozen=True, eq=False)
 class Follow(Law):
-    r"""River force that traces a curve by itself and yields to the hand.
+    r"""River force: carries a free stylus along the curve, and yields to the hand.
 
     .. math:: F = w(d/\varepsilon)\,\bigl(k_r\,(\varphi(t^*) - p) + b_d\,(\dot\varphi(t^*) - \dot p)\bigr)
 
     t* is the phase of the curve's point nearest to the hand, d its distance, w the C² `window`. F is continuous in
-    p wherever the nearest point is unique (within `Trajectory.reach` of the curve, and beyond outside the medial
-    axis). Where two points are equally near, the one found first stays; beyond ε there is no force. At an open
-    curve's ends t* stays at the end.
+    p wherever the nearest point is unique: within `Trajectory.reach` of the curve, and farther out off the medial
+    axis. Where two points are equally near, the one found first is kept; beyond ε there is no force. Past an end of an
+    open curve t* stays at that end.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Follow(Law):
     b_d : float
         Tangential damping [N s/m].
     epsilon : float
-        ε, radius of the tube [m], may be infinite. The default is about the workspace's: the field reaches
+        ε, radius of the tube [m], may be infinite. The default is about the radius of the workspace: the field reaches
         everywhere and is hardly weakened near the curve (2 % at 2 cm).
 
     Raises

@@ -1,4 +1,4 @@
-"""A law that is a function of the user's, with parameters that have names."""
+"""Laws of force given by a user's Python function with named parameters."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,7 +18,8 @@ from controllers.state import Array, HandState, Wrench
 class FunctionLaw(Law):
     """Field F(hand; parameters), computed by a function; made by `controllers.fields.own_law.law`.
 
-    It is a law with its parameters as they are, and called with some of them by name the same law with these.
+    The object is a law with its current parameters; calling it with keyword arguments gives the same law with those
+    parameters replaced.
 
     Parameters
     ----------
@@ -26,12 +27,12 @@ class FunctionLaw(Law):
         ``function(hand, **parameters)``, from a `HandState` to the force F_H [N], or the force and the moment [N m]:
         three or six numbers.
     parameters : mapping of str to float
-        By name.
+        Values by name.
 
     Raises
     ------
     ParameterError
-        If a parameter is not a finite number; and when the law is evaluated, if it does not give three or six.
+        If a parameter is not a finite number; on evaluation, if the function does not return three or six numbers.
     """
 
     function: Callable[..., npt.ArrayLike]
@@ -48,7 +49,7 @@ class FunctionLaw(Law):
         Raises
         ------
         ParameterError
-            If it has no parameter of that name, or a value is not a finite number.
+            If the law has no parameter of that name, or a value is not a finite number.
         """
         unknown = [name for name in parameters if name not in self.parameters]
         if unknown:
@@ -62,7 +63,7 @@ class FunctionLaw(Law):
 
     @property
     def name(self) -> str:
-        """Of the function."""
+        """Name of the function."""
         return getattr(self.function, "__name__", type(self.function).__name__)
 
     @property
@@ -71,7 +72,7 @@ class FunctionLaw(Law):
         return place_of(self.function)
 
     def six_numbers(self, hand: HandState) -> Array:
-        """Force and moment of the function at a hand, shape (6,); a moment that it does not give is zero."""
+        """Force [N] and moment [N m] of the function at a hand state, shape (6,); a moment not returned is zero."""
         numbers = np.asarray(self.function(hand, **self.parameters), dtype=np.float64)
         if numbers.shape not in ((3,), (6,)):
             raise ParameterError(
@@ -86,7 +87,7 @@ class FunctionLaw(Law):
         Raises
         ------
         ParameterError
-            If they are not finite. In a run that latches the limiter's fault instead.
+            If they are not finite. In a run, such a wrench latches the limiter's fault instead.
         """
         wrench = super().wrench(hand)
         if np.isfinite(hand.vector()).all() and not np.isfinite(np.concatenate(wrench)).all():
@@ -94,14 +95,14 @@ class FunctionLaw(Law):
         return wrench
 
     def expression(self, hand: HandState, **parameters: Any) -> tuple[Any, ...]:
-        """What the function gives for symbols, such as CasADi's, in the place of numbers.
+        """The function evaluated on symbols (for example CasADi's) instead of numbers.
 
         Parameters
         ----------
         hand : HandState
-            Of symbols; vectors may be tuples of them.
+            Made of symbols; vectors may be tuples of them.
         **parameters
-            Symbols for some of the parameters; the others are their values.
+            Symbols for some of the parameters; the others keep their values.
 
         Raises
         ------

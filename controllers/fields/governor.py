@@ -1,4 +1,4 @@
-"""The governor: a force against playing a motion slower or faster than is physically feasible."""
+"""The governor: a force that resists playing a motion slower or faster than is physically feasible."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,11 +17,11 @@ from controllers.fields.law import Law, Program
 from controllers.fields.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
 
-_SPEEDS = 3  # where they begin, behind `GovernorGains`
+_SPEEDS = 3  # offset of the pairs of speeds, which follow `GovernorGains`
 
 
 class GovernorGains(NamedTuple):
-    """Parameters of `governor_wrench`: b [N s/m], 1/ε² [1/m²], and how many pairs of speeds follow."""
+    """Parameters of `governor_wrench`: b [N s/m], 1/ε² [1/m²], and the number of pairs of speeds that follow."""
 
     drag: float
     inverse_square: float
@@ -30,7 +30,7 @@ class GovernorGains(NamedTuple):
 
 @njit
 def governor_force(speed: float, least: float, greatest: float, drag: float) -> float:
-    """Force [N] along the curve on a hand of a speed along it, b (⟨v_min − s⟩ − ⟨s − v_max⟩); speeds in m/s."""
+    """Force along the curve, b (⟨v_min − s⟩ − ⟨s − v_max⟩) [N], for a hand speed s along the curve; speeds in m/s."""
     return drag * (np.maximum(0.0, least - speed) - np.maximum(0.0, speed - greatest))
 
 
@@ -42,7 +42,7 @@ def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     phase, distance = closest_phase(params, curve, p[0], p[1], p[2], memory[slot])
     memory[slot] = phase
     x, y, z = curve_velocity(params, curve, phase)
-    # Where the curve rests it has no direction, and there is no force.
+    # Where the curve's velocity is zero it has no direction; the bound then makes the force zero.
     pace = max(np.sqrt(x * x + y * y + z * z), 1e-12)
     share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
     least, greatest = admissible_speeds(params, at + _SPEEDS, int(gains.rows), share)
@@ -56,23 +56,23 @@ def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
 
 @dataclass(frozen=True, eq=False)
 class Governor(Law):
-    r"""Force that keeps a hand's pace along a curve within what the motion under it admits.
+    r"""Force that keeps a hand's speed along a curve within the speeds that the animated motion admits.
 
     .. math:: F = w(d/\varepsilon)\,b\,\bigl(\langle v_{min} - s\rangle - \langle s - v_{max}\rangle\bigr)\,
               \frac{\dot\varphi}{|\dot\varphi|}, \qquad s = \dot p \cdot \frac{\dot\varphi}{|\dot\varphi|},
               \quad \langle x \rangle = \max(0, x)
 
-    at t*, the phase of the curve's point nearest to the hand, d its distance, w the C² `window`. Inside the interval
-    there is no force, at its ends the force is continuous; it is what a drag would do to a hand that is as much too
-    fast or too slow. Alone it does not hold the hand to the curve: add it to a field that does.
+    at t*, the phase of the curve's point nearest to the hand, with d its distance and w the C² `window`. Inside
+    [v_min, v_max] there is no force, at its ends the force is continuous, and outside it is viscous drag on the excess
+    speed. Alone it does not hold the hand to the curve: add it to a field that does.
 
     Parameters
     ----------
     curve : Trajectory
         φ, in the hand frame H.
     speeds : array_like, shape (m, 2)
-        v_min and v_max [m/s] at m phases equally spaced from the curve's start to its end, linear between them, as
-        of `River.speeds`; what comes of `controllers.certificates.flight.rate_bounds.RateBounds.stylus_speed`.
+        v_min and v_max [m/s] at m phases equally spaced from the curve's start to its end, linear between them, as in
+        `River.speeds`; `controllers.certificates.flight.rate_bounds.RateBounds.stylus_speed` computes them.
     drag : float
         b [N s/m].
     epsilon : float

@@ -1,4 +1,4 @@
-"""Higher-order fields: which river takes a hand depends on how it moves (Donald & Henle 2000, sections 7.1, 7.2)."""
+"""Higher-order fields: the hand's velocity decides which river acts on it (Donald & Henle 2000, sections 7.1, 7.2)."""
 
 import math
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ from controllers.work_array import work_array
 
 
 class Crossing(NamedTuple):
-    """Parameters of `higher_order_wrench`; offsets of the rivers' blocks follow, counted from here, then the blocks.
+    """Parameters of `higher_order_wrench`; then follow offsets of the rivers' blocks, from this header, and the blocks.
 
-    The form, 1/2σ² [s²/m²], r and r + h [m/s], the number of rivers, and the time constant of the look [s].
+    Flag for the discrete form, 1/2σ² [s²/m²], r and r + h [m/s], number of rivers, time constant of the low-pass [s].
     """
 
     discrete: float
@@ -37,9 +37,9 @@ class Crossing(NamedTuple):
 
 
 class RiverGains(NamedTuple):
-    """Begin of a river's block; pairs of admissible speeds follow, so many of them, and the packed curve.
+    """Header of a river's block; the pairs of admissible speeds and the packed curve follow it.
 
-    k_r [N/m], b_d [N s/m], 1/ε² [1/m²], ε [m] and τ [s].
+    k_r [N/m], b_d [N s/m], 1/ε² [1/m²], ε [m], τ [s], and the number of pairs of speeds.
     """
 
     k_r: float
@@ -51,13 +51,13 @@ class RiverGains(NamedTuple):
 
 
 _HEADER, _BLOCK = len(Crossing._fields), len(RiverGains._fields)
-# What is known of a branch.
+# Columns of the table of candidate branches.
 _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE = range(6)
 
-# Memory: the river that has the hand and its phase, when the law was last asked, and the velocity by which it decides.
+# Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s]].
 _WHEN, _SEEN, _MEMORY = 2, 3, 6
 
-_NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
+_NEIGHBOUR = 0.1  # of a lap: a branch whose phase differs by more is a different branch
 
 
 @njit
@@ -67,7 +67,7 @@ def _crossing(params: Array, at: int) -> Crossing:
 
 @njit
 def _river(params: Array, at: int, number: float) -> tuple[RiverGains, int, int]:
-    """Gains of a river, and where its speeds and its curve begin."""
+    """Gains of a river, and the offsets of its speeds and of its packed curve."""
     block = at + int(params[at + _HEADER + int(number)])
     gains = RiverGains(
         params[block], params[block + 1], params[block + 2], params[block + 3], params[block + 4], params[block + 5]
@@ -79,9 +79,9 @@ def _river(params: Array, at: int, number: float) -> tuple[RiverGains, int, int]
 def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
     r"""Distance m [m/s] of a hand's velocity from a river's, m² = |e|² − (e·Y)²/(|Y|² + |φ̇|²).
 
-    e is the velocity less the nearest admissible one, and Y = (φ(t*) − p)/τ the current towards the curve. What e has
-    along Y is forgiven as far as Y outweighs the current along the curve, or a hand that springs back to its river
-    would be let go for the speed that the river gave it.
+    e is the velocity minus the nearest admissible one, and Y = (φ(t*) − p)/τ the current towards the curve. The part of
+    e along Y is discounted, the more so the larger |Y| is against |φ̇|: otherwise a hand that springs back to its river
+    would be released because of the speed that this river gave it.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _branch_mismatch(
 
 @njit
 def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int:
-    """Branches of all rivers in whose tubes p is, as rows of the table; returns their number."""
+    """Write the branches of all rivers whose tube contains p as rows of the table; returns their number."""
     count, crossing = 0, _crossing(params, at)
     found = work_array((BRANCHES, 2))
     for number in range(int(crossing.rivers)):
@@ -135,10 +135,10 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
 
 @njit
 def _look(look: float, memory: Array, slot: int, t: float, v: Array) -> Array:
-    """The velocity by which rivers are told apart: smoothed, unless no time has passed."""
+    """Low-passed hand velocity [m/s] that selects the river; unfiltered if no time has passed or the filter is off."""
     seen = memory[slot + _SEEN : slot + _MEMORY]
     passed = t - memory[slot + _WHEN]
-    # False for NaN, the first time.
+    # The comparison is false for the NaN of the first evaluation.
     share = 1.0 - math.exp(-passed / look) if look > 0.0 and passed > 0.0 else 1.0
     memory[slot + _WHEN] = t
     for i in range(3):
@@ -157,7 +157,7 @@ def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Ar
 
 @njit
 def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array, wrench: Array) -> int:
-    """Add the weighted forces; returns the row with the greatest weight, −1 if that is the null weight."""
+    """Add the weighted forces; returns the row of greatest weight, −1 if the null weight is greatest."""
     crossing = _crossing(params, at)
     sharpness, null = crossing.sharpness, crossing.admission**2
     least = null
@@ -177,7 +177,7 @@ def _smooth(params: Array, at: int, table: Array, count: int, p: Array, v: Array
 
 @njit
 def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, slot: int) -> int:
-    """Row of the river that has the hand, −1 for none; memory [river, phase] keeps it."""
+    """Row of the active river, chosen with hysteresis, −1 for none; stored in the memory as [river, phase]."""
     crossing = _crossing(params, at)
     admission, release = crossing.admission, crossing.release
     current, nearest = -1, math.inf
@@ -206,7 +206,7 @@ def _discrete(params: Array, at: int, table: Array, count: int, memory: Array, s
 def higher_order_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
-    """Kernel of `HigherOrder`: parameters see `Crossing`, memory see the module; `curve` is not used."""
+    """Kernel of `HigherOrder`: parameters see `Crossing`, memory see above `_WHEN`; `curve` is not used."""
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     if not np.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2]):
         wrench[:] = np.nan
@@ -226,7 +226,7 @@ def higher_order_wrench(
 
 @njit
 def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory: Array, p: Array) -> None:
-    """Note the river that has the hand, or the nearest one when none has it."""
+    """Write the trace for the active river, or for the nearest one if none is active."""
     shown = winner
     if winner < 0 and count > 0:
         shown = 0
@@ -250,35 +250,36 @@ def _trace(params: Array, at: int, table: Array, count: int, winner: int, memory
 class HigherOrder(Law):
     r"""Field on TC of a bundle of rivers: the hand feels the river that it moves with, in direction and speed.
 
-    With m_i the distance of the hand's velocity from the admissible ones of river i, s φ̇_i/|φ̇_i| at t*_i with s in
-    the interval of `River.speeds` (`mismatch`), w_i its window, r the admission, and a null weight for a hand that
-    moves with none,
+    Let m_i (`mismatch`) be the distance of the hand's velocity from the admissible velocities of river i, which are
+    s φ̇_i/|φ̇_i| at t*_i with s in the interval of `River.speeds`; w_i its window; and r the admission, which gives a
+    null weight to a hand that moves with no river. Then
 
     .. math:: F = \sum_i \lambda_i F_i, \qquad \lambda_i = \frac{e^{-s_i^2/2\sigma^2}}
               {e^{-r^2/2\sigma^2} + \sum_j e^{-s_j^2/2\sigma^2}}, \qquad s_i^2 = m_i^2 - 2\sigma^2\ln w_i
 
-    is the smooth form. The discrete one gives the whole hand to one river: to the least s_i, if it is below r; and
-    with hysteresis h it stays there while s_i < r + h, unless s_j + h < s_i for another one. It jumps where it
-    changes. As σ → 0 both tend to the least m_i, if it is below r.
+    is the smooth form. In the discrete form one river acts alone: that of least s_i, if s_i < r. With hysteresis h it
+    stays active while s_i < r + h, unless s_j + h < s_i for another river j; the force jumps at a change. As σ → 0 both
+    forms select the river of least m_i, if m_i < r.
 
-    A river takes part with each of its branches (`controllers.curves.branches`), so that one that crosses itself is
-    treated like two that cross.
+    Each branch of a river (`controllers.curves.branches`) takes part by itself, so that a river that crosses itself is
+    treated like two rivers that cross.
 
     Parameters
     ----------
     bundle : RiverBundle
-        The rivers; continuity asks ε_i below the radius of curvature of φ_i.
+        The rivers; continuity needs ε_i below the radius of curvature of φ_i.
     admission : float
         r [m/s].
     sigma : float
-        σ [m/s]: how sharply rivers are told apart; and in both forms what a place near a tube's edge costs.
+        σ [m/s]: width of the selection between rivers; in both forms also the weight of the penalty −2σ² ln w_i near a
+        tube's edge.
     hysteresis : float
-        h [m/s], of the discrete field.
+        h [m/s], of the discrete form.
     form : {"smooth", "discrete"}
         How rivers share the hand.
     look : float
-        Time constant of a low-pass of the velocity by which rivers are told apart [s], so that the noise of a device
-        does not; 0: none. The forces take the velocity as it is.
+        Time constant of a low-pass on the velocity that selects the river [s], against measurement noise; 0: no filter.
+        The forces use the unfiltered velocity.
 
     Raises
     ------

@@ -1,12 +1,13 @@
-"""What a force field compiles to: rows of instructions over one array of parameters and one of memory.
+"""Instruction format of a compiled force field: rows of instructions over one array of parameters and one of memory.
 
-A row is ``[code, parameters at, memory at, curve at]``. The code of a law is the number of its kernel among the
-program's, that of an operation a `Join`; the last number is the offset of a packed `Trajectory` in the parameters.
-Instructions leave wrenches on a stack, like a pocket calculator's, so that sums and blends of fields are instructions
-too. The first `TRACE_SIZE` numbers of the memory tell of the last evaluation, for the record: ``[t*, c (3), d, row,
-attractor, river]``: phase, point and distance of the nearest curve, the row of its law, and the phase of the point
-that attracts (t* itself, or the bunny's). With no curve near, d is infinite. The last is the number of the river that
-has the hand, in a field of higher order: −1 for none, and without such a field.
+A row is ``[code, parameters at, memory at, curve at]``. The code of a law is the index of its kernel in the program,
+that of an operation a `Join`; the last number is the offset of a packed `Trajectory` in the parameters. Instructions
+push wrenches on a stack (postfix notation), so that sums and blends of fields are instructions too.
+
+The first `TRACE_SIZE` numbers of the memory are the trace of the last evaluation, which is recorded: ``[t*, c (3), d,
+row, attractor, river]``: phase, point and distance of the nearest curve, the row of its law, and the phase of the
+attracting point (t* itself, or the bunny's). With no curve near, d is infinite. The last is the number of the active
+river of a higher-order field, −1 for none or without such a field.
 """
 
 from collections.abc import Callable
@@ -29,16 +30,16 @@ class Join(IntEnum):
 
     @property
     def takes(self) -> int:
-        """How many wrenches it takes from the stack, to leave one."""
+        """Number of wrenches that the operation pops from the stack; it pushes one."""
         return 2 if self in (Join.ADD, Join.BLEND) else 1
 
 
-STACK = 16
+STACK = 16  # depth of the stack: most wrenches that may be pending at once
 
 TRACE_PHASE, TRACE_POINT, TRACE_DISTANCE, TRACE_ROW, TRACE_ATTRACTOR, TRACE_RIVER, TRACE_SIZE = 0, 1, 4, 5, 6, 7, 8
 
 Kernel = Callable[[Array, int, int, Array, int, Array, Array], None]
-"""Compiled law ``kernel(params, at, curve, memory, slot, hand, wrench)``: writes the wrench, and its memory."""
+"""Compiled law ``kernel(params, at, curve, memory, slot, hand, wrench)``: writes the wrench and its own memory."""
 
 VECTOR = types.Array(types.float64, 1, "C")
 """Type of a row of numbers."""
@@ -47,7 +48,7 @@ LAW_ARGUMENTS = (VECTOR, types.int64, types.int64, VECTOR, types.int64, VECTOR, 
 
 
 def empty_trace() -> Array:
-    """Trace of a field that was not evaluated yet."""
+    """Trace of a field that has not been evaluated yet."""
     trace = np.zeros(TRACE_SIZE)
     trace[TRACE_DISTANCE], trace[TRACE_RIVER] = np.inf, -1.0
     return trace
@@ -55,7 +56,7 @@ def empty_trace() -> Array:
 
 @njit
 def leave_trace(params: Array, curve: int, memory: Array, phase: float, distance: float, attractor: float) -> None:
-    """Note the closest point of a curve, if no nearer one is noted yet."""
+    """Write the closest point of a curve to the trace, unless a nearer one stands there."""
     if distance < memory[TRACE_DISTANCE]:
         leave_place(memory, phase, curve_point(params, curve, phase), distance, attractor)
 
@@ -64,7 +65,7 @@ def leave_trace(params: Array, curve: int, memory: Array, phase: float, distance
 def leave_place(
     memory: Array, phase: float, place: tuple[float, float, float], distance: float, attractor: float
 ) -> None:
-    """Note the nearest place of a law [m], if no nearer one is noted yet."""
+    """Write the nearest point of a law [m] to the trace, unless a nearer one stands there."""
     if distance < memory[TRACE_DISTANCE]:
         memory[TRACE_PHASE], memory[TRACE_DISTANCE], memory[TRACE_ATTRACTOR] = phase, distance, attractor
         memory[TRACE_POINT], memory[TRACE_POINT + 1], memory[TRACE_POINT + 2] = place

@@ -1,4 +1,4 @@
-"""Laws of force and their algebra: what every field can do, built in, composed, or one's own."""
+"""Laws of force and their algebra: the interface shared by built-in, composed and user-defined fields."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -25,15 +25,15 @@ class Law(ABC):
 
     .. math:: F + F', \quad x\,F, \quad s\,F, \quad (1 - s)\,F + s\,F', \quad F \min(1, L/|F|)
 
-    by ``+``, ``*``, `gated`, `blended` and `limited`; each gives another law, and s is a `Weight`.
+    by ``+``, ``*``, `gated`, `blended` and `limited`; each result is again a law, and s is a `Weight`.
     """
 
     @abstractmethod
     def program(self) -> "Program":
-        """The field as the servo runs it."""
+        """Compiled form of the field, which the servo runs."""
 
     def wrench(self, hand: HandState) -> Wrench:
-        """Force and moment at one hand state, by the compiled laws, at the first tick of a run."""
+        """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
         program, wrench = self.program(), np.empty(6)
         memory = program.fresh_memory()
         program.feed(memory, hand)
@@ -41,7 +41,7 @@ class Law(ABC):
         return Wrench(wrench[:3], wrench[3:])
 
     def description(self) -> dict[str, object]:
-        """The law's name and its parameters by name, in plain data; what a certificate of the law depends on."""
+        """The law's name and its parameters by name, in plain data; a certificate of the law depends on these."""
         return {"law": type(self).__name__, "parameters": parts_of(self)}
 
     def __add__(self, other: "Law") -> "Program":
@@ -61,39 +61,39 @@ class Law(ABC):
         return self.program().joined(other.program(), Join.BLEND, weight.row)
 
     def limited(self, force: float, torque: float = np.inf) -> "Program":
-        """Field whose force [N] and moment [N m] are cut to a length, their direction kept."""
+        """Field whose force [N] and moment [N m] saturate at a norm; their direction is kept."""
         bounds = (("force", force, "N"), ("torque", torque, "N m"))
         return self.program().followed(Join.LIMIT, [checked(*bound, infinite=True) for bound in bounds])
 
 
 class PythonFeed(NamedTuple):
-    """Six numbers in a field's memory, [F (3), τ (3)], that a Python function gives before each evaluation.
+    """Wrench [F (3), τ (3)] in a field's memory that a Python function writes before each evaluation.
 
     Attributes
     ----------
     slot : int
-        Where in the memory.
+        Offset in the memory.
     function : callable
-        From the measured hand to the six numbers.
+        From the measured hand state to the six numbers.
     """
 
     slot: int
     function: Callable[[HandState], Array]
 
     def moved(self, params: int, memory: int) -> "PythonFeed":
-        """The same behind so many more parameters, and numbers of the memory."""
+        """The same feed with its offsets in the parameters and in the memory increased."""
         return self._replace(slot=self.slot + memory)
 
 
 class MapFeed(NamedTuple):
-    """Pose h (nq) and derivative h_* (nv × 6) of a haptic map at the stylus, that a law finds in its memory.
+    """Pose h (nq) and derivative h_* (nv × 6) of a haptic map at the stylus, written into a law's memory.
 
     Attributes
     ----------
     slot : int
-        Where in the memory; the map's own memory is behind them.
+        Offset of h in the memory; h_* and then the map's own memory follow.
     at : int
-        Where in the parameters those of the map are.
+        Offset of the map's parameters among the field's.
     haptic_map : HapticMap
     """
 
@@ -102,7 +102,7 @@ class MapFeed(NamedTuple):
     haptic_map: HapticMap
 
     def moved(self, params: int, memory: int) -> "MapFeed":
-        """The same behind so many more parameters, and numbers of the memory."""
+        """The same feed with its offsets in the parameters and in the memory increased."""
         return self._replace(slot=self.slot + memory, at=self.at + params)
 
 
@@ -119,11 +119,11 @@ class Program(Law):
     memory : Array
         Initial memory. Evaluation writes into a copy of it (`fresh_memory`), one copy for every run.
     kernels : tuple of Kernel
-        Compiled laws, each once; the code of a law's instruction is its kernel's number here.
+        Compiled laws, each once; the code of a law's instruction is its kernel's index here.
     laws : tuple of Law
-        Whose instructions they are, in their order.
+        Laws in the order of their instructions.
     python_feeds, map_feeds
-        What laws are given before each evaluation, besides the hand.
+        Inputs that are written into the memory before each evaluation, besides the hand.
 
     Raises
     ------
@@ -162,9 +162,9 @@ class Program(Law):
         curve: Trajectory | None = None,
         feeds: tuple["PythonFeed | MapFeed", ...] = (),
     ) -> "Program":
-        """One law of force: its kernel, parameters, initial memory and curve, and what it is given before each tick.
+        """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
 
-        Its memory begins at `TRACE_SIZE`.
+        The law's memory begins at `TRACE_SIZE`.
         """
         blob = np.zeros(0) if curve is None else curve.packed()
         ops = np.array([[0, 0, TRACE_SIZE, len(params)]], dtype=np.int64)
@@ -174,7 +174,7 @@ class Program(Law):
         return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps)
 
     def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
-        """Both programs one after the other, and an operation that makes one wrench of theirs."""
+        """Both programs one after the other, then an operation that combines their two wrenches into one."""
         kernels = (*self.kernels, *(kernel for kernel in other.kernels if kernel not in self.kernels))
         gap, kept = len(self.params), len(self.memory) - TRACE_SIZE
         moved = other.ops + np.array([0, gap, kept, gap])
@@ -191,7 +191,7 @@ class Program(Law):
         )
 
     def followed(self, join: Join, params: Sequence[float]) -> "Program":
-        """The program, and an operation on its wrench."""
+        """The program, then an operation on its wrench."""
         ops = np.vstack([self.ops, [[join, len(self.params), 0, 0]]])
         return replace(self, ops=ops, params=np.concatenate([self.params, params]))
 
@@ -205,12 +205,12 @@ class Program(Law):
         return Compiled(units, self.ops, self.params)
 
     def compiled(self) -> Compiled:
-        """Arguments of `evaluate`; its laws are compiled in this process if they have not been."""
+        """First arguments of `evaluate`; laws that are not compiled yet are compiled in this process."""
         return self._compiled
 
     @property
     def python_laws(self) -> tuple[Callable[[HandState], Array], ...]:
-        """Functions that the loop calls at every tick, each for six numbers."""
+        """Functions that the loop calls at every tick, each returning a wrench of six numbers."""
         return tuple(feed.function for feed in self.python_feeds)
 
     def fresh_memory(self) -> Array:
@@ -218,7 +218,7 @@ class Program(Law):
         return self.memory.copy()
 
     def feed(self, memory: Array, hand: HandState) -> None:
-        """Write what its laws are given besides the hand, from Python."""
+        """Write the inputs of the feeds into the memory, from Python (`wrench`; a run uses compiled code for maps)."""
         for slot, function in self.python_feeds:
             memory[slot : slot + 6] = function(hand)
         stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
@@ -229,12 +229,12 @@ class Program(Law):
             memory[first:last] = haptic_map.jacobian(stylus, kept).ravel()
 
     def slot_of(self, law: Law) -> int:
-        """Where in the memory the part of one of its laws begins.
+        """Offset of one of the field's laws in the memory.
 
         Raises
         ------
         ParameterError
-            If it is not one of its laws.
+            If the law is not part of this field.
         """
         for row, own in zip(self.ops[self.ops[:, 0] >= 0], self.laws, strict=True):
             if own is law:
@@ -242,7 +242,7 @@ class Program(Law):
         raise ParameterError(f"{law!r} is no law of this field; it has {', '.join(map(repr, self.laws))}")
 
     def composition(self) -> Iterator[tuple[Law | Join, Array]]:
-        """Laws and operations in their order, as on a pocket calculator, with the numbers of the operations."""
+        """Laws and operations in postfix order, each with the operation's parameters (none for a law)."""
         laws = iter(self.laws)
         for code, at, *_ in self.ops.tolist():
             if code >= 0:
@@ -252,7 +252,7 @@ class Program(Law):
                 yield join, self.params[at : at + {Join.ADD: 0, Join.LIMIT: 2}.get(join, WEIGHT_SIZE)]
 
     def with_law(self, law: Law, other: Law) -> "Program":
-        """The same composition with another law in the place of one of its laws."""
+        """The same composition with `law` replaced by `other`."""
         stack: list[Program] = []
         for what, numbers in self.composition():
             if isinstance(what, Law):
@@ -266,7 +266,7 @@ class Program(Law):
         return stack[0]
 
     def description(self) -> dict[str, object]:
-        """What it is composed of: operations, and its laws with their parameters by name."""
+        """Composition of the field: operations, and laws with their parameters by name."""
         stack: list[dict[str, object]] = []
         for what, numbers in self.composition():
             if isinstance(what, Law):

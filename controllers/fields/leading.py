@@ -1,6 +1,6 @@
-r"""LEADING: the stylus leads a walking figure, and feels how far it can be followed (Donald & Henle 2000, section 8).
+r"""LEADING: the stylus leads a walking figure and feels the limits of its following (Donald & Henle 2000, section 8).
 
-The figure is a `controllers.walking.walker.Walker`, which this law moves.
+The figure is represented by a `controllers.walking.walker.Walker` in the law's memory, which this law advances.
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ from controllers.walking.walker import (
     walker_at,
 )
 
-_HEIGHT = 1.0  # of the pendulum by which it leans [m]
-_FORESIGHT = 1.5  # times the pendulum's length of way
+_HEIGHT = 1.0  # [m] of the linear inverted pendulum that models the figure's sway
+_FORESIGHT = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
 
 
 @njit
@@ -45,11 +45,11 @@ def leading_force(
     p_x, p_y, v_x, v_y : float
         Stylus [m], [m/s].
     x, y, c, s : float
-        Place on the path next to the stylus [m], and its tangent t = (c, s); n = (−s, c).
+        Point of the path nearest to the stylus, on the floor [m], and the tangent t = (c, s) there; n = (−s, c).
     along : float
-        How far along the path that place is from where the figure wants it [m].
+        Arc length of that point minus s + D, where the figure wants it [m].
     back, lead, room : float
-        What the figure can follow backwards, forwards and to each side [m]; u_t and u_n are what lies beyond.
+        Offsets that the figure can follow backwards, forwards and to each side [m]; u_t and u_n are the excess.
     scale, k_l, b : float
         S, k_l [N/m], b [N s/m].
     """
@@ -63,7 +63,7 @@ def leading_force(
 class LeadingGains(NamedTuple):
     """Parameters of `leading_wrench`, before those of the walker.
 
-    k_l [N/m], b [N s/m], k_z [N/m], S, and how far the figure follows forwards and backwards [m].
+    k_l [N/m], b [N s/m], k_z [N/m], S, and the offsets that the figure follows forwards and backwards [m].
     """
 
     k_l: float
@@ -92,7 +92,7 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
     nearest, beyond = min(goal, front), max(goal - front, 0.0)
     a, b, heading, _ = path_place(walker.path, nearest)
     c, s = np.cos(heading), np.sin(heading)
-    # Beyond the path any place can be reached that an arc leads to; on it there is no room to the sides.
+    # At L beyond the path's front an arc of curvature κ_max reaches κ_max L²/2 to the side; on the path room is 0.
     room = 0.5 * follow.curvature * beyond * beyond
     wrench[0], wrench[1] = leading_force(
         p[0], p[1], v[0], v[1], a, b, c, s, nearest - walker.argument[0] - follow.ahead,
@@ -106,37 +106,37 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
 
 @dataclass(frozen=True, eq=False)
 class Leading(Law):
-    r"""Force of a figure that is led, on a stylus that moves over the floor like a carrot on a stick.
+    r"""Force on a stylus that leads a walking figure: the stylus is a moving goal over the floor.
 
     .. math::
         F = -\tfrac{k_l}{S}\,(u_t\,t + u_n\,n) - k_z\,z\,e_z - b\,v, \qquad
         \ddot s = \omega^2 (g - D - s) - 2\,\omega\,\dot s
 
-    The stylus at p is at S p on the floor, and wants to be D ahead of the figure, where the path ends that is laid for
-    its next step. A(g) is the place next to it on the path and, beyond the front, on the straight line on; t and n are
-    tangent and normal there. u_t is the part of g − D − s that lies beyond what the figure follows at its own pace;
-    u_n the part of the stylus's distance from the path that lies beyond what bending it can reach: nothing on the path
-    that is laid, so backwards the hand is guided along it.
+    The stylus at p stands for the point S p on the floor. In equilibrium it is D ahead of the figure, where the path
+    laid for the next step ends. g is the arc length of the path's point nearest to S p (beyond the path's front, of the
+    straight line that continues it), s that of the figure; t and n are the tangent and normal at g. u_t is the part of
+    g − D − s beyond what the figure follows at its own pace; u_n the part of the stylus's distance from the path beyond
+    what bending the path can reach. On the path already laid this reach is zero, so the hand is guided back along it.
 
-    A gait with flight phases needs speed: it begins on the ground, and at each stance decides by its pace whether it
-    flies the next one (`controllers.walking.gait`).
+    A gait with flight phases needs speed: it starts grounded, and at each stance the figure's pace decides whether the
+    next flight phase is taken (`controllers.walking.gait`).
 
-    The figure follows with bounded acceleration and speed. In front the path is laid towards the stylus, bent by at
-    most κ_max, Ω/ṡ and a/ṡ² times the share of its support: 1 on two feet, less on one, 0 on none. On the path that
-    was laid its speed is at most what the same bounds allow. Backwards s decreases; forwards again it increases.
+    The figure follows with bounded acceleration and speed. Ahead, the path is laid towards the stylus with a curvature
+    of at most κ_max, Ω/ṡ and a/ṡ², scaled by the support: 1 in double support, less in single support, 0 in flight. On
+    the path already laid the same bounds limit its speed. Led backwards s decreases; forwards again it increases.
 
     Parameters
     ----------
     gait : Gait
-        Of the figure.
+        Gait of the figure.
     start : tuple of two floats
-        Where the stylus is D ahead of the figure at s = 0, in H [m].
+        Position of the stylus in H [m] at which it is D ahead of the figure at s = 0.
     heading : float
-        There [rad], from the x axis of H.
+        Heading of the path there [rad], from the x axis of H.
     scale : float
-        S, metres on the floor for one of the stylus.
+        S, metres on the floor for one metre of the stylus.
     k_l, k_z : float
-        Stiffness of what discourages, and of the plane z = 0 [N/m].
+        Stiffness of the force that resists leaving what the figure can follow, and of the plane z = 0 [N/m].
     b : float
         Damping [N s/m].
     rate : float
@@ -144,17 +144,18 @@ class Leading(Law):
     pull : float
         Largest |s̈| [m/s²].
     forward, backward : float
-        Largest speeds, times the gait's own.
+        Largest speeds, in multiples of the gait's own speed.
     turn_two, turn_one : float
-        Ω, largest turn rates on two feet and on one [rad/s].
+        Ω, largest turn rates in double and in single support [rad/s].
     lateral : float
         a, largest lateral acceleration [m/s²].
     curvature : float
         κ_max [1/m].
     take_off, landing : float
-        Paces, times the gait's own, from which on a gait that flies does so, and below which it stays on the ground.
+        Speeds, in multiples of the gait's own, above which a running gait takes its flight phases, and below which it
+        stays grounded.
     haste : float
-        Largest |s̈| while it flies from step to step [m/s²].
+        Largest |s̈| while the gait has flight phases [m/s²].
 
     Raises
     ------
@@ -203,9 +204,9 @@ class Leading(Law):
 
     @cached_property
     def shares(self) -> Array:
-        """Share of the largest turn rate that the support allows, at equal steps of the lap.
+        """Fraction of the largest turn rate that the support (feet on the floor) allows, at equal steps of the lap.
 
-        A row of the path turns it over three steps, so each share is the least over these.
+        A row of the path turns it over three steps of its grid, so each share is the least within 1.5 steps around it.
         """
         counts, gait = self.gait.support, self.gait
         share = np.array([0.0, self.turn_one / self.turn_two, 1.0])[counts]
@@ -231,12 +232,12 @@ class Leading(Law):
 
     @property
     def ahead(self) -> float:
-        """D, how far ahead of the figure its path is laid [m]: a foot finds its place there, and a bend its lean."""
+        """D, length of path laid ahead of the figure [m]: enough to place a foot, and to lean into a bend in time."""
         return max(self.gait.reach, _FORESIGHT * self._sway) + MARGIN * STEP
 
     @property
     def _sway(self) -> float:
-        """Way over which an inverted pendulum falls by a factor of e at the gait's own speed [m]."""
+        """Distance covered at the gait's own speed while an inverted pendulum falls by a factor of e [m]."""
         return self.gait.speed * float(np.sqrt(_HEIGHT / GRAVITY))
 
     def path(self) -> Array:
@@ -250,13 +251,13 @@ class Leading(Law):
         return self._program
 
     def walker(self, memory: Array, slot: int = TRACE_SIZE) -> Walker:
-        """The walker of a run, for whoever shows or measures it: views of the memory.
+        """The walker of a run as views of the memory, for display and measurement.
 
         Parameters
         ----------
         memory : Array
-            Of the field's program, or of one that this field is a part of.
+            Memory of the field's program, or of a program that contains this field.
         slot : int
-            Where the field's part begins (see `Program.slot_of`).
+            Offset of this field in it (see `Program.slot_of`).
         """
         return walker_at.py_func(memory, slot)

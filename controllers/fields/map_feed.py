@@ -1,7 +1,6 @@
-"""What laws read of a haptic map: its pose and derivative at the stylus, written before they are evaluated.
+"""Inputs of laws from a haptic map: its pose and derivative at the stylus, written to their memory in each tick.
 
-Only where a map is at hand can this be done, so the laws of force do not depend on the maps: the servo calls
-`feed_maps` before `evaluate`.
+The servo calls `feed_maps` before `evaluate`, so the kernels of the laws do not depend on those of the maps.
 """
 
 import numpy as np
@@ -14,7 +13,7 @@ from controllers.state import HAND_POSITION, Array, IntArray
 
 
 def feed_rows(feeds: tuple[MapFeed, ...]) -> IntArray:
-    """A field's `map_feeds` as numbers, shape (n, 6): slot, at, kind and number of parameters, nq, nv."""
+    """A field's `map_feeds` as numbers, shape (n, 6): slot, at, kind of map, number of parameters, nq, nv."""
     rows = np.zeros((len(feeds), 6), dtype=np.int64)
     for row, (slot, at, haptic_map) in zip(rows, feeds, strict=True):
         kind, params, _ = haptic_map.compiled()
@@ -29,11 +28,11 @@ def feed_maps(units: IntArray, feeds: IntArray, params: Array, memory: Array, ha
     Parameters
     ----------
     units : IntArray
-        Of the maps (see `controllers.haptic_map.evaluate`).
+        Addresses of the maps' kernels (see `controllers.haptic_map.evaluate`).
     feeds : IntArray
         See `feed_rows`.
     params, memory, hand
-        As `controllers.fields.program.evaluate` takes them.
+        As in `controllers.fields.program.evaluate`.
     """
     stylus = hand[HAND_POSITION : HAND_POSITION + STYLUS]
     for n in range(feeds.shape[0]):

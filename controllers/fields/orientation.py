@@ -55,8 +55,8 @@ class Orientation(Law):
     the curve's angular velocity at t*. τ is finite everywhere, with |log| ≤ π. Its switching sets: α = π, where both
     ways round are equally short and τ changes its sign, and where t* jumps (the medial axis of the curve).
 
-    A device with three motors, such as the Phantom, cannot give a moment: it is evaluated and recorded (the last
-    three numbers of the channel ``field``), and the limiter drops it. A device that can would take it as it is.
+    A device with three motors, such as the Phantom, cannot render a moment: τ is evaluated and recorded (the last
+    three numbers of the channel ``field``), and the limiter drops it. A device with six motors would take it as it is.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Laws of one's own: a function becomes a field."""
+"""User-defined laws of force: the decorator `law` turns a function into a field."""
 
 import inspect
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def law(function: _Function) -> PythonLaw: ...
 @overload
 def law(*, compiled: bool) -> Callable[[_Function], PythonLaw | CompiledLaw]: ...
 def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
-    """Make a law of a function ``law(hand, parameter=default, ...)`` that gives a force, or force and moment.
+    """Make a law from a function ``law(hand, parameter=default, ...)`` that returns a force, or force and moment.
 
     ::
 
@@ -28,20 +28,20 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
             depth = -1e-3 - hand.p[2]
             return (0, 0, max(0.0, k * depth - b * hand.v[2])) if depth > 0 else (0, 0, 0)
 
-    is a law with these parameters, and ``floor(k=300.0)`` one with others. With ``@law(compiled=True)`` the function is
-    compiled by numba, and the servo need not call Python.
+    is a law with these parameters, and ``floor(k=300.0)`` the same law with another stiffness. With
+    ``@law(compiled=True)`` numba compiles the function, and the servo need not call Python.
 
     Parameters
     ----------
     function : callable
         From a `controllers.state.HandState` to three numbers, the force F_H [N], or six, with the moment [N m].
     compiled : bool
-        Whether it is compiled.
+        Whether the function is compiled.
 
     Raises
     ------
     ParameterError
-        If its first argument is not ``hand``, another one has no number as its default, or it cannot be compiled.
+        If the first argument is not ``hand``, another one has no number as its default, or it cannot be compiled.
     """
     make = CompiledLaw if compiled else PythonLaw
 

@@ -1,7 +1,7 @@
-"""The evaluation of a field: one compiled chain over its instructions, whatever it is composed of.
+"""Evaluation of a field: one compiled interpreter of its instructions, the same for every composition.
 
-Every law has a kernel with the same arguments, which is called by its address: so nothing is compiled that is not used,
-and a law of one's own is called like any other.
+Every law has a kernel with the same signature, called by its address: so only kernels that are used are compiled, and
+a user-defined law is called like a built-in one.
 """
 
 from typing import NamedTuple
@@ -20,12 +20,12 @@ _call = kernel_call(LAW_ARGUMENTS)
 
 
 class Compiled(NamedTuple):
-    """A field as `evaluate` takes it: ``evaluate(*program.compiled(), memory, hand, wrench)``.
+    """First arguments of `evaluate`: ``evaluate(*program.compiled(), memory, hand, wrench)``.
 
     Attributes
     ----------
     units : IntArray, shape (kernels,)
-        Addresses of the compiled kernels of its laws, 0 for one that is not compiled.
+        Addresses of the compiled kernels of the laws, 0 for one that is not compiled.
     ops : IntArray, shape (n, 4)
         Instructions.
     params : Array
@@ -39,15 +39,15 @@ class Compiled(NamedTuple):
 
 @njit
 def evaluate(units: IntArray, ops: IntArray, params: Array, memory: Array, hand: Array, wrench: Array) -> None:
-    """Field's wrench at one tick.
+    """Wrench of a field at one tick.
 
     Parameters
     ----------
     units, ops, params
         See `Compiled`.
     memory : Array
-        Of the program, written: state of the laws, and the trace in the first `TRACE_SIZE` numbers (see
-        `instructions`).
+        Memory of the program, written: the trace in the first `TRACE_SIZE` numbers (see `instructions`), then the
+        state of the laws.
     hand : Array, shape (15,)
         State of the hand (see `controllers.state`).
     wrench : Array, shape (6,)

@@ -1,4 +1,4 @@
-"""A law of force in plain Python, wherever a compiled one can stand."""
+"""Laws of force in plain Python, usable wherever a compiled law is."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,8 +22,8 @@ def given_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, h
 class PythonLaw(FunctionLaw):
     """Field computed by a Python function at every tick of the servo.
 
-    It composes like any other: the loop calls the function between sensing and the compiled rest of the tick. What the
-    function keeps between ticks is its own affair. Parameters are those of `FunctionLaw`.
+    It composes like any other law: the loop calls the function between sensing and the compiled rest of the tick. State
+    that the function keeps between ticks is not part of the field's memory. Parameters are those of `FunctionLaw`.
     """
 
     @cached_property
@@ -32,5 +32,5 @@ class PythonLaw(FunctionLaw):
         return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))
 
     def program(self) -> Program:
-        """Compiled form of the field: a place for the function's six numbers."""
+        """Compiled form of the field: a kernel that reads the function's six numbers from the memory."""
         return self._program

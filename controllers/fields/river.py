@@ -27,7 +27,7 @@ Flow = Callable[[float, Array], Array]
 
 @njit
 def river_flow(curve: Array, inverse_tau: float, inverse_square: float, p: Array, guess: float, flow: Array) -> float:
-    """Write V(p) = w(d/ε) (φ̇(t*) + (φ(t*) − p)/τ) [m/s] and return t*; the curve is packed at ``curve[0:]``."""
+    """Write V(p) = w(d/ε) (φ̇(t*) + (φ(t*) − p)/τ) [m/s] to `flow` and return t*; `curve` is a packed curve."""
     phase, distance = closest_phase(curve, 0, p[0], p[1], p[2], guess)
     p_curve, v_curve = curve_point(curve, 0, phase), curve_velocity(curve, 0, phase)
     w = window(distance * distance * inverse_square)
@@ -38,12 +38,12 @@ def river_flow(curve: Array, inverse_tau: float, inverse_square: float, p: Array
 
 @dataclass(frozen=True, eq=False)
 class River(Law):
-    r"""Tube of radius ε around a curve, with a current that runs along the curve and draws onto it.
+    r"""Tube of radius ε around a curve, with a current along the curve and towards it.
 
     .. math:: V(p) = w(d/\varepsilon)\,\bigl(\dot\varphi(t^*) + (\varphi(t^*) - p)/\tau\bigr)
 
-    As a *flow*, V is a velocity: `flow`, integrated by `integrate`. As a *force* it is what a viscous current does to
-    a hand in it, F = b (V − w v), which is FOLLOW with k_r = b/τ and b_d = b.
+    As a *flow*, V is a velocity (`flow`, integrated by `integrate`). As a *force* it is the drag of a viscous current
+    on the hand, F = b (V − w v), which is FOLLOW with k_r = b/τ and b_d = b.
 
     Parameters
     ----------
@@ -52,19 +52,19 @@ class River(Law):
     epsilon : float
         ε [m], may be infinite. V is continuous if ε is below `Trajectory.reach`.
     tau : float
-        τ, time in which the current draws onto the curve [s].
+        τ, time constant of the current towards the curve [s].
     drag : float
         b, force per velocity between current and hand [N s/m].
     speeds : array_like, shape (m, 2), optional
         Least and greatest speed of a hand that the river takes [m/s], at m phases equally spaced from the curve's
-        start to its end, linear between them; without them, the curve's own speed. Only fields of higher order
-        (`HigherOrder`) look at it.
+        start to its end, linear between them; without them, the curve's own speed. Only higher-order fields
+        (`HigherOrder`) use them.
 
     Raises
     ------
     ParameterError
-        If τ is below 1e-4 s, ε below 1e-4 m, b negative, one of them not finite (but ε), or the speeds are not
-        pairs 0 ≤ least ≤ greatest.
+        If τ is below 1e-4 s, ε below 1e-4 m, b negative, τ or b not finite, or the speeds are not pairs
+        0 ≤ least ≤ greatest.
     """
 
     curve: Trajectory
@@ -125,16 +125,16 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_st
     start : array_like, shape (3,)
         p at the first time, in H [m].
     times : array_like, shape (n,)
-        When the curve is wanted, increasing [s].
+        Output times, increasing [s].
     longest_step : float
-        Largest step [s]; a step much longer than a river is wide could leap over it.
+        Largest integration step [s]; a much longer step could pass over a narrow river unnoticed.
 
     Raises
     ------
     ControllerError
         If the integration fails.
     """
-    from scipy.integrate import solve_ivp  # the servo integrates nothing, and imports this file
+    from scipy.integrate import solve_ivp  # here, since the servo imports this file and does not need it
 
     wanted = np.asarray(times, dtype=float)
     solution = solve_ivp(
@@ -147,7 +147,7 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike, longest_st
 
 
 def settling_time(start: float, end: float, epsilon: float, tau: float) -> float:
-    r"""Time [s] in which a river draws a point from one distance of its curve to another.
+    r"""Time [s] in which the flow of a river carries a point from one distance from its curve to a smaller one.
 
     Within the reach the gradient of d is normal to φ̇, so ḋ = −w(d/ε) d/τ whatever the curve, and with q = (d/ε)²
 
@@ -159,7 +159,7 @@ def settling_time(start: float, end: float, epsilon: float, tau: float) -> float
     start, end : float
         Distances d [m], 0 < end ≤ start < ε.
     epsilon, tau : float
-        Of the river [m], [s].
+        Radius [m] and time constant [s] of the river.
 
     Raises
     ------

@@ -1,15 +1,16 @@
-r"""Soft walls: joint limits of a haptic map's target, felt by the hand through the map's transposed Jacobian.
+r"""Soft walls: repulsion from the figure's joint limits, pulled back to the hand by the map's transposed Jacobian.
 
-With q = h(x), its rates q̇ = h_* ẋ and for every joint angle or component of a rotation vector r_i an interval,
+With q = h(x), its rates q̇ = h_* ẋ and an interval [a_i, b_i], the limits drawn in by the margin m, for every hinge
+angle or component of a ball joint's rotation vector r_i,
 
 .. math:: F = -h_*^T \left(\nabla P(q) + \sum_j d\,\frac{(|\omega_j| - \omega_{max})_+}{|\omega_j|}\,\omega_j\right),
           \qquad P = \sum_i U(r_i - b_i) + U(a_i - r_i)
 
-with U'(e) = k e²/2m up to e = m, k (e − m/2) beyond, 0 below: a spring that sets in softly, m [rad] before the limit
-itself. The first part is −∇(P∘h): a potential, which gives back what it took. The second only takes: its power is
-−Σ d (|ω_j| − ω_max)_+ |ω_j|.
+with U'(e) = 0 for e < 0, k e²/2m for e up to m and k (e − m/2) beyond: a spring with a smooth onset, m [rad] before
+the limit itself. The first part is conservative: −∇(P∘h) returns the energy that it stored. The second is dissipative,
+with power −Σ d (|ω_j| − ω_max)_+ |ω_j|.
 
-h and h_* at the stylus are given to the law in its memory before it is evaluated (`controllers.fields.map_feed`).
+h and h_* at the stylus are written to the law's memory before it is evaluated (`controllers.fields.map_feed`).
 """
 
 from dataclasses import dataclass
@@ -28,13 +29,14 @@ from controllers.rotations import logarithm, rotation_vector_rate
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array
 from controllers.work_array import work_array
 
-_COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9  # of a joint: three intervals follow; a hinge has one
+# Layout of a joint's row: [column of qpos, row of qvel, is a ball joint, three intervals (a hinge uses the first)].
+_COLUMN, _ROW, _BALL, _LIMITS, _JOINT = 0, 1, 2, 3, 9
 
 
 class WallGains(NamedTuple):
-    """Parameters of `soft_wall_wrench`; a row for each joint follows, and what its map is made of.
+    """Parameters of `soft_wall_wrench`; a row for each joint and the parameters of the map follow.
 
-    nq and nv, how many joints, k [N m/rad], m [rad], d [N m s/rad] and ω_max [rad/s].
+    nq and nv, number of joints, k [N m/rad], m [rad], d [N m s/rad] and ω_max [rad/s].
     """
 
     nq: float
@@ -51,7 +53,7 @@ _HEADER = len(WallGains._fields)
 
 @njit
 def wall_slope(angle: float, low: float, high: float, stiffness: float, margin: float) -> float:
-    """U'(r − b) − U'(a − r) [N m] with a and b the margin within the limits; continuous, with its derivative."""
+    """U'(r − b) − U'(a − r) [N m], a and b the limits [rad] drawn in by the margin; continuously differentiable."""
     excess = max(angle - high, low - angle) + margin
     if excess <= 0.0:
         return 0.0
@@ -61,7 +63,10 @@ def wall_slope(angle: float, low: float, high: float, stiffness: float, margin: 
 
 @njit
 def _is_clear(params: Array, limits: int, margin: float, vector: Array) -> bool:
-    """Whether no wall of a ball joint can be near, by the vector part (3,) of its quaternion: |r_i| ≤ π |q_i|."""
+    """Whether a ball joint is surely off its walls, by its quaternion's vector part (3,) and |r_i| ≤ π |q_i|.
+
+    A cheap test that spares the logarithm for most joints.
+    """
     for i in range(3):
         low, high = params[limits + 2 * i], params[limits + 2 * i + 1]
         if np.pi * abs(vector[i]) > min(high, -low) - margin:
@@ -71,7 +76,7 @@ def _is_clear(params: Array, limits: int, margin: float, vector: Array) -> bool:
 
 @njit
 def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Array, torque: Array) -> None:
-    """∇P and the damper's torque of one joint, written to `torque` (3,); its rates (3,) are ω."""
+    """Write ∇P plus the damper's torque of one joint [N m] to `torque` (3,); `rates` (3,) are its ω [rad/s]."""
     k, m = gains.stiffness, gains.margin
     column, limits = int(params[joint + _COLUMN]), joint + _LIMITS
     if params[joint + _BALL] == 0.0:
@@ -95,7 +100,7 @@ def _torque(gains: WallGains, params: Array, joint: int, pose: Array, rates: Arr
 
 @njit
 def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `SoftWall`: parameters see `WallGains`, memory [h (nq), h_* (nv × 6), that of the map]."""
+    """Kernel of `SoftWall`: parameters see `WallGains`, memory [h (nq), h_* (nv × 6), memory of the map]."""
     gains = WallGains(
         params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]
     )  # fmt: skip
@@ -121,24 +126,24 @@ def soft_wall_wrench(params: Array, at: int, curve: int, memory: Array, slot: in
 
 @dataclass(frozen=True, eq=False)
 class SoftWall(Law):
-    r"""Limits of joint angles and joint speeds of a haptic map's target, felt in the control space.
+    r"""Limits of the figure's joint angles and joint speeds, felt by the hand.
 
-    The force is continuous wherever h_* is, finite, and as large as h_* makes it: compose it with
-    `Program.limited`. A joint turned by half a turn or more from rest has no unique rotation vector: there the force
-    may jump.
+    The force is finite and continuous wherever h_* is, but unbounded where h_* is large: compose it with
+    `Law.limited`. A ball joint turned by half a turn or more from its zero has no unique rotation vector: there the
+    force may jump.
 
     Parameters
     ----------
     haptic_map : HapticMap
         h.
     columns, rows : sequence of int
-        Where each joint's numbers begin in a configuration and in a tangent.
+        Index of each joint's first number in a configuration (qpos) and in a tangent (qvel).
     limits : sequence of Array
-        Of each joint: shape (1, 2) of a hinge [rad], (3, 2) of a ball joint's rotation vector [rad].
+        Interval of each joint: shape (1, 2) for a hinge [rad], (3, 2) for a ball joint's rotation vector [rad].
     stiffness : float
         k [N m/rad].
     margin : float
-        m, before the limit, where the wall begins [rad].
+        m, angle before the limit at which the wall begins [rad].
     damping : float
         d [N m s/rad].
     speed : float
@@ -199,5 +204,5 @@ class SoftWall(Law):
         return Program.of(self, soft_wall_wrench, numbers, np.concatenate([given, memory]), feeds=(feed,))
 
     def program(self) -> Program:
-        """Compiled form of the field; in a new run the map's lap has just begun."""
+        """Compiled form of the field; a new run starts with the initial memory of the map."""
         return self._program

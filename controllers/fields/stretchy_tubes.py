@@ -1,4 +1,4 @@
-"""STRETCHY TUBES: a curve that is sought, taken hold of and bent like rubber (Donald & Henle 2000, section 4)."""
+"""STRETCHY TUBES: a deformable guide; a curve is found, grasped and bent like rubber (Donald & Henle 2000, sec. 4)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,17 +31,17 @@ from controllers.fields.instructions import TRACE_SIZE, leave_trace
 from controllers.fields.law import Law, Program
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
 
-CLICK_DISTANCE = 1e-3  # [m] a press that carries the stylus less far is a click and no edit
-CLICK_TIME = 0.4  # [s] a shorter click takes the last edit back, a longer one makes it again
+CLICK_DISTANCE = 1e-3  # [m] a press during which the stylus moves less than this is a click, not an edit
+CLICK_TIME = 0.4  # [s] a shorter click undoes the last edit, a longer one redoes it
 
 NEW, SEEKING, HOLDING, PROBING, PUSHING, IDLE = (float(mode) for mode in range(6))
-# Memory: phase t*, mode, when and where the switch was pressed, how far the stylus was carried since, the normal of a
-# push, FOLLOW's gains, how far off the stylus a held point ever was, then the record of the curve.
+# Memory: phase t*, mode, time and position (3) of the last press, largest distance of the stylus from there, normal (3)
+# of a push, FOLLOW's gains (3), largest distance of a held point from the stylus, then the record of the curve.
 _PHASE, _MODE, _SINCE, _PRESSED, _CARRIED, _NORMAL, _GAINS, _OFF, _RECORD = 0, 1, 2, 3, 6, 7, 10, 13, 14
 
 
 class StretchyGains(NamedTuple):
-    """Parameters of `stretchy_wrench`: k_f and k_s [N/m], b [N s/m], ε [m], the end and the ease [s], and p_0."""
+    """Parameters of `stretchy_wrench`: k_f and k_s [N/m], b [N s/m], ε [m], `until` and `ease` [s], flag of `hold`."""
 
     seek: float
     stretch: float
@@ -60,7 +60,7 @@ def stretch_force(p: float, v: float, target: float, stiffness: float, damping: 
 
 @njit
 def eased_share(t: float, seconds: float) -> float:
-    """Share σ = x³ (10 − 15 x + 6 x²), x = t/T, that FOLLOW has at t [s] of an easing of T [s], which may be 0; C²."""
+    """Weight σ = x³ (10 − 15 x + 6 x²), x = t/T, of FOLLOW at t [s] in a transition of T [s], which may be 0; C²."""
     if t >= seconds:
         return 1.0
     x = max(t, 0.0) / seconds
@@ -69,7 +69,7 @@ def eased_share(t: float, seconds: float) -> float:
 
 @njit
 def _press(radius: float, memory: Array, slot: int, hand: Array, distance: float) -> None:
-    """The switch goes down: hold the tube that the stylus is in, or become a probe that pushes tubes."""
+    """Switch pressed: hold the tube if the stylus is inside it, otherwise become a probe that pushes it."""
     memory[slot + _SINCE], memory[slot + _CARRIED] = hand[HAND_TIME], 0.0
     for i in range(3):
         memory[slot + _PRESSED + i] = hand[HAND_POSITION + i]
@@ -83,7 +83,7 @@ def _press(radius: float, memory: Array, slot: int, hand: Array, distance: float
 
 @njit
 def _release(memory: Array, slot: int, time: float) -> None:
-    """The switch goes up: keep the edit, or, after a click on the curve, take one back or make it again."""
+    """Switch released: commit the edit, or, after a click on the curve, undo or redo one."""
     record, mode = slot + _RECORD, memory[slot + _MODE]
     if mode == PUSHING or (mode == HOLDING and memory[slot + _CARRIED] >= CLICK_DISTANCE):
         commit(memory, record)
@@ -99,7 +99,7 @@ def _release(memory: Array, slot: int, time: float) -> None:
 
 @njit
 def _touch(radius: float, memory: Array, slot: int, p: Array, distance: float) -> None:
-    """A probe that gets into a tube begins to push it, along the normal at which they met."""
+    """A probe that enters the tube begins to push it, along the normal of the first contact."""
     record = slot + _RECORD
     if distance < radius and take_hold(memory, record, memory[slot + _PHASE]):
         memory[slot + _MODE] = PUSHING
@@ -109,7 +109,7 @@ def _touch(radius: float, memory: Array, slot: int, p: Array, distance: float) -
 
 @njit
 def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
-    """Carry the curve ahead of a probe, such that it stays at the tube's surface: how far [m]; at 0 it lets go."""
+    """Bend the curve so that the probe stays on the tube's surface; returns its depth [m], at 0 contact is lost."""
     record = slot + _RECORD
     depth = radius
     for i in range(3):
@@ -129,14 +129,14 @@ def _push(radius: float, memory: Array, slot: int, p: Array) -> float:
 
 @njit
 def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `StretchyTubes`: parameters `StretchyGains`; the memory holds the curve, see the module."""
+    """Kernel of `StretchyTubes`: parameters `StretchyGains`, memory see above `_PHASE`; it contains the curve."""
     gains = StretchyGains(
         params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]
     )  # fmt: skip
     p, v, record = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3], slot + _RECORD
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
-        # What is not finite must reach the limiter, and must not reach the curve.
+        # Non-finite input must reach the limiter, which latches a fault, and must not corrupt the stored curve.
         wrench[:3] = np.nan
         return
     if memory[slot + _MODE] == NEW:
@@ -192,7 +192,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
 
 @dataclass(frozen=True, eq=False)
 class StretchyTubes(Law):
-    r"""Field in which a curve is found, taken hold of, and bent: the tube about it yields and resists like rubber.
+    r"""Field in which a curve is found, grasped and bent: the tube about it yields and resists like rubber.
 
     .. math::
         \text{switch open:}\quad & F = k_f\,(c(p) - p) - b\,v \\
@@ -200,41 +200,43 @@ class StretchyTubes(Law):
         \text{pushed:}\quad      & F = k_s\,s\,n - b\,v, \qquad \varphi'(t_j) = p_0 - s\,n,\;
                                    s = \langle\varepsilon - n \cdot (p - p_0)\rangle
 
-    c(p) = φ(t*) is the nearest point of the curve. A press of the switch within ε of it takes hold of p_0 = φ(t_j),
-    t_j = t* (in the paper's form p_0 is the stylus's place then, so that a held tube does not pull at once, but the
-    search that it takes the place of did), which from then on is at the stylus, and the curve is bent with it (see
-    `controllers.curves.deformation`). A press farther off makes the stylus a probe: it feels nothing until it meets
-    the tube of radius ε, then pushes it along the normal n of the contact, without friction. Letting go of the switch
-    commits. A press on the curve that carries the stylus less than 1 mm is a click: a short one (under 0.4 s) undoes
-    the last edit, a longer one makes it again.
+    c(p) = φ(t*) is the nearest point of the curve. A press of the switch within ε of it grasps φ(t_j), t_j = t*: from
+    then on this point follows the stylus, and the curve is bent with it (see `controllers.curves.deformation`). p_0 is
+    the grasped point φ(t_j) at the press; in the paper's form (`hold` "stylus") it is the stylus's position at the
+    press, where the held tube does not pull at first although the search spring before it did.
 
-    F leaps at the switch (unless k_f = k_s) and nowhere else within the curve's reach, open ends excepted.
+    A press farther off makes the stylus a probe: it feels only damping until it meets the tube of radius ε, then pushes
+    it along the normal n of the contact, without friction. Releasing the switch commits the edit. A press on the curve
+    during which the stylus moves less than 1 mm is a click: a short one (under 0.4 s) undoes the last edit, a longer
+    one redoes it.
+
+    F jumps at the switch (unless k_f = k_s) and nowhere else within the curve's reach, except at open ends.
 
     Parameters
     ----------
     curve : Trajectory
-        φ before it is bent, in the hand frame H.
+        φ before any edit, in the hand frame H.
     k_f : float
-        Stiffness of the search [N/m].
+        Stiffness of the search spring (switch open) [N/m].
     k_s : float
         Stiffness of the rubber [N/m].
     b : float
         Damping [N s/m]; the paper has none.
     hold : {"curve", "stylus"}
-        Whether p_0 of a held tube is φ(t_j), or the stylus's place when it was taken hold of.
+        Whether p_0 of a held tube is φ(t_j), or the stylus's position, both at the press.
     epsilon : float
         ε, radius of the tube [m].
     width : float
         h, half the width of a bump [s]; see `controllers.curves.editing.record_of`.
     until : float
-        When stretching ends [s]; may be infinite. An edit that is under way then is committed.
+        Time at which stretching ends [s]; may be infinite. An edit in progress then is committed.
     then : Follow, optional
-        Gains with which the bent curve is performed from then on; needed if there is an end. Its curve is not used.
+        Gains with which the bent curve is performed from then on; needed if `until` is finite. Its curve is not used.
     ease : float
-        T, in which the search goes over into the performance [s]: F = (1 − σ) F_open + σ F_follow, with
-        σ = x³ (10 − 15x + 6x²), x = t/T. A body that stands cannot go on at once at the speed of a walk.
+        T, duration of the transition from search to performance [s]: F = (1 − σ) F_open + σ F_follow, with
+        σ = x³ (10 − 15x + 6x²), x = t/T. A standing body cannot reach the speed of a walk at once.
     depth : int
-        How many edits can be undone.
+        Number of edits that can be undone.
 
     Raises
     ------
@@ -282,12 +284,12 @@ class StretchyTubes(Law):
         return Program.of(self, stretchy_wrench, gains, memory)
 
     def program(self) -> Program:
-        """Compiled form of the field; the curve lies in its memory, where it is bent."""
+        """Compiled form of the field; its memory contains the curve, which is bent there."""
         return self._program
 
     @staticmethod
     def record_at(slot: int = TRACE_SIZE) -> int:
-        """Where in the memory of a run the record of the curve begins; before it lies the state of the law."""
+        """Offset of the curve's record in the memory of a run, behind the state of the law."""
         return slot + _RECORD
 
     def edited(self, memory: Array, slot: int = TRACE_SIZE) -> Trajectory:
@@ -296,14 +298,14 @@ class StretchyTubes(Law):
         Parameters
         ----------
         memory : Array
-            Of the field's program, or of one that this field is a part of.
+            Memory of the field's program, or of a program that contains this field.
         slot : int
-            Where the field's part begins: the third number of its row of instructions.
+            Offset of this field in it: the third number of its instruction.
         """
         return curve_of(memory, slot + _RECORD, self.curve)
 
     def edits(self, memory: Array, slot: int = TRACE_SIZE) -> Array:
-        """Edits in force in the memory of a run, [t̂ [s], h [s], δ̂ (3) [m]] each, shape (n, 5), n up to `depth`."""
+        """Current edits in the memory of a run, each [t̂ [s], h [s], δ̂ (3) [m]]; shape (n, 5), n up to `depth`."""
         record = memory[slot + _RECORD :]
         table, count = int(record[TABLE]), int(record[COUNT])
         return record[table : table + EDIT * count].reshape(count, EDIT).copy()

@@ -1,1 +1,1 @@
-"""Haptic maps: every stylus pose is a pose of something with many joints."""
+"""Haptic maps: from stylus poses to configurations of a figure or a robot arm."""

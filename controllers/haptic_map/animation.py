@@ -1,4 +1,4 @@
-"""What maps that blend clips have in common: clips become loops, and a lap of the hand is a lap of every clip."""
+"""Base classes of the maps that blend clips: clips become loops, and a lap of the hand plays a lap of every clip."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
@@ -19,22 +19,22 @@ Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
 
 
 class ClipMap(HapticMap):
-    """A map whose poses are made of clips by a kernel, and whose memory is the frame of the lap.
+    """A map whose kernel computes poses from clips, and whose memory is the frame of the lap.
 
     Parameters
     ----------
     kind : int
-        Which kernel (see `evaluate`).
+        Number of the kernel (see `evaluate`).
     kernel : Kernel
-        It: (params, x, memory, pose, jacobian).
+        Compiled function (params, x, memory, pose, jacobian).
     params : Array
-        What it reads.
+        Parameters of the kernel.
     clips : sequence of (Array, float)
-        What it was made of: poses (n, nq) and frames per second.
+        Clips that the map is made of: poses (n, nq) and frames per second.
     names : sequence of str
-        Of the clips, all different.
+        Names of the clips, all different.
     limbs : sequence of Limb
-        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
     drifts : Array, shape (m, 3)
         ξ of each clip (see `loops`).
     """
@@ -50,7 +50,7 @@ class ClipMap(HapticMap):
         drifts: Array,
     ) -> None:
         self._kind, self._kernel, self._params = kind, kernel, params
-        # As they were given: what is made of them again is the same to the last bit.
+        # Stored as given, so that a map made of them again is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
         self.names, self.limbs, self._travels = tuple(names), tuple(limbs), bool(drifts.any())
 
@@ -66,20 +66,20 @@ class ClipMap(HapticMap):
 
     @property
     def lap_seconds(self) -> float:
-        """Time of a lap at which the clips run, on average, at their own pace [s]."""
+        """Duration of a lap at which the clips run on average at their own pace [s]."""
         return float(np.mean([(len(poses) - 1) / fps for poses, fps in self.clips]))
 
     @property
     def travels(self) -> bool:
-        """Whether a lap moves or turns the figure, so that h depends on the laps done."""
+        """Whether a lap moves or turns the figure, so that h depends on the number of laps done."""
         return self._travels
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
+        """The map in the form of its kernel, with the memory of a new run."""
         return CompiledMap(self._kind, self._params, fresh_lap())
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
         return self._evaluate(x, memory, 0)[0]
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
@@ -101,28 +101,28 @@ class AnimationMap(ClipMap):
     Parameters
     ----------
     kind : int
-        Which kernel (see `evaluate`).
+        Number of the kernel (see `evaluate`).
     kernel : Kernel
-        It: (params, x, memory, pose, jacobian).
+        Compiled function (params, x, memory, pose, jacobian).
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second; a pose is root position, root quaternion, then joint quaternions (wxyz).
         Clips that do not close are closed (`closed_loop`), travelling ones brought in step (`strides`), and all
         are aligned to the first in time (`alignment`).
     numbers : sequence of float
-        What the kernel reads before the blend's own parameters.
+        Parameters of the kernel before those of the blend.
     second_group : sequence of int
-        Joints, counted from 1, whose weights are the second group's.
+        Joints, counted from 1, that are blended with the second group of weights.
     limbs : sequence of Limb
-        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
     lap : float, optional
-        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+        Duration of the hand's lap [s], in which each clip is played as often as it fits (`strides`); by default once.
     apart : bool
-        Whether legs are one clip's, so that strides of the clips need not be in step.
+        Whether the legs are those of one clip, so that strides of the clips need not be in step.
 
     Raises
     ------
     ParameterError
-        If the clips are not of the same kind of pose, or have not the joints of a limb or of the second group.
+        If the clips' poses differ in size, or lack joints of a limb or of the second group.
     """
 
     def __init__(
@@ -157,21 +157,21 @@ class AnimationMap(ClipMap):
 
     @property
     def lap_seconds(self) -> float:
-        """Time of a lap at which the clips run, on average and as often as it plays them, at their own pace [s]."""
+        """Duration of a lap at which the clips, with their repeats, run on average at their own pace [s]."""
         return self._lap_seconds
 
     def lap_array(self) -> dict[str, Array]:
-        """The lap that it was made for, as an array by key; none without."""
+        """The lap that the map was made for, as an array by key; empty without one."""
         return {} if self.lap is None else {"lap": np.array([self.lap])}
 
 
 def kept_lap(arrays: Mapping[str, Array]) -> float | None:
-    """The lap of what `lap_array` gave.
+    """The lap [s] in the output of `lap_array`, or None.
 
     Raises
     ------
     ParameterError
-        If it is no positive number.
+        If it is not a positive number.
     """
     if "lap" not in arrays:
         return None

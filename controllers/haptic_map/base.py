@@ -1,4 +1,4 @@
-"""Haptic maps: every stylus pose is a pose of something with many joints (Donald & Henle 2000, section 2.2)."""
+"""Interface of haptic maps, from stylus poses to configurations of a target (Donald & Henle 2000, section 2.2)."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
@@ -19,11 +19,11 @@ class CompiledMap(NamedTuple):
     Attributes
     ----------
     kind : int
-        Which kernel.
+        Number of the kernel.
     params : Array
-        What it reads.
+        Parameters of the kernel.
     memory : Array
-        What it keeps from tick to tick, at the start of a run.
+        State of the kernel between ticks, at the start of a run.
     """
 
     kind: int
@@ -36,10 +36,10 @@ class HapticMap(ABC):
 
     .. math:: h: SE(3) \to D, \qquad h_*: \mathbb{R}^6 \to T_{h(X)}D
 
-    A configuration has `nq` numbers and a tangent `nv`; what they mean is the map's affair. A map that keeps memory
-    (the lap of a travelling animation) is a function of the stylus pose and of that memory.
+    A configuration has `nq` numbers and a tangent `nv`; their meaning depends on the map. A map with memory (the lap
+    of a travelling animation) is a function of the stylus pose and of that memory.
 
-    A map of one's own says `pose` and no more::
+    A user-defined map needs only `pose`::
 
         class Bow(HapticMap):
             def pose(self, x):  # p_H [m] and R_H (wxyz) -> 75 numbers
@@ -47,7 +47,7 @@ class HapticMap(ABC):
                 pose[7:11] = np.cos(5 * x[0]), 0, np.sin(5 * x[0]), 0
                 return pose
 
-    Its configurations are then a root's position and quaternion, and quaternions of joints; its derivative is found by
+    Its configurations are then root position, root quaternion and joint quaternions; its derivative is computed by
     finite differences, and the tick calls it in Python.
     """
 
@@ -55,12 +55,12 @@ class HapticMap(ABC):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is to be said of it before a run."""
+        """Remarks on the map that are printed before a run."""
         return ()
 
     @abstractmethod
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or the memory's (updated)."""
+        """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
 
     @property
     def nq(self) -> int:
@@ -73,22 +73,22 @@ class HapticMap(ABC):
         return 6 + 3 * ((self.nq - 7) // 4)
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run; that of one's own is asked in Python.
+        """The map in the form of its kernel, with the memory of a new run; by default a kernel that calls Python.
 
         Raises
         ------
         ParameterError
-            If `pose` gives no configuration where the stylus begins.
+            If `pose` gives no valid configuration for the stylus at the origin of H.
         """
         asked = self._asked
         if asked is None:
             start = np.asarray(self.pose(np.array(_ORIGIN)), dtype=np.float64)
             asked = Asked(self.pose, self.jacobian, checked_pose(start, start.size))
-            object.__setattr__(self, "_asked", asked)  # kept: the tick has its address only
+            object.__setattr__(self, "_asked", asked)  # kept alive, since the tick has only its address
         return CompiledMap(OWN, asked.params, np.zeros(1))
 
     def check(self) -> None:
-        """Raise what went wrong in a map of one's own while the tick asked it."""
+        """Raise the first error of a user-defined map that was called by the tick, if there was one."""
         if self._asked is not None and self._asked.error is not None:
             raise self._asked.error
 
@@ -97,16 +97,15 @@ class HapticMap(ABC):
         return finite_differences(self.pose, np.asarray(x, dtype=np.float64))
 
     def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
-        """A vector of the control space at x as one of the target's: h_* ẋ, shape (nv,).
+        """Push-forward h_* ẋ, shape (nv,), of a stylus velocity at x to rates of the target.
 
-        A field of velocities in C becomes one of rates in D. `twist`, shape (6,): linear [m/s], then angular velocity
-        [rad/s], both in H.
+        `twist`, shape (6,): linear [m/s], then angular velocity [rad/s], both in H.
         """
         return self.jacobian(x, memory) @ np.asarray(twist, dtype=np.float64)
 
     def pull_back(self, x: Array, torque: Array, memory: Array | None = None) -> Array:
-        """A force on the target as the wrench that the hand feels: h_*ᵀ f, shape (6,), force [N] and moment [N m] in H.
+        """Pull-back h_*ᵀ f, shape (6,), of a generalised force on the target to force [N] and moment [N m] in H.
 
-        The power is the same: (h_*ᵀ f)·ẋ = f·(h_* ẋ). `torque`, shape (nv,): force or torque on each rate.
+        The power is the same: (h_*ᵀ f)·ẋ = f·(h_* ẋ). `torque`, shape (nv,): f, the force or torque on each rate.
         """
         return self.jacobian(x, memory).T @ np.asarray(torque, dtype=np.float64)

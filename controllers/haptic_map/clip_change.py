@@ -1,9 +1,10 @@
-r"""A change from one river's clip to another's that is known beforehand, as what is added to the second clip.
+r"""Precomputed transitions from one river's clip to another's, as an offset added to the second clip.
 
 .. math:: h = \rho_j(\varphi)\,\exp o(\varphi - g), \qquad o(s) = 0 \text{ for } s \ge T
 
-g is the gate, a phase at which it begins: up to there o is the way from the second clip to the first, so that nothing
-jumps. The root's place is moved in its own frame, rotations turn in theirs. o is a uniform cubic B-spline, C².
+The transition begins at the gate g, a phase of the lap, and lasts T. At the gate o is the difference of the first clip
+from the second, so that the pose does not jump. The root is moved in its own frame, and every rotation is turned in its
+own frame. o is a uniform cubic B-spline, C².
 """
 
 from collections.abc import Sequence
@@ -18,10 +19,10 @@ from controllers.rotations import angular_velocity, exponential, multiply, rotat
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-FPS = 120.0  # rows a second of the phase
-MARGIN = 0.1  # [s] before the gate from which on rows are given
-_PADDING = 16  # rows after the last over which the spline comes back to the first: what is not smooth there is not read
-# A row of the directory: the rivers, where rows and gates begin, and how many there are.
+FPS = 120.0  # rows of o per second of the phase
+MARGIN = 0.1  # [s] before the gate at which the rows begin
+_PADDING = 16  # rows of zeros, and of the first row, that close the periodic spline behind the last row; never read
+# A row of the directory: first and second river, offset and number of rows, offset and number of gates.
 _FIRST, _SECOND, _ROWS, _COUNT, _GATES, _PHASES, _ENTRY = range(7)
 
 
@@ -31,11 +32,11 @@ class ClipChange(NamedTuple):
     Attributes
     ----------
     first, second : int
-        Rivers.
+        Numbers of the rivers.
     gates : Array, shape (m,)
-        Phases at which it may begin, after the start of the lap [s].
+        Phases at which the change may begin, after the start of the lap [s].
     offsets : Array, shape (n, nv)
-        Rows of o from `MARGIN` before the gate on, `FPS` a second; zero at the end.
+        Rows of o from `MARGIN` before the gate on, `FPS` per second; zero at the end.
     """
 
     first: int
@@ -45,12 +46,12 @@ class ClipChange(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """T, from the gate to the end [s]."""
+        """T, duration from the gate to the end [s]."""
         return (len(self.offsets) - 1) / FPS - MARGIN
 
 
 def packed_changes(changes: Sequence[ClipChange]) -> Array:
-    """What the kernels read of changes: how many, a directory, and their rows and gates."""
+    """Changes packed for the kernels: their number, a directory, then their rows and gates."""
     at, rows, data = 1 + _ENTRY * len(changes), [], []
     for change in changes:
         blank = np.zeros((_PADDING, change.offsets.shape[1]))
@@ -65,7 +66,7 @@ def packed_changes(changes: Sequence[ClipChange]) -> Array:
 
 @njit
 def known_between(changes: Array, first: float, second: float) -> bool:
-    """Whether a change from a river to another is known."""
+    """Whether there is a precomputed change from one river to another."""
     for k in range(int(changes[0])):
         entry = changes[1 + k * _ENTRY :]
         if entry[_FIRST] == first and entry[_SECOND] == second:
@@ -77,9 +78,9 @@ def known_between(changes: Array, first: float, second: float) -> bool:
 def gate_behind(
     changes: Array, first: float, second: float, before: float, now: float, lap: float
 ) -> tuple[int, float]:
-    """Number and gate [s] of a change from a river to another that is passed between two phases after a lap's start.
+    """Number and gate [s] of a change between two rivers whose gate lies between the phases `before` and `now`.
 
-    The number is −1 if none is.
+    Phases count from the start of the lap [s]. The number is −1 if no gate was passed.
     """
     way = now - before
     way -= lap * np.round(way / lap)
@@ -97,7 +98,7 @@ def gate_behind(
 
 @njit
 def change_lasts(changes: Array, k: int) -> float:
-    """T of a change [s]."""
+    """T, duration of a change [s]."""
     return (changes[1 + k * _ENTRY + _COUNT] - 1.0) / FPS - MARGIN
 
 
@@ -110,7 +111,7 @@ def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacob
     changes : Array
         `packed_changes`.
     k, s
-        Which one, and the phase after the gate [s]; beyond its ends as there.
+        Number of the change, and the phase after its gate [s], clamped to the rows of o.
     along : Array, shape (6,)
         Derivatives of s.
     pose : Pose

@@ -1,4 +1,4 @@
-"""The red-blue composite map: the legs of one clip, arms blended of two others (Donald & Henle 2000, Figs. 5 to 7)."""
+"""The red-blue composite map: legs of one clip, arms blended of two others (Donald & Henle 2000, Figs. 5 to 7)."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -37,10 +37,10 @@ def composite_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
 class Composite(AnimationMap):
     r"""The lower body of one clip, the upper body blended between two.
 
-    θ = atan2(y, x) is the phase, the radius blends red (inside) and blue (outside): weights 1 − u(r) and u(r) for
-    the joints of the upper body, which ease in at the edges (C²). Root and all other joints are the lower clip's, and a
-    share 1 − λ of the upper body where it cannot carry more of the others (`with_share`). h
-    depends neither on the height nor on the orientation of the stylus; on the axis r = 0 it is not defined.
+    θ = atan2(y, x) is the phase; the radius r blends red (inside) and blue (outside) with the weights 1 − u(r) and u(r)
+    for the joints of the upper body, where u has eased ends (C²). Root and all other joints are those of the lower
+    clip. Where the lower clip's legs cannot carry all of red and blue, only a share λ of them is blended in
+    (`with_share`). h does not depend on height or orientation of the stylus; on the axis r = 0 it is not defined.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ class Composite(AnimationMap):
     Raises
     ------
     ParameterError
-        If the clips are not of the same kind of pose or have not these joints, a limb belongs to the upper body, or
-        the interval is empty.
+        If the clips' poses differ in size or lack these joints, a limb belongs to the upper body, or the interval is
+        empty.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Composite(AnimationMap):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Whether red and blue are blended in by a part only."""
+        """Says so if only a share of red and blue is blended in."""
         if self.share == 1.0:
             return ()
         return (f"the lower body bears {100 * self.share:.0f} % of the others' arms",)
@@ -97,7 +97,7 @@ class Composite(AnimationMap):
         Raises
         ------
         ParameterError
-            If it is not from 0 to 1.
+            If the share is not from 0 to 1.
         """
         if not 0.0 <= share <= 1.0:
             raise ParameterError(f"the share of other clips' joints is from 0 to 1, got {share}")
@@ -107,7 +107,7 @@ class Composite(AnimationMap):
         return other
 
     def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
         numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
         numbers["share"] = np.array([self.share])
         if self.apart:
@@ -116,12 +116,12 @@ class Composite(AnimationMap):
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Composite":
-        """Map of what `arrays` gave.
+        """Map restored from the output of `arrays`.
 
         Raises
         ------
         ParameterError
-            If an array is missing, or they make no map.
+            If an array is missing, or its values are not those of a map.
         """
         clips, joints = kept_clips(arrays), kept(arrays, "upper_joints", (None,))
         if len(clips) != _CLIPS or not np.isfinite(joints).all():

@@ -1,4 +1,4 @@
-"""The cylindrical map: an angle is the frame, radius and height blend four clips (Donald & Henle 2000, Fig. 3)."""
+"""The cylindrical map: the angle is the phase, radius and height blend four clips (Donald & Henle 2000, Fig. 3)."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -24,10 +24,10 @@ CYLINDRICAL = 1
 _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _OWN_LEGS, _SHARE, _TABLE_SIZE, _TABLE = range(8)
-_NODES = 13  # of the corrections' table, across the blend each way
-_BETWEEN = 2 * _NODES - 1  # places each way at which it is looked at
-_EDGE = 0.05  # where it eases in: its nodes lie close where weights are small, since a small step is a step too
-_ROWS = 512  # of it round the lap, at most
+_NODES = 13  # nodes of the table of corrections along each of r and z
+_BETWEEN = 2 * _NODES - 1  # points along each of r and z at which foot clearance is checked
+_EDGE = 0.05  # eased share at each end of the table's coordinates: nodes are dense where a clip's weight is small
+_ROWS = 512  # largest number of rows of the table round the lap
 
 
 @njit
@@ -64,8 +64,8 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
 
 
 def _mixtures(steps: int) -> tuple[Array, Array]:
-    """Places (steps², 2) at equal steps of the corrections' table, as shares of r and z, and weights (steps², 4)."""
-    ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # compiling it would take longer than all of this
+    """Points (steps², 2) at equal steps of the table's coordinates, as shares of r and z, and weights (steps², 4)."""
+    ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
     nodes = np.interp(np.linspace(0.0, 1.0, steps), [ease(at, _EDGE)[0] for at in share], share)
     z, r = np.meshgrid(nodes, nodes)
     places = np.stack([r.ravel(), z.ravel()], axis=-1)
@@ -74,7 +74,7 @@ def _mixtures(steps: int) -> tuple[Array, Array]:
 
 
 def correction_shape(limbs: int) -> tuple[int, int]:
-    """Shape of a map's corrections at one place of the lap: how many mixtures it has, and channels of so many limbs."""
+    """Shape of a map's corrections at one phase: number of mixtures, and of channels for this number of limbs."""
     return _NODES**2, ROOT + FOOT * limbs
 
 
@@ -82,16 +82,16 @@ class Cylindrical(AnimationMap):
     r"""Four clips round a cylinder about the z axis of H.
 
     θ = atan2(y, x) is the phase: one lap of the hand is one lap of every clip. The weights w_i(r, z) blend the four
-    clips bilinearly and ease in at the edges (C²); beyond them they stay, so no limb is ever extrapolated. How poses
-    are blended is told in `blending`. With limbs, in-betweens are corrected by a table (`inbetween`): ends move while
-    they are lifted, one at a time (`footfalls`), and the root may sway (`with_sway`).
+    clips bilinearly with eased edges (C²) and are constant beyond them, so no limb is ever extrapolated. `blending`
+    describes how poses are blended. With limbs, in-betweens are corrected by a table (`inbetween`): feet move one at a
+    time while they are lifted (`footfalls`), and the root may sway (`with_sway`).
 
-    Clips that step differently have no mean that steps: a foot that one of them plants, another one lifts. With `upper`
-    joints only these are blended; root and legs are those of one clip everywhere, and so are its feet. Where it bears
-    no more, only a share λ of the others' joints is blended into its own: weights are λ w_i + (1 − λ) of that clip.
+    The mean of clips with different footsteps is no gait: while one clip plants a foot, another lifts it. With `upper`,
+    only those joints are blended; root, legs and feet are those of one clip everywhere. Where that clip's legs cannot
+    carry more, only a share λ of the others' joints is blended in: the weights are λ w_i, plus 1 − λ for that clip.
 
-    A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand goes over
-    the seam θ = 0 forwards, and back backwards, so the figure walks on. Pose, velocity and acceleration are
+    A ∈ SE(2) is the frame of the lap, kept in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
+    seam θ = 0 forwards, and by the inverse backwards, so the figure walks on. Pose, velocity and acceleration are
     continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
     position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.
 
@@ -104,22 +104,22 @@ class Cylindrical(AnimationMap):
     r_range, z_range : tuple of two floats
         Intervals [m] over which the clips blend; r_min > 0.
     limbs : sequence of Limb
-        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
     corrections : Array, shape (n, k, 2 + 4 limbs), optional
-        What a map of the same clips, limbs and lap has as its `corrections`, which then need not be found again.
+        `corrections` of a map of the same clips, limbs and lap, to spare computing them again.
     lap : float, optional
-        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+        Duration of the hand's lap [s], in which each clip is played as often as it fits (`strides`); by default once.
     upper : sequence of int
-        Joints that alone are blended, counted from 1; by default all.
+        The only joints that are blended, counted from 1; by default all.
     legs_of : int
-        With `upper`, the clip whose legs and root they are, counted from 0.
+        With `upper`, the clip that gives legs and root, counted from 0.
 
     Attributes
     ----------
     mixtures : Array, shape (k, 4)
         Weights of the clips at the nodes of the table.
     corrections : Array, shape (n, k, 2 + 4 limbs)
-        Of the ends at the mixtures, at equal steps of the lap; none without limbs.
+        Corrections of root and ends at the mixtures, at equal steps of the lap; empty without limbs.
     drifts : Array, shape (4, 3)
         ξ of each clip.
     share : float
@@ -128,7 +128,7 @@ class Cylindrical(AnimationMap):
     Raises
     ------
     ParameterError
-        If there are not four clips of the same kind of pose, an interval is empty, or a limb is not one of the pose's.
+        If there are not four clips with poses of one size, an interval is empty, or the poses lack a limb's joints.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class Cylindrical(AnimationMap):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Whether only some joints are blended."""
+        """Says so if only some joints are blended."""
         if not self.upper:
             return ()
         owner = _ORDINALS[self.legs_of]
@@ -189,7 +189,7 @@ class Cylindrical(AnimationMap):
         return (told,)
 
     def places(self, angles: Array) -> Array:
-        """Stylus poses, upright, at which the weights are those of the mixtures, at angles θ (n,): shape (k, n, 7)."""
+        """Upright stylus poses (k, n, 7) at which the weights are those of the mixtures, at angles θ (n,)."""
         r_min, r_max, z_min, z_max = self._numbers
         r, z = r_min + self._nodes[:, 0] * (r_max - r_min), z_min + self._nodes[:, 1] * (z_max - z_min)
         x = np.zeros((len(r), len(angles), 7))
@@ -198,12 +198,12 @@ class Cylindrical(AnimationMap):
         return x
 
     def with_sway(self, sway: Array) -> "Cylindrical":
-        """The same map, its root moved at the mixtures.
+        """The same map with the root displaced over the floor at the mixtures.
 
         Parameters
         ----------
         sway : Array, shape (n, k, 2)
-            At equal steps of the lap [m], in the frame of the lap's drift.
+            Displacement at equal steps of the lap [m], in the frame of the drift.
         """
         other = copy(self)
         values = self.corrections.copy()
@@ -213,12 +213,12 @@ class Cylindrical(AnimationMap):
         return other
 
     def with_share(self, share: float) -> "Cylindrical":
-        """The same map with another share λ of other clips' joints: 0 leaves them to the clip whose legs they are.
+        """The same map with another share λ of the other clips' joints: 0 plays the clip of the legs alone.
 
         Raises
         ------
         ParameterError
-            If it is not from 0 to 1, or all joints are blended.
+            If the share is not from 0 to 1, or all joints are blended.
         """
         if not (self.upper and 0.0 <= share <= 1.0):
             raise ParameterError(f"a map with legs of one clip takes a share of other joints from 0 to 1, got {share}")
@@ -228,7 +228,7 @@ class Cylindrical(AnimationMap):
         return other
 
     def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
         arrays = {"domain": np.array([self.r_range, self.z_range])}
         if self.upper:
             arrays["upper_joints"] = np.array(self.upper, dtype=np.float64)
@@ -239,12 +239,12 @@ class Cylindrical(AnimationMap):
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Cylindrical":
-        """Map of what `arrays` gave.
+        """Map restored from the output of `arrays`.
 
         Raises
         ------
         ParameterError
-            If an array is missing, or they make no map.
+            If an array is missing, or its values are not those of a map.
         """
         (r_low, r_high), (z_low, z_high) = kept(arrays, "domain", (2, 2)).tolist()
         limbs, corrections = kept_limbs(arrays), None

@@ -1,7 +1,7 @@
-"""The evaluation of a haptic map, of whatever kind, in the compiled tick.
+"""Evaluation of haptic maps of any kind in the compiled tick.
 
-Every kind has a kernel with the same arguments, which is called by its address: so nothing is compiled that is not
-used. Where the addresses come from is not this package's affair (see `sim.compilation.kernel_units`).
+Every kind has a kernel with the same signature, called by its address, so only kernels that are used are compiled. The
+addresses come from `sim.compilation.kernel_units`.
 """
 
 from numba import njit, types
@@ -30,7 +30,7 @@ MAP_KERNELS: dict[int, Kernel] = {
     LED: led_map,
     OWN: own_map,
 }
-"""Kernels by kind; that of a map that wraps another one changes what the other one wrote."""
+"""Kernels by kind; the kernel of a map that wraps another map modifies the output of the wrapped map's kernel."""
 
 _VECTOR = types.Array(types.float64, 1, "C")
 MAP_ARGUMENTS = (_VECTOR, _VECTOR, _VECTOR, _VECTOR, types.Array(types.float64, 2, "C"))
@@ -40,7 +40,7 @@ _call = kernel_call(MAP_ARGUMENTS)
 
 
 def kinds_of(kind: int, params: Array) -> tuple[int, ...]:
-    """Kinds of kernels that a map needs: its own, and that of the map that it wraps."""
+    """Kinds of kernels that a map needs: its own, and that of a map that it wraps."""
     base, _ = base_of.py_func(kind, params)
     return (kind,) if base == kind else (kind, base)
 
@@ -67,7 +67,7 @@ def evaluate_map(units: IntArray, kind: int, params: Array, x: Array, memory: Ar
     units : IntArray
         Addresses of compiled kernels by kind, 0 for those that are not compiled.
     kind, params, memory
-        Of a `CompiledMap`; the memory is updated.
+        See `CompiledMap`; the memory is updated.
     x : Array, shape (7,)
         Stylus pose: p_H [m], R_H (quaternion wxyz).
     pose : Array, shape (nq,)

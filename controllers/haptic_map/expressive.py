@@ -1,4 +1,4 @@
-"""Expression: how the stylus is turned turns joints of any map's figure, such as gaze and lean (C is SE(3), not R³)."""
+"""Expressive maps: the orientation of the stylus turns joints of any map's figure, for gaze and lean."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 EXPRESSIVE = 6
-FADE_FROM = 2.0 * np.pi / 3.0  # angle of the stylus from which its turn fades, to nothing at half a turn [rad]
+FADE_FROM = 2.0 * np.pi / 3.0  # [rad] stylus angle from which its effect fades out, to zero at half a turn
 _KIND, _JOINTS, _ROWS = range(3)
 _JOINT, _GAIN, _LOW, _HIGH, _ROW = 0, 1, 4, 7, 10
 _NO_MEMORY = np.zeros(0)
-_ROUNDING = 0.02  # of a room: with less than this left it shrinks to nothing without a corner [rad]
+_ROUNDING = 0.02  # [rad] smooths the room left to a joint limit near zero, so that it stays positive
 
 
 @njit
@@ -39,7 +39,7 @@ def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
     for k in range(3):
         e_x, e_y, e_z = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
         rate = rotation_vector_rate(-a, -b, -c, e_x, e_y, e_z)
-        # The angle grows by the share of ω about the axis; where it does not matter the slope is zero.
+        # The angle's rate is the component of ω along the axis; below FADE_FROM the slope is 0, so max() has no effect.
         fading = slope * turn[k] / max(angle, FADE_FROM)
         for i in range(3):
             rates[i, k] = (1.0 - faded) * rate[i] - fading * turn[i]
@@ -49,16 +49,16 @@ def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
 
 @njit
 def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float, float, float]:
-    r"""Turn f that a joint's room lets through, and its derivatives by what is wanted and by where the joint is.
+    r"""Turn f after soft saturation at a joint's limits, and its derivatives by `wanted` and by `there`.
 
     .. math:: f = y\,(1 + (y/R)^4)^{-1/4}
 
     Parameters
     ----------
     wanted, there : float
-        Turn y that is wanted, and what the joint has already [rad].
+        Turn y that is asked for, and the present value of the joint's component [rad].
     low, high : float
-        Ends of its range: R is about the distance to the one in the direction of y, and stays positive [rad].
+        Ends of its range [rad]; the room R is about the distance to the end in the direction of y, and stays positive.
     """
     side = 1.0 if wanted >= 0.0 else -1.0
     left = (high - there if side > 0.0 else there - low) - _ROUNDING
@@ -73,7 +73,7 @@ def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float
 
 @njit
 def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array) -> None:
-    """Turn one joint, its quaternion (4,) and, unless it has no rows, its derivative (3, 6)."""
+    """Turn one joint: its quaternion q (4,) and, unless `jacobian` has no rows, its derivative (3, 6)."""
     v = logarithm(q[0], q[1], q[2], q[3])
     e, by_turn, by_there = work_array(3), work_array(3), work_array(3)
     for i in range(3):
@@ -98,18 +98,18 @@ def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array
 
 @njit
 def express(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Turn the joints of a base map's pose, and of its derivative unless that has no rows, as the stylus is turned.
+    """Kernel of `Expressive`: turn joints of the base map's pose by the stylus, and the derivative unless it is empty.
 
     Parameters
     ----------
     params : Array
-        Of an `Expressive`.
+        Parameters of an `Expressive`.
     x : Array, shape (7,)
         Stylus pose.
     memory : Array
-        The base map's; neither read nor written.
+        Memory of the base map; neither read nor written.
     pose, jacobian : Array, shapes (nq,), (nv, 6)
-        The base map's; updated.
+        Pose and derivative of the base map; updated.
     """
     turn, rates = work_array(3), work_array((3, 3))
     stylus_turn(x, turn, rates)
@@ -128,9 +128,9 @@ class ExpressiveJoint:
     Parameters
     ----------
     joint : int
-        Joint k has the numbers 3 + 4k to 6 + 4k of a pose; the root, 0, is not to be turned.
+        Joint k has the numbers 3 + 4k to 6 + 4k of a pose; the root, 0, is not allowed.
     gain : (float, float, float)
-        Turn about the axes x, y, z of the joint's own frame for each turn of the stylus about those of H [rad/rad].
+        Turn about the axes x, y, z of the joint's own frame per turn of the stylus about x, y, z of H [rad/rad].
     low, high : (float, float, float)
         Range of the joint's rotation vector [rad].
     """
@@ -142,30 +142,31 @@ class ExpressiveJoint:
 
 
 class Expressive(HapticMap):
-    r"""A map whose figure also expresses how the stylus is turned: gaze and lean.
+    r"""A map with joints that also turn with the stylus: gaze and lean.
 
     .. math:: q_k(p, R) = q_k(p) \otimes \exp e_k, \qquad e_{k,i} = f(g_{k,i}\, r_i;\, R_{k,i}), \qquad r = F \log R
 
-    q_k is the base map's rotation of joint k, r the turn of the stylus from upright: the rotation vector of R about
-    the axes of H, roll, pitch and yaw. f(y; R) = y (1 + (y/R)⁴)^(−1/4) lets small turns through as they are and
-    never as much as the room R that the pose has left to the end of the joint's range, component by component of its
-    rotation vector. All other joints and the root are the base map's, and all of it is for an upright stylus.
+    q_k is the base map's rotation of joint k; r the turn of the stylus from upright, the rotation vector of R about the
+    axes of H (roll, pitch and yaw). f(y; R) = y (1 + (y/R)⁴)^(−1/4) is a soft saturation: it passes small turns
+    unchanged and stays below the room R that the pose leaves up to the joint's limit, for each component of the joint's
+    rotation vector. All other joints and the root, and for an upright stylus the whole pose, are those of the base map.
 
-    F is 1 up to a turn of 120° and eases to 0 at 180°: a half turn to the left is one to the right, so any continuous
-    map must forget there which way it went. h is C² in R everywhere, and in the base's pose but where a joint that is
-    turned is half a turn from rest.
+    F is 1 up to a turn of 120° and eases to 0 at 180°: half a turn to the left equals half a turn to the right, so a
+    continuous map cannot distinguish them there. h is C² in R everywhere, and C² in the base map's pose except where a
+    turned joint is half a turn from its zero.
 
     Parameters
     ----------
     base : HapticMap
-        Of poses that are root position, root quaternion, then joint quaternions (wxyz).
+        A map to poses of root position, root quaternion, then joint quaternions (wxyz).
     joints : sequence of ExpressiveJoint
         At least one.
 
     Raises
     ------
     ParameterError
-        If the base has not such poses or these joints, or wraps a map itself; or a gain is not finite, a range empty.
+        If the base map has other poses, lacks these joints or wraps a map itself, a gain is not finite, or a range is
+        empty.
     """
 
     def __init__(self, base: HapticMap, joints: Sequence[ExpressiveJoint]) -> None:
@@ -195,7 +196,7 @@ class Expressive(HapticMap):
         return self.base.nv
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
+        """The map in the form of its kernel, with the memory of a new run."""
         return CompiledMap(EXPRESSIVE, self._params, self.base.compiled().memory)
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:

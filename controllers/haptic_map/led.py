@@ -1,15 +1,16 @@
-r"""The led figure: a clip of straight walking follows a curved path, and its feet do not skate.
+r"""The map of a led figure: a clip of straight walking is carried along a curved path without foot skate.
 
 .. math:: X_{root}(s) = A(s)\,\rho(s/\ell), \qquad X_{foot}(s) = A(s + \ell\,\lambda(s/\ell))\,\rho_{foot}(s/\ell)
 
-A(s) ∈ SE(2) is the figure's path (`controllers.walking.walked_path`), ℓ the length of the clip's lap, ρ what is left of
-a pose when its steady drift is taken off (`loops`). While a foot stands s + ℓλ rests, and advances while it swings
-(`limbs`): so a foot that stands stays where it is, however path and pelvis turn over it. The legs follow. Bends are
-walked leaning to the inside, as a pendulum does whose foot goes on the path: root and trunk turn about it by φ(s), and
-the root is lower by twice as much as that raises the outer hip.
+A(s) ∈ SE(2) is the frame of the figure's path at arc length s (`controllers.walking.walked_path`), ℓ the length of the
+clip's lap, ρ the pose without its steady drift (`loops`). λ is such that s + ℓλ is constant while the foot is in stance
+and advances while it swings (`limbs`): so a foot in stance keeps its place, however path and pelvis turn over it. The
+legs follow by inverse kinematics. In bends the figure leans to the inside like an inverted pendulum whose foot is on
+the path: root and trunk turn about the path by φ(s), and the root is lowered by twice the height that this lifts the
+outer hip.
 
-A clip that flies has a second form without flights (`grounded`), for paces too slow to fly that long. Channels
-are (1 − u) ρ + u ρ_grounded; u, how far the figure stays on the ground, is the walker's second number.
+A clip with flight phases has a second form without them (`grounded`), for paces too slow for flights of that length.
+Channels are (1 − u) ρ + u ρ_grounded; u, the share of the grounded form, is the walker's second number.
 """
 
 from collections.abc import Sequence
@@ -44,10 +45,10 @@ from controllers.work_array import work_array
 LED = 7
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
-_LEAST_TRAVEL = 0.5  # [m] of a lap
-_LARGEST_TURN = np.deg2rad(30.0)  # of a lap
-_UPRIGHT = 0.015  # [rad] of lean within which the root is hardly lowered
-_STOOP = 2.0  # times what the outer hip is raised by: in a bend feet swing beside the path too
+_LEAST_TRAVEL = 0.5  # [m] least length of a lap
+_LARGEST_TURN = np.deg2rad(30.0)  # [rad] largest turn of a lap
+_UPRIGHT = 0.015  # [rad] lean below which the root is hardly lowered
+_STOOP = 2.0  # lowering of the root over the rise of the outer hip; above 1, since in bends feet also swing outwards
 
 
 @njit
@@ -67,7 +68,7 @@ def _channels(rows: Array, samples: int, lap: float, value: Array, slope: Array)
 
 @njit
 def _mixed(rows: Array, samples: int, lap: float, held: float, value: Array, slope: Array, change: Array) -> None:
-    """Channels of a clip's two forms, mixed by u; `change` becomes their derivatives by u."""
+    """Channels of a clip's two forms, mixed by u = `held`; `change` becomes their derivatives by u."""
     n = value.shape[0]
     ground, ground_slope = work_array(n), work_array(n)
     _channels(rows, samples, lap, value, slope)
@@ -83,24 +84,24 @@ def _carried(
     path: Array, s: float, pace: float, rate: float, lean: float, leaning: float, value: Array,
     slope: Array, by: int, p: Array, q: Array, spin: Array,
 ) -> None:  # fmt: skip
-    """Carry what stands at a place in the frame A(s), leaning to the left about the path on the floor.
+    """Transform a position and orientation from the frame A(s), leaning to the left by φ about the path, to the floor.
 
-    Derivatives are by one of the walker's two numbers x, the figure's arc length and u.
+    Derivatives are by one of the walker's two numbers x: the figure's arc length, or u.
 
     Parameters
     ----------
     path, s
         The packed path, and the arc length of the frame [m].
     pace, rate : float
-        Derivatives of s by x, and of what x changes `value` by: the lap, or u itself.
+        Derivatives by x of s, and of the parameter of `slope`: the phase of the lap, or u itself.
     lean, leaning : float
         φ [rad] and its derivative by x.
     value, slope : Array, shape (7,)
-        Place and quaternion, and their derivatives by that.
+        Position and quaternion, and their derivatives by the phase of the lap, or by u.
     by : int
-        Which x, 0 or 1.
+        Which of the two numbers x is, 0 or 1.
     p, q, spin : Array, shapes (3, 3), (4,), (3, 2)
-        Written: place and its derivative by x, unit quaternion, local angular velocity by x.
+        Written: position and its derivative by x, unit quaternion, local angular velocity by x.
     """
     (x, d_x), (y, d_y) = path_value(path, s, PATH_X), path_value(path, s, PATH_Y)
     heading, turn = path_value(path, s, PATH_HEADING)
@@ -130,9 +131,9 @@ def _carried(
 
 @njit
 def _stooped(lean: float, leaning: float, width: float) -> tuple[float, float]:
-    """How much lower the root of a figure is that leans [m], and the derivative: in proportion to its raised hip.
+    """Lowering of the root of a leaning figure [m], in proportion to the rise of its outer hip, and its derivative.
 
-    A leg that lands straight would be too short otherwise, and its knee would stop with a jerk.
+    Otherwise a leg that lands straight would be too short, and its knee would stop with a jerk.
     """
     size = np.sqrt(lean * lean + _UPRIGHT * _UPRIGHT)
     return width * (size - _UPRIGHT), width * leaning * lean / size
@@ -196,39 +197,39 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
 
 
 class Led(HapticMap):
-    r"""A clip that travels, on the path of a figure that is led (see `controllers.fields.leading`).
+    r"""A travelling clip on the path of a figure that is led (see `controllers.fields.leading`).
 
-    The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, s the arc length [m] and u from 0,
-    the clip, to 1, the clip without its flights. The memory is the walker's path (`controllers.walking.walker`);
-    `compiled` gives one of its own, straight on from the origin.
+    The map's argument is not the stylus but the walker: ``[s, u, 0, 1, 0, 0, 0]``, with s the arc length [m] and u
+    from 0, the clip, to 1, the clip without its flight phases. The memory is the walker's path
+    (`controllers.walking.walker`); `compiled` gives a straight one through the origin.
 
     Parameters
     ----------
     clip : (Array, float)
         Poses (n, nq) and frames per second. A clip that does not close is closed (`forward_loop`).
     limbs : sequence of Limb
-        Legs whose feet stand.
+        Legs with feet that stand.
     phase : float
-        Share of the lap at which the figure is at s = 0.
+        Phase of the lap at s = 0, as a share of the lap.
     standing : array of bool, shape (m, limbs), optional
-        Which limbs stand, at m equal steps of the lap: between its flights. Without it u changes nothing.
+        Which limbs are in stance, at m equal steps of the lap; no limb is in flight phases. Without it u has no effect.
     capture : Capture, optional
-        How a captured clip is made fit for the floor: low-passed, the limbs that stand held (`planted`), and without
-        flights whatever u is, unless it hops on one foot. Without it the clip is led as it is.
+        How a motion capture is cleaned up: low-passed, feet in stance held (`planted`), and flight phases removed
+        whatever u is, unless the figure hops on one foot. Without it the clip is used as it is.
     sway : Array, shape (k, 2), optional
-        By which the root of a form without flights, or of a capture, moves over the floor [m], at k equal steps of the
+        Displacement over the floor of the root of a form without flights, or of a capture [m], at k equal steps of the
         lap.
 
     Attributes
     ----------
     flies, grounds : bool
-        Whether there are flights in it at u = 0, and whether it has a form without those of its clip.
+        Whether it has flight phases at u = 0, and whether it has a form without the flight phases of its clip.
     sways : bool
-        Whether the sway moves any of it.
+        Whether the sway affects any of its forms.
     stride, duration : float
-        Way [m] and time [s] of a lap: less than the clip's way if the steps would be too long without flights.
+        Length [m] and duration [s] of a lap; shorter than the clip's if its steps would be too long without flights.
     pace : float
-        Times the clip's own, at which no limb swings faster than in the clip.
+        Largest pace, in multiples of the clip's own, at which no limb swings faster than in the clip.
 
     Raises
     ------
@@ -261,7 +262,7 @@ class Led(HapticMap):
             )
         samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
-        # The path is along x, whichever way the figure faces while it goes.
+        # The path is along x, whichever way the figure faces while it walks.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
         channels[:, :2] = turned(course, channels[:, :2])
         channels[:, 3:7] = yawed(course, channels[:, 3:7])
@@ -287,7 +288,7 @@ class Led(HapticMap):
                 low = grounded(rows, signs, self.stride, limbs, stands, sway)
                 forms, self.grounds = ([rows], False) if low is None else ([rows, low], True)
             else:
-                # A flight of the capture becomes a step, which is shorter.
+                # A flight phase of the capture becomes a walking step, which is shorter.
                 steps = min(self.stride, capture.step * len(flights)) if flights else self.stride
                 held = (channels, drift[0], limbs, stands, capture.radius, self.duration)
                 forms = [with_planted_ends(rows, *held, steps, np.zeros((2, 2)) if flights else sway)]
@@ -306,7 +307,7 @@ class Led(HapticMap):
         self._params = np.concatenate([header, *(limb.packed() for limb in limbs), *packed])
 
     def with_sway(self, sway: Array) -> "Led":
-        """The same map with another sway (k, 2) where no flight is left."""
+        """The same map with another sway (k, 2) [m] of the forms without flight phases."""
         return Led(*self._made_of, sway)
 
     @property
@@ -320,11 +321,11 @@ class Led(HapticMap):
         return 3 + 3 * self._rotations
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with a straight path through the origin along x, 30 m to both sides."""
+        """The map in the form of its kernel, with a straight path along x, 30 m to both sides of the origin."""
         return CompiledMap(LED, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration at x = [s, u, …], shape (nq,), on the memory's path, or on a straight one."""
+        """Configuration at x = [s, u, …], shape (nq,), on the path in the memory, or on a straight one."""
         return self._evaluate(x, memory, 0)[0]
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:

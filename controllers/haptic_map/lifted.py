@@ -1,4 +1,4 @@
-"""The lifted map: every clip has a curve of its own, and the stylus blends clips of near curves (section 8.1)."""
+"""The lifted map: every clip has its own curve, and the stylus blends the clips of nearby curves (section 8.1)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -40,8 +40,8 @@ from controllers.work_array import work_array, work_integers
 LIFTED = 3
 
 _LAGS = 128  # samples of λ round the lap
-_ROWS = 256  # of the corrections' table round the lap, at most
-_PAIR_STEPS = 24  # of the lap, at which clips are looked for that are neighbours
+_ROWS = 256  # largest number of rows of the corrections' table round the lap
+_PAIR_STEPS = 24  # phases of the lap at which neighbouring clips are searched
 (
     _R_LOW, _R_HIGH, _Z_LOW, _Z_HIGH, _MARGIN, _CLIPS, _LAG_AT, _DRIFTS_AT, _FRAMES_AT, _NEAR_AT, _PAIRS_AT,
     _SOLES_AT, _FIGURE,
@@ -50,7 +50,7 @@ _PAIR_STEPS = 24  # of the lap, at which clips are looked for that are neighbour
 
 @njit
 def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array, slope: Array) -> None:
-    """Write λ of each limb, which is common to all clips, into the channels of the first."""
+    """Write λ of each limb, which all clips share, into the channels of the first clip."""
     s = angle * _LAGS / (2.0 * np.pi)
     row = min(int(s), _LAGS - 1)
     b0, b1, b2, b3 = basis(s - row)
@@ -65,7 +65,7 @@ def _lags(control: Array, limbs: int, angle: float, channels: int, value: Array,
 
 @njit
 def _weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, changes: Array) -> tuple[float, int]:
-    """Angle of the hand and number of clips near, their numbers, weights and the derivatives of these (3, m)."""
+    """Angle of the hand and number of nearby clips; writes `near`, weights w and their derivatives `changes` (3, m)."""
     radius, angle = cylinder(x, chain)
     r, r_slope = clamped(radius, params[_R_LOW], params[_R_HIGH], params[_MARGIN])
     z, z_slope = clamped(x[2], params[_Z_LOW], params[_Z_HIGH], params[_MARGIN])
@@ -120,50 +120,51 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
 
 
 class Lifted(ClipMap):
-    r"""Clips α_i as curves α̃_i round the z axis of H, and one smooth map with h∘α̃_i = α_i at every frame.
+    r"""Clips α_i lifted to curves α̃_i round the z axis of H, and one smooth map with h∘α̃_i = α_i at every frame.
 
     .. math:: \tilde\alpha_i(t_k) = (r_i(\theta)\cos\theta,\; r_i(\theta)\sin\theta,\; z_i(\theta)),
               \qquad \theta = \theta_i(t_k)
 
-    θ = atan2(y, x) is the phase, and in the half plane (r, z) at θ the clips have their sites q_i = (r_i, z_i):
-    periodic C² splines of θ. The pose is the mean of the clips that are near, with the weights of `neighbours`; each
-    contributes its own at θ by splines with a knot at every frame (`frames`). On its curve a clip is alone, in its core
-    (`cores`) nearly so, and exact up to the displacement over the ground by which it was moved to the origin
-    (`placed`). What is blended, how, and the lap's frame A are told in `combination`; a closed clip whose angles begin
-    at θ₀ > 0 has its frames beyond 2π in the next lap.
+    θ = atan2(y, x) is the phase. In the half plane (r, z) at θ each clip has a site q_i = (r_i, z_i), a periodic C²
+    spline of θ. The pose is the mean of the nearby clips with the weights of `neighbours`; each clip contributes its
+    pose at θ by splines with a knot at every frame (`frames`). On its own curve a clip has all the weight, in its core
+    (`cores`) nearly all, and its poses are exact up to the displacement over the ground that moved the clip to the
+    origin (`placed`). `combination` describes the blend and the frame A of the lap; a closed clip whose angles begin at
+    θ₀ > 0 has its frames beyond 2π in the next lap.
 
     With limbs, in-betweens of neighbours are corrected (`pair_corrections`): feet move one at a time, while they are
-    lifted. They stay above the floor (`floor`), and where they stand though the mixture changes (`footing`).
+    lifted. They stay above the floor (`floor`), and in stance they keep their place while the mixture changes
+    (`footing`).
 
-    h is C² but on the axis r = 0, where the phase is not defined. Beyond the box round all sites r and z are clamped
-    to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
+    h is C² except on the axis r = 0, where the phase is not defined. Outside the box round all sites r and z are
+    clamped to it, smoothly (C²) over a margin: no limb is extrapolated. h does not depend on the stylus orientation.
 
     Parameters
     ----------
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second, as in `Cylindrical`.
     closed : sequence of bool
-        Whether a clip's last frame is its first again, moved over the ground.
+        Whether each clip's last frame equals its first up to a displacement over the ground.
     angles : sequence of Array
-        θ_i(t_k) [rad], shape (n,), increasing: from some θ₀ in [0, 2π) once round for a closed clip, within [0, 2π]
-        for an open one, which leaves a gap.
+        θ_i(t_k) [rad], shape (n,), increasing: from some θ₀ in [0, 2π) once round for a closed clip; within [0, 2π],
+        leaving a gap, for an open one.
     sites : Array, shape (rows, m, 2)
         (r_i, z_i) [m] at `rows` equal steps of a lap.
     limbs : sequence of Limb
-        Limbs whose ends are to be where they are in the clips on average: feet that stand (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
     names : sequence of str, optional
-        Of the clips; by default their numbers.
+        Names of the clips; by default their numbers.
     margin : float
-        Of the clamping [m].
+        Margin of the clamping [m].
     transitions : Array, shape (k, 5), optional
-        Where a hand may change over: numbers of two clips, θ [rad], relative distances of pose and velocity. Kept
-        with the map; h does not depend on them.
+        Where a hand may change between clips: numbers of two clips, θ [rad], relative distances of pose and velocity.
+        Stored with the map; h does not depend on them.
 
     Raises
     ------
     ParameterError
-        If clips, angles, sites and names do not fit each other, a clip does not close that should, a site comes to
-        the axis, or two come together.
+        If clips, angles, sites and names do not fit each other, a clip given as closed does not close, a site comes
+        too near to the axis, or two sites too near to each other.
     """
 
     def __init__(
@@ -199,12 +200,12 @@ class Lifted(ClipMap):
         return np.stack([clip.drift for clip in self._placed])
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run."""
+        """The map in the form of its kernel, with the memory of a new run."""
         return CompiledMap(LIFTED, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))]))
 
     @property
     def closed(self) -> tuple[bool, ...]:
-        """Whether each clip closes."""
+        """Whether each clip is closed."""
         return tuple(clip.closed for clip in self._placed)
 
     @property
@@ -214,12 +215,12 @@ class Lifted(ClipMap):
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Intervals of r and z [m] that hold all sites; beyond them the stylus is clamped."""
+        """Intervals of r and z [m] that contain all sites; beyond them the stylus is clamped."""
         low, high = box(self.sites)
         return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
     def placed(self, i: int) -> Array:
-        """Poses of clip i (n, nq) where they were moved to: what h gives along its curve from the first lap on."""
+        """Poses of clip i (n, nq) after its displacement to the origin: h along its curve, from the first lap on."""
         return self._placed[i].poses.copy()
 
     def site(self, i: int, angles: Array) -> Array:
@@ -227,7 +228,7 @@ class Lifted(ClipMap):
         return round_lap(self.sites[:, i], angles)
 
     def curve(self, i: int) -> Trajectory:
-        """α̃_i, timed by the clip, periodic if it closes; exact at the frames."""
+        """α̃_i with the timing of the clip, periodic if the clip is closed; exact at the frames."""
         angles = self.angles[i]
         q = self.site(i, angles)
         points = np.column_stack([q[:, 0] * np.cos(angles), q[:, 0] * np.sin(angles), q[:, 1]])
@@ -236,7 +237,7 @@ class Lifted(ClipMap):
         return Trajectory(np.arange(len(points)) / self.clips[i][1], points, periodic=self.closed[i])
 
     def weights(self, x: Array) -> Array:
-        """Weights w_i (m,) of the clips at a stylus pose (7,); of sum 1."""
+        """Weights w_i (m,) of the clips at a stylus pose (7,); their sum is 1."""
         m = len(self.clips)
         near, w, changes, result = np.empty(m, dtype=np.int64), np.empty(m), np.empty((3, m)), np.zeros(m)
         _, count = _weigh(self._params, np.asarray(x, dtype=np.float64), np.empty((3, 6)), near, w, changes)
@@ -244,7 +245,7 @@ class Lifted(ClipMap):
         return result
 
     def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` makes the same map of them, to the last bit."""
+        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
         arrays = {"sites": self.sites, "margin": np.array([self.margin]), "transitions": self.transitions}
         for name, clip in zip(self.names, self._placed, strict=True):
             arrays |= {f"angles/{name}": clip.angles, f"closed/{name}": np.array([float(clip.closed)])}
@@ -252,12 +253,12 @@ class Lifted(ClipMap):
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> "Lifted":
-        """Map of what `arrays` gave.
+        """Map restored from the output of `arrays`.
 
         Raises
         ------
         ParameterError
-            If an array is missing, or they make no map.
+            If an array is missing, or its values are not those of a map.
         """
         names = kept_names(arrays)
         return Lifted(

@@ -1,6 +1,6 @@
-"""Maps of one's own in Python, as the compiled tick calls them: by the address of a C function that asks the map.
+"""User-defined maps in Python, called by the compiled tick through the address of a C callback.
 
-The tick runs without the GIL; the C function takes it for as long as the map computes a pose.
+The tick runs without the GIL; the callback holds the GIL while the map computes a pose.
 """
 
 import ctypes
@@ -19,7 +19,7 @@ from controllers.state import Array, Pose
 OWN = 8
 _NUMBERS = ctypes.POINTER(ctypes.c_double)
 _CALLBACK = ctypes.CFUNCTYPE(None, _NUMBERS, _NUMBERS, _NUMBERS, ctypes.c_int64, ctypes.c_int64)
-_STEP = 1e-5  # of finite differences [m, rad]: the cube root of rounding, of lengths of some centimetres
+_STEP = 1e-5  # [m, rad] of central differences: cube root of the rounding error, for lengths of some centimetres
 
 
 @intrinsic
@@ -42,20 +42,20 @@ _call = cast(Callable[[int, int, int, int, int, int], None], _call_c)
 
 @njit
 def own_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Kernel of a map in Python: the bits of the first parameter are the address of what asks it (see `Asked`)."""
+    """Kernel of a map in Python: the bits of the first parameter are the address of the callback (see `Asked`)."""
     place, rows = params.view(np.int64)[0], jacobian.shape[0]
     _call(place, x.ctypes.data, pose.ctypes.data, jacobian.ctypes.data, pose.shape[0], rows)
 
 
 class Asked:
-    """A map's function as the tick asks it; the first error in it is kept, and the pose then stays what it was.
+    """C callback of a map for the tick; after a first error, which is kept, the pose stays at its last value.
 
     Parameters
     ----------
     pose, jacobian : callable
         From a stylus pose (7,) to a configuration (nq,), and to the derivative (nv, 6).
     start : Pose
-        The configuration until the first is found.
+        The configuration before the first call.
     """
 
     def __init__(self, pose: Callable[[Array], Pose], jacobian: Callable[[Array], Array], start: Pose):
@@ -69,7 +69,7 @@ class Asked:
                     self._last = checked_pose(pose(place), nq)
                     if rows:
                         np.ctypeslib.as_array(derivative, (rows, 6))[:] = jacobian(place)
-            except Exception as error:  # nothing may leave a C function
+            except Exception as error:  # no exception may leave a C callback
                 self.error = error
             np.ctypeslib.as_array(target, (nq,))[:] = self._last
 
@@ -79,12 +79,12 @@ class Asked:
 
 
 def checked_pose(pose: Any, nq: int) -> Pose:
-    """A configuration of so many finite numbers.
+    """A configuration of `nq` finite numbers.
 
     Raises
     ------
     ParameterError
-        If it is not one.
+        If the pose has another shape or a number that is not finite.
     """
     numbers = np.asarray(pose, dtype=np.float64)
     if numbers.shape != (nq,) or not np.isfinite(numbers).all():
@@ -93,9 +93,9 @@ def checked_pose(pose: Any, nq: int) -> Pose:
 
 
 def difference(before: Pose, after: Pose) -> Array:
-    """The tangent that leads from one configuration to another, shape (nv,).
+    """The tangent that leads from one configuration to another in unit time, shape (nv,).
 
-    Root velocity in the world; angular velocity of root and joints in their own frames, as MuJoCo has them.
+    Root velocity in the world; angular velocity of root and joints in their own frames, as in MuJoCo's qvel.
     """
     parts = [after[:3] - before[:3]]
     for k in range(3, len(before), 4):

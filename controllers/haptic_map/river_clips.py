@@ -1,4 +1,4 @@
-"""Every river plays a clip of its own: the river that has the hand gives the clip, the hand's phase on it the frame."""
+"""The map of a bundle of rivers: the active river selects the clip, the hand's phase on its curve the frame."""
 
 import math
 from collections.abc import Sequence
@@ -39,25 +39,26 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 RIVER_CLIPS = 5
-# The memory: the lap of the clip that plays, then its river, the last phase of the hand, and whether it stands still
-# there; the river along which the hand goes, the phase at which it came there, how far the clip was ahead of it, and
-# the phase that is shown; the change that is gone through (−1: none), its gate, and the phase that was shown when gates
-# were looked for last.
+# Memory behind the frame of the lap; phases in s:
+# RIVER: river of the playing clip. PHASE: last phase of the hand. STILL: 1 while the clip is held at a phase.
+# COURSE: river whose curve times the hand. CAME: phase at which the hand came to it. AHEAD: lead of the clip over the
+# hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate. LOOKED: phase
+# shown when gates were last searched.
 RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(MEMORY, MEMORY + 10)
-# Parameters: a header, offsets of the packed curves, the phases of rest and the changes, all these, and the blend.
+# Parameters: header, offsets of the packed curves, of the rest phases and of the changes, then these, then the blend.
 _RIVERS, _TUBE, _BLEND, _CURVES = range(4)
-_RACES = 2.0  # times the river's pace: a hand that no river has and that is faster plays no clip
-_SOON = 0.03  # [s] by which it is foreseen that it will be
-_CATCHES_UP = 2.0  # [s] in which a clip comes to be with a hand that it was ahead of
-_PAST = 0.25  # of a lap: a hand that goes back by as much is no longer before the moment, but after it
-LONGEST = 0.7  # of a lap, that a change may last
-_ALIKE = 1e-6  # [s] by which laps of rivers differ at most
-_NEIGHBOUR = 0.1  # of a lap: a phase further off is another branch
+_RACES = 2.0  # times the river's pace: a faster hand that no river holds plays no clip
+_SOON = 0.03  # [s] horizon of the prediction in `lets_go`
+_CATCHES_UP = 2.0  # [s] of the phase, in which the clip's lead over the hand decays to zero
+_PAST = 0.25  # of a lap: a phase that lies before a moment by less than this counts as before it, otherwise as after it
+LONGEST = 0.7  # of a lap: longest duration of a change
+_ALIKE = 1e-6  # [s] largest difference of the laps of two rivers with a change between them
+_NEIGHBOUR = 0.1  # of a lap: a branch whose phase differs by more is a different branch
 
 
 @njit
 def _phase_near(params: Array, curve: int, x: Array, last: float) -> float:
-    """Phase of the curve's point nearest to the stylus; where it passes twice, of the branch that goes on."""
+    """Phase [s] of the curve's point nearest to the stylus; of several branches, that which continues `last`."""
     found = work_array((BRANCHES, 2))
     start, end = params[curve + START], params[curve + END]
     best, nearest = np.nan, _NEIGHBOUR * (end - start)
@@ -92,7 +93,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
         memory[CHANGE] = memory[CHANGE] if since < change_lasts(known, change) else -1.0
     there, along = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend = curve_acceleration(params, curve, phase)
-    # The nearest point stays nearest: (φ − p)·φ̇ = 0 gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
+    # Differentiating (φ − p)·φ̇ = 0 at the nearest point gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
     slope = 0.0
     for i in range(3):
         slope += along[i] ** 2 + (there[i] - x[i]) * bend[i]
@@ -113,28 +114,28 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
 
 @njit
 def _course(params: Array, memory: Array) -> int:
-    """Where the curve along which the hand goes is."""
+    """Offset in the parameters of the curve that times the hand."""
     return int(params[_CURVES + int(memory[COURSE])])
 
 
 @njit
 def changes_of(params: Array) -> Array:
-    """The changes that a map knows (`packed_changes`)."""
+    """The precomputed changes of a map (`packed_changes`)."""
     return params[int(params[_CURVES + 2 * int(params[_RIVERS])]) :]
 
 
 @njit
 def _after(phase: float, moment: float, lap: float) -> float:
-    """How long a phase is after a moment of the lap [s]; up to a quarter of it before, that is negative."""
+    """Time of a phase after a moment of the lap [s]; negative up to a quarter of the lap before it."""
     way = phase - moment
     return way - lap * np.floor(way / lap + _PAST)
 
 
 @njit(forceinline=False)
 def takes_over(params: Array, memory: Array, river: float) -> bool:
-    """Whether a river, by its number in the trace of the field, takes the hand from another, or from none; −1 is none.
+    """Whether the active river of the field (−1: none) takes the hand over from another river, or a held clip goes on.
 
-    What plays another clip, or the clip that stands still, begins at the phase of the hand on that river.
+    The clip then begins at the phase of the hand on that river.
     """
     other = river != memory[RIVER] or river != memory[COURSE]
     return 0.0 <= river < params[_RIVERS] and (other or memory[STILL] > 0.0)
@@ -142,7 +143,7 @@ def takes_over(params: Array, memory: Array, river: float) -> bool:
 
 @njit(forceinline=False)
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
-    """Pace at which the hand plays the clip, 1 for the river's own, by the memory a period later."""
+    """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
     curve = _course(params, memory)
     lap, way = params[curve + END] - params[curve + START], later[PHASE] - memory[PHASE]
     return (way - lap * np.round(way / lap)) / period
@@ -150,10 +151,11 @@ def phase_rate(params: Array, memory: Array, later: Array, period: float) -> flo
 
 @njit(forceinline=False)
 def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
-    """Whether no river has the hand any more, and it is outside the tube of the one whose clip plays, or races it.
+    """Whether the hand has left the river of the playing clip: no river is active, and it is off the tube or too fast.
 
-    A hand (3, 3), with its rates, that is thrown off is not followed until it does: it counts where it will be soon.
-    Half way to the curve's centre of curvature its pace is no pace of the river's, too.
+    `hand` (3, 3) holds position, velocity and acceleration. So that the clip does not follow a hand that is thrown off,
+    the pace predicted `_SOON` ahead counts too; and so does a predicted place more than half way to the curve's centre
+    of curvature, where the phase is not a useful measure of pace.
     """
     if river >= 0.0 or memory[STILL] > 0.0:
         return False
@@ -177,14 +179,14 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
 
 @njit
 def change_clip(memory: Array, river: float, phase: float) -> None:
-    """Let the clip of another river play, from a phase on, in the frame of the lap that is."""
+    """Play the clip of another river, from a phase [s] on, in the current frame of the lap."""
     memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
     memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
 
 
 @njit(forceinline=False)
 def knows_change(params: Array, memory: Array, river: float) -> bool:
-    """Whether a change from the clip that plays to a river's is known, or is none."""
+    """Whether a precomputed change leads from the playing clip to that of a river, or the river is already playing."""
     if memory[STILL] > 0.0:
         return False
     return river == memory[RIVER] or known_between(changes_of(params), memory[RIVER], river)
@@ -192,7 +194,7 @@ def knows_change(params: Array, memory: Array, river: float) -> bool:
 
 @njit(forceinline=False)
 def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]:
-    """Change to a river, by its number, whose gate [s] has been passed since the last call; −1 if it has none."""
+    """Number and gate [s] of a change to a river whose gate was passed since the last call; number −1 if none was."""
     curve, before = _course(params, memory), memory[LOOKED]
     memory[LOOKED] = memory[SHOWN]
     start, lap = params[curve + START], params[curve + END] - params[curve + START]
@@ -201,13 +203,13 @@ def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]
 
 @njit(forceinline=False)
 def changing(memory: Array) -> bool:
-    """Whether a known change is gone through."""
+    """Whether a precomputed change is in progress."""
     return bool(memory[CHANGE] >= 0.0)
 
 
 @njit
 def take_course(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
-    """Let the hand at x be timed by another river's curve, while the clip that plays shows a phase [s]."""
+    """Time the hand at x by another river's curve, while the playing clip shows the phase `shown` [s]."""
     memory[COURSE] = river
     curve = _course(params, memory)
     phase = _phase_near(params, curve, x, shown)
@@ -217,26 +219,26 @@ def take_course(params: Array, memory: Array, river: float, x: Array, shown: flo
 
 @njit
 def hold_at_gate(params: Array, memory: Array, gate: float) -> None:
-    """Let the clip that plays stand where it has a gate [s]."""
+    """Hold the playing clip at a gate [s]."""
     memory[PHASE] = params[_course(params, memory) + START] + gate
     memory[STILL], memory[AHEAD] = 1.0, 0.0
 
 
 @njit
 def begin_change(memory: Array, river: float, change: int, gate: float) -> None:
-    """Let the clip of another river play through a known change, from its gate [s] on."""
+    """Play the clip of another river through a precomputed change, from its gate [s] on."""
     memory[RIVER], memory[LAST_ANGLE], memory[CHANGE], memory[GATE] = river, np.nan, change, gate
 
 
 @njit
 def go_on(memory: Array, phase: float, ahead: float) -> None:
-    """Let a clip that was held go on with the hand, at a phase, and ahead of it by a time [s]."""
+    """Let a held clip go on with the hand at a phase [s], ahead of the hand by a time [s]."""
     memory[PHASE], memory[AHEAD], memory[STILL] = phase, ahead, 0.0
 
 
 @njit
 def stop_clip(params: Array, memory: Array, way: float) -> None:
-    """Let the clip that plays stand still wherever the stylus is: at the phase of rest nearest to one `way` ahead."""
+    """Hold the playing clip at the rest phase nearest to `way` [s] beyond the shown phase; without any, just there."""
     river, rivers, curve = int(memory[RIVER]), int(params[_RIVERS]), _course(params, memory)
     lap = params[curve + END] - params[curve + START]
     first, last = int(params[_CURVES + rivers + river]), int(params[_CURVES + rivers + river + 1])
@@ -253,14 +255,14 @@ def stop_clip(params: Array, memory: Array, way: float) -> None:
 
 @njit
 def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
-    """Go on in the clip that plays at the pace of its river, without the hand; one that stands still stands."""
+    """Advance the playing clip by `seconds` at its river's own pace and hold it there; a held clip stays."""
     if memory[STILL] == 0.0:
         memory[PHASE], memory[STILL] = wrap_phase(params, _course(params, memory), memory[PHASE] + seconds), 1.0
 
 
 @njit
 def heading_between(pose: Pose, other: Pose) -> float:
-    """Angle about the vertical [rad] by which a root must turn to face as another one does: the twist of q' q⁻¹."""
+    """Angle about the vertical [rad] from the heading of one pose's root to that of another: the twist of q' q⁻¹."""
     w, _, _, z = multiply(other[3], other[4], other[5], other[6], pose[3], -pose[4], -pose[5], -pose[6])
     return 2.0 * np.arctan2(z, w) if w >= 0.0 else 2.0 * np.arctan2(-z, -w)
 
@@ -280,36 +282,37 @@ class RiverClips(AnimationMap):
 
     .. math:: h(p, i) = A\,\rho_i\bigl(2\pi\,(t^*_i - t_0)/(t_1 - t_0)\bigr)
 
-    i is the river that has the hand, a number that the field leaves in its trace; t*_i the phase of its curve nearest
-    to the stylus (of the branch that goes on, where the curve passes twice); a lap of the river is a lap of its clip.
-    A hand that no river has, outside the tube of the last or too fast in it, has no frame: the reference stops, at a
-    phase at which the clip can stand (`stop_clip`).
-    Clips are aligned in time to the first (`alignment`), so at a change the figure is about as far in the new motion
-    as it was in the old. A ∈ SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h
-    jumps: the reference goes on from where the figure stands (`place_clip`), with the offset decaying
-    (`inertialization`); or, where a change from the one clip to the other is known (`clip_change`), it begins at the
-    next gate, and h goes through it with the phase of the hand. h does not depend on the stylus's orientation.
+    i is the active river, whose number the field leaves in its trace; t*_i the phase of its curve nearest to the stylus
+    (of several branches, of the one that continues); a lap of the river is a lap of its clip. A hand without an active
+    river that is outside the tube of the last one, or too fast in it, plays no frame: the reference stops at a phase at
+    which the clip can stand (`stop_clip`).
+
+    Clips are aligned in time to the first (`alignment`), so that a change keeps about the same phase of motion. A ∈
+    SE(2) is the frame of the lap, kept in the memory (`lap`). When the river changes, h jumps, and the reference goes
+    on from where the figure stands (`place_clip`) with a decaying offset (`inertialization`). Where a change between
+    the two clips is precomputed (`clip_change`), it begins at the next gate instead, and h runs through it with the
+    phase of the hand. h does not depend on the stylus's orientation.
 
     Parameters
     ----------
     curves : sequence of Trajectory
-        Of the rivers, periodic, in H.
+        Curves of the rivers, periodic, in H.
     clips : sequence of (Array, float)
-        As many: poses (n, nq) and frames per second. Clips that do not close are closed (`closed_loop`).
+        One for each curve: poses (n, nq) and frames per second. Clips that do not close are closed (`closed_loop`).
     tube : float
         Distance from a curve [m] within which a branch is followed; beyond it the nearest point of all counts.
     limbs : sequence of Limb
-        Limbs whose ends are placed: feet that stand (see `limbs`).
+        Limbs whose ends (feet) are placed (see `limbs`).
     lap : float, optional
-        Time of the hand's lap [s], in which each clip is played as often as it fits (`strides`); without it, once.
+        Duration of the hand's lap [s], in which each clip is played as often as it fits (`strides`); by default once.
     apart : bool
         Whether strides of the clips need not be in step.
 
     Raises
     ------
     ParameterError
-        If there are not as many clips as curves, a curve is open, the tube is not positive, or a clip is not as the
-        others.
+        If clips and curves differ in number, a curve is open, the tube is not positive, or the clips' poses differ in
+        size.
     """
 
     def __init__(
@@ -336,18 +339,18 @@ class RiverClips(AnimationMap):
         super().__init__(RIVER_CLIPS, river_clips_map, clips, self._header(), (), limbs, lap, apart)
 
     def _header(self) -> Array:
-        """What the kernel reads before the blend."""
+        """Parameters of the kernel before those of the blend."""
         blocks = [*(curve.packed() for curve in self.curves), *self._rests, packed_changes(self.changes)]
         offsets = np.cumsum([_CURVES + len(blocks) + 1, *(len(block) for block in blocks)])
         return np.concatenate([[len(self.curves), self._tube, offsets[-1]], offsets, *blocks])
 
     def with_rests(self, rests: Sequence[Array]) -> "RiverClips":
-        """The same map, whose clips stop only where they can stand: phases of each curve, shape (n,); none: anywhere.
+        """The same map with clips that stop only at rest phases [s], shape (n,) for each curve; empty: anywhere.
 
         Raises
         ------
         ParameterError
-            If there are not phases for as many curves, or they are not finite.
+            If phases and curves differ in number, or a phase is not finite.
         """
         phases = [np.asarray(still, dtype=np.float64).ravel() for still in rests]
         if len(phases) != len(self.curves) or not all(np.all(np.isfinite(still)) for still in phases):
@@ -357,13 +360,13 @@ class RiverClips(AnimationMap):
         return other._repacked()
 
     def with_changes(self, changes: Sequence[ClipChange]) -> "RiverClips":
-        """The same map, whose clips go over into each other by changes that are known, where there are.
+        """The same map with precomputed changes between its clips.
 
         Raises
         ------
         ParameterError
-            If one is between rivers that are not there or whose laps differ, has no gate, is not of such poses, or
-            lasts longer than 0.7 of a lap.
+            If a change names a river that does not exist, or rivers with different laps, has no gate, does not fit
+            the poses, or lasts longer than 0.7 of a lap.
         """
         laps = [curve.duration for curve in self.curves]
         for change in changes:
@@ -381,7 +384,7 @@ class RiverClips(AnimationMap):
         return other._repacked()
 
     def on_one_river(self) -> "RiverClips":
-        """The same clips with the first river's curve for all: between them then only the motion changes."""
+        """The same clips with the first river's curve for all, so that a change affects only the motion."""
         other = copy(self)
         other.curves = (self.curves[0],) * len(self.curves)
         return other._repacked()
@@ -391,6 +394,6 @@ class RiverClips(AnimationMap):
         return self
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it, with the memory of a new run: the first river has the hand."""
+        """The map in the form of its kernel, with the memory of a new run: the first river is active."""
         memory = [0.0, np.nan, 0.0, 0.0, 0.0, 0.0, np.nan, -1.0, 0.0, np.nan]
         return CompiledMap(self._kind, self._params, np.concatenate([fresh_lap(), memory]))

@@ -1,12 +1,12 @@
-r"""The map to a robot arm: the stylus leads the tool of an arm of seven joints.
+r"""The map to a redundant robot arm: the stylus leads the end effector (tool) of an arm with seven joints.
 
-The tool's pose is the stylus's, moved, scaled and kept within a domain (`saturation`):
+The tool's pose is the stylus's, displaced, scaled and saturated at the edge of a domain (`saturation`):
 
 .. math:: p_T = p_0 + \kappa\, f(p_H), \qquad R_T = \exp f(\log R_H)\; R_0
 
 The joints follow by closed-form inverse kinematics of a spherical shoulder (axes z, y, z), an elbow (y) and a spherical
-wrist (z, y, z). With x from shoulder to wrist, of length D, azimuth a and angle e from the vertical, l the lengths of
-upper arm and forearm,
+wrist (z, y, z). With x the vector from shoulder to wrist, of length D, azimuth a and angle e from the vertical, and
+l_1, l_2 the lengths of upper arm and forearm,
 
 .. math:: \cos q_4 = \frac{D^2 - l_1^2 - l_2^2}{2 l_1 l_2}, \quad
           \beta = \operatorname{atan2}(l_2 \sin q_4,\, l_1 + l_2 \cos q_4), \quad
@@ -14,7 +14,7 @@ upper arm and forearm,
 
 and the angles of shoulder and wrist are those of R_03 and R_04ᵀ R_T. The redundant degree of freedom is the arm angle ψ
 (Kreutz-Delgado, Long & Seraji 1992), the turn of the elbow about x away from the vertical plane; it is kept constant,
-so that a closed path of the tool is a closed path of the joints. h_* follows the same steps.
+so that a closed path of the tool is a closed path of the joints. h_* differentiates the same steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,8 +35,8 @@ ROBOT_ARM = 4
 JOINTS = 7
 _HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 4, 6, 8, 12, 16, 17
 
-_FAR, _NEARLY_BACK = 1e3, 3.1  # [m], [rad] where a saturated stylus is on the edge of its domain
-_LEAST_BEND = np.radians(8.0)  # of the joints at whose zero shoulder, elbow or wrist are singular
+_FAR, _NEARLY_BACK = 1e3, 3.1  # [m], [rad] far enough for the saturated stylus to be at the edge of its domain
+_LEAST_BEND = np.radians(8.0)  # least distance from the singularities of shoulder, elbow and wrist, which are at zero
 
 
 @njit
@@ -56,7 +56,7 @@ def _wrapped(angle: float) -> float:
 
 @njit
 def _zyz(q: Quaternion, sign: float) -> Vector:
-    """Angles of R_z(a) R_y(b) R_z(c), b of a given sign; at b = 0 only a + c is defined."""
+    """Angles a, b, c of R_z(a) R_y(b) R_z(c), with b of a given sign; at b = 0 only a + c is defined."""
     w, x, y, z = q
     total, difference = np.arctan2(z, w), np.arctan2(-sign * x, sign * y)
     b = 2.0 * np.arctan2(np.sqrt(x * x + y * y), np.sqrt(w * w + z * z))
@@ -65,7 +65,7 @@ def _zyz(q: Quaternion, sign: float) -> Vector:
 
 @njit
 def _zyz_rates(a: float, b: float, omega: Vector) -> Vector:
-    """Rates of the three angles for an angular velocity in the frame in which the first turns."""
+    """Rates of the three angles for an angular velocity in the fixed frame of the first rotation."""
     sine, cosine = np.sin(a), np.cos(a)
     rate_c = (cosine * omega[0] + sine * omega[1]) / np.copysign(max(abs(np.sin(b)), 1e-9), b)
     return omega[2] - np.cos(b) * rate_c, cosine * omega[1] - sine * omega[0], rate_c
@@ -94,7 +94,7 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
     flat, square = np.sqrt(flat2), flat2 + pz * pz
     azimuth, elevation = np.arctan2(py, px), np.arctan2(flat, pz)
     cosine = (square - upper * upper - fore * fore) / (2.0 * upper * fore)
-    # Out of reach the arm is stretched; `RobotArm` refuses a domain where that happens.
+    # Out of reach the arm is stretched straight; `RobotArm` rejects a domain where that happens.
     cosine = min(1.0, max(-1.0, cosine))
     sine = np.sqrt(1.0 - cosine * cosine)
     elbow = np.arctan2(sine, cosine)
@@ -116,7 +116,7 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
             v = scale * place_slope[0, j], scale * place_slope[1, j], scale * place_slope[2, j]
         else:
             unit = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
-            # Angular velocities are not local here, hence the minus signs.
+            # Angular velocities are in the fixed frame here, not the local one, hence the minus signs.
             rate = rotation_vector_rate(-stylus[0], -stylus[1], -stylus[2], unit[0], unit[1], unit[2])
             led_rate = (
                 turn_slope[0, 0] * rate[0] + turn_slope[0, 1] * rate[1] + turn_slope[0, 2] * rate[2],
@@ -153,14 +153,14 @@ def robot_arm_map(params: Array, x: Array, memory: Array, pose: Array, jacobian:
 class RobotArm(HapticMap):
     """The stylus leads the tool of a robot arm.
 
-    A configuration is the seven joint angles [rad], a tangent their rates [rad/s]. Stylus positions are kept within a
-    ball about the origin of H and its rotations from upright within a cone, smoothly (C²): beyond, the arm stays at the
-    edge. A stylus turned by exactly half a turn may be led to either side: h jumps there.
+    A configuration is the seven joint angles [rad], a tangent their rates [rad/s]. Stylus positions saturate smoothly
+    (C²) at a ball about the origin of H, and its rotations from upright at a largest angle: beyond, the arm stays at
+    the edge. At a stylus turn of exactly half a turn the direction is ambiguous: h jumps there.
 
     Parameters
     ----------
     lengths : sequence of four floats
-        Base to shoulder, to elbow, to wrist, to tool [m].
+        Base to shoulder, shoulder to elbow, elbow to wrist, wrist to tool [m].
     limits : Array, shape (7, 2)
         Least and greatest joint angles [rad].
     home : Array-like, shape (3,)
@@ -168,22 +168,22 @@ class RobotArm(HapticMap):
     orientation : Array-like, shape (4,)
         R_0, the tool's orientation in that frame for an upright stylus, quaternion wxyz; its z axis is the tool's.
     scale : float
-        κ, tool's motion over the stylus's.
+        κ, ratio of the tool's motion to the stylus's.
     reach : tuple of two floats
-        Stylus distance up to which the tool follows exactly, and beyond which it never goes [m].
+        Stylus distance up to which the tool follows exactly, and its bound in saturation [m].
     turn : tuple of two floats
-        Likewise of the stylus's rotation from upright [rad].
+        The same for the stylus's rotation from upright [rad].
     arm_angle : float
         ψ [rad].
     evaluate : callable, optional
-        How the arm's domain is checked: h of this map at stylus poses (n, 7), shape (n, 7), by compiled code that is
-        there already. By default Python calls the kernel, which is then compiled.
+        h of this map at stylus poses (n, 7), shape (n, 7), for the check of the domain, by code that is compiled
+        already. By default the kernel is called from Python and compiled for it.
 
     Raises
     ------
     ParameterError
-        If a number is out of its interval, or somewhere in the domain the arm does not reach, its wrist or shoulder is
-        straight, or a joint is beyond its limits; the message has the place.
+        If a number is out of its interval, or somewhere in the domain the arm does not reach, is near a singularity of
+        shoulder, elbow or wrist, or exceeds a joint limit; the message says where.
     """
 
     def __init__(
@@ -224,7 +224,7 @@ class RobotArm(HapticMap):
         return CompiledMap(ROBOT_ARM, self._params, np.zeros(0))
 
     def compiled(self) -> CompiledMap:
-        """The map as its kernel takes it; it keeps no memory."""
+        """The map in the form of its kernel; it has no memory."""
         return self._compiled
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
@@ -243,7 +243,7 @@ class RobotArm(HapticMap):
         return np.array([self.pose(x) for x in points])
 
     def _check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array]) -> None:
-        """Refuse a domain in whose ball and cone the arm does not work, on a grid of directions and sizes."""
+        """Raise unless the arm works at the centre and the edge of the domain, on a grid of directions and turns."""
         directions = np.array([(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], dtype=float)
         directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1.0)
         edge = [(place, turn) for place in _FAR * directions for turn in _NEARLY_BACK * directions]

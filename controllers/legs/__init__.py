@@ -1,1 +1,1 @@
-"""Legs: limbs and soles, stance and swing, feet that keep their place on the floor."""
+"""Legs: inverse kinematics of limbs, stance and swing, foot placement, and removal of foot skate."""

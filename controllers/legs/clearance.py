@@ -1,14 +1,14 @@
-r"""Clearance of a blend's feet in swing, also between the mixtures at which footfalls were found.
+r"""Swing clearance of a blend's feet between the mixtures (nodes) at which footfalls were computed.
 
-Which foot steps, and when, may change from one mixture of the clips to the next. Half way between two such nodes a
-table has a foot move as the one says, and lifted as the other: it would be dragged over the floor. So the
-interpolated paths of the soles' points are looked at between the nodes too. Where a point p is dragged a way D about
-a moment while its height h over the ground is less than h_c, its foot lacks
+Which foot steps, and when, may change from one mixture of the clips to the next. Half way between two such nodes the
+interpolated table moves a foot as at one node and lifts it as at the other: it would be dragged over the floor. So the
+interpolated paths of the sole points are also checked between the nodes. Where a point p is dragged over a distance D
+around a moment while its height h over the ground is less than h_c, its foot lacks the clearance
 
 .. math:: N = S\Bigl(\frac{D - D_0}{D_1 - D_0}\Bigr)\, S\Bigl(\frac{|\dot p|}{v}\Bigr)\, (h_c - h)_+,
 
-or as much as it is deeper than h_d in the ground. The nodes around lift it by the largest N, widened in time; this is
-done again where that was not enough. Where a clip is alone its own slides are its.
+or, if larger, its penetration into the ground beyond h_d. The surrounding nodes are raised by the largest N, widened in
+time; this is repeated where it was not enough. A clip alone keeps its own foot skate.
 """
 
 from collections.abc import Sequence
@@ -24,32 +24,32 @@ from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import turned
 from controllers.state import Array
 
-_CLEAR, _TOUCHES = 0.005, 0.004  # h_c, and how low what moves is dragged in full [m]
+_CLEAR, _TOUCHES = 0.005, 0.004  # [m] h_c, and the height below which a moving point counts fully as dragged
 _LEAST, _MOST = 0.0265, 0.029  # D_0, D_1 [m]
 _DEEP = 0.005  # h_d [m]
-_FAST = 0.3  # v [m a lap]
-_MOMENT = 0.1  # share of the lap over which D is taken
+_FAST = 0.3  # v [m per lap]
+_MOMENT = 0.1  # share of the lap over which D is accumulated
 _SPREAD = 0.012  # share of the lap by which a lift begins early and ends late
-_TAKES_PART = 0.02  # least share that a node around has in the place between
-_ALONE = 0.1  # by which a clip's share of its own slides is less than 1 where feet are lifted in full
-_ROUNDS = 4
+_TAKES_PART = 0.02  # least interpolation weight of a node that is raised for a point between nodes
+_ALONE = 0.1  # how far below 1 the kept share of the clips' own skate must be for feet to be raised in full
+_ROUNDS = 4  # iterations
 
 
 def cleared(
     values: Array, channels: Array, drifts: Array, limbs: Sequence[Limb], nodes: Array, between: Array, shares: Array
 ) -> Array:
-    """Corrections at nodes, with feet raised that would be dragged between them.
+    """Corrections at nodes, raised where feet would be dragged between the nodes.
 
     Parameters
     ----------
     values : Array, shape (n, k, 2 + 4 limbs)
-        Of `foot_corrections` at the nodes.
+        `foot_corrections` at the nodes.
     channels, drifts, limbs
-        As there.
+        As in `foot_corrections`.
     nodes, between : Array, shapes (k, m), (c, m)
-        Weights of the clips at the nodes, and at places between them.
+        Weights of the clips at the nodes, and at points between them.
     shares : Array, shape (c, k)
-        By which the nodes' values are interpolated at these.
+        Interpolation weights of the nodes at those points.
 
     Returns
     -------
@@ -80,14 +80,14 @@ def cleared(
 
 
 def _levers(turn: Array, limb: Limb) -> Array:
-    """From the centre of a limb's points to each of them [m], shape (n, c, points, 3)."""
+    """Vectors from the centre of a limb's points to each point [m], shape (n, c, points, 3)."""
     turns = Rotation.from_quat(turn.reshape(-1, 4), scalar_first=True)
     levers = [turns.apply(point) for point in limb.points - limb.points.mean(axis=0)]
     return np.stack(levers, axis=1).reshape(*turn.shape[:2], -1, 3)
 
 
 def _lacking(end: MeanEnd, levers: Array, d: Array, ground: Array) -> Array:
-    """N of a foot with corrections d (n, c, 4) over the ground at heights (c,), shape (n, c)."""
+    """Lacking clearance N [m] of a foot with corrections d (n, c, 4), over ground at heights (c,); shape (n, c)."""
     n = len(d)
     height = (end.place[..., 2] + d[..., 2] - ground)[..., None] + levers[..., 2]
     low = np.maximum(_CLEAR - height, 0.0)
@@ -98,7 +98,7 @@ def _lacking(end: MeanEnd, levers: Array, d: Array, ground: Array) -> Array:
     moment = max(1, round(_MOMENT * n))
     on_ground = way * np.minimum(touches, np.roll(touches, -1, axis=0))
     dragged = moment * uniform_filter1d(on_ground, moment, axis=0, mode="wrap")
-    # Of the two steps beside a sample.
+    # The larger of the two steps beside a sample.
     speed = n * np.maximum(way, np.roll(way, 1, axis=0))
     lacks = smooth_step((dragged - _LEAST) / (_MOST - _LEAST)) * smooth_step(speed / _FAST) * low
     return np.maximum(lacks, -_DEEP - height).max(axis=2)

@@ -1,8 +1,8 @@
-r"""Ends of limbs of a blend do not go below the lowest that its clips go: not where corrections of many clips add up.
+r"""Floor constraint of a blend: feet do not go below the lowest point of all clips, even where corrections add up.
 
-With l = z + m(R s_k) the height of an end, m a soft minimum over its points s_k, and l₀ the lowest of
-all clips' frames, the end is raised by S(l₀ − l); S(x) = x³/(x² + s²), 0 for x < 0: C², and within s/2 of x. A clip
-alone is left as it is.
+With l = z + m(R s_k) the height of an end (foot), m a soft minimum over its points s_k, and l₀ the lowest over all
+clips' frames, the end is raised by S(l₀ − l); S(x) = x³/(x² + s²), 0 for x < 0: C², and within s/2 of x. A clip alone
+is left unchanged.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ _ROUND = 4e-3  # s [m]
 
 @njit
 def keep_above(floor: float, sole: Array, end: Array, q: Quat, rate: Array, tangents: int) -> None:
-    """Raise an end that goes below the floor.
+    """Raise a limb's end that goes below the floor.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ def keep_above(floor: float, sole: Array, end: Array, q: Quat, rate: Array, tang
     q : Quat
         Orientation of the end.
     rate : Array, shape (3, n)
-        Its local angular velocities with respect to the parameters.
+        Local angular velocities of the end with respect to the parameters.
     tangents : int
-        n, or 0 to leave the derivatives alone.
+        n, or 0 to leave the derivatives unchanged.
     """
     least, heights = np.inf, work_array(sole.shape[0])
     for i in range(sole.shape[0]):

@@ -1,19 +1,21 @@
 r"""Stance and swing of a blend: its feet step one at a time, and move only while they are lifted.
 
-A mean of clips that step at different times moves both feet at once, hardly lifted. So at every mixture of the clips
-the path of each foot over the lap is made again from what the mean asks for:
+The mean of clips with different footsteps moves both feet at once, hardly lifted. So for every mixture of the clips the
+path of each foot over the lap is computed anew from the mean path p̄:
 
-- Clearance. With the clearances h̄_j of the blended feet and F = Σ w_i min_j h_ij, the height at which the clips
-  themselves fly, foot j is held at F + A(ĥ_j), ĥ_j = h̄_j − min_k h̄_k: the lower foot stands. A(h) = h + c h/(h + h_c)
-  lifts a foot that makes a small share of a step enough for it to clear the ground.
-- Place and heading. The foot moves as far as it is free, g = S((ĥ + F)/h_0), and catches up with the mean then:
+- Clearance. With the clearances h̄_j of the feet in the mean and F = Σ w_i min_j h_ij, the mean height of the clips'
+  flight phases, foot j is placed at F + A(ĥ_j), ĥ_j = h̄_j − min_k h̄_k: the lower foot is in stance.
+  A(h) = h + c h/(h + h_c) lifts a foot that makes only a small share of a step enough to clear the ground.
+- Position and heading. The foot moves in proportion to g = S((ĥ + F)/h_0), 0 in stance and 1 in swing, and catches up
+  with the mean meanwhile:
 
 .. math:: p' = g\, \dot{\bar p} + \kappa\, g\, (\bar p - p) .
 
   Integrated forwards round the lap this holds a foot where it last stood; integrated backwards, where it will stand
-  next; their average does both by halves, and is as fixed while g = 0.
+  next. The average of both is used; it is equally fixed while g = 0.
 
-What is found at a mixture is lessened by the average of what is found for its clips alone, which so remain as they are.
+From the correction of a mixture, the weighted corrections of its clips alone are subtracted, so that clips alone remain
+unchanged.
 """
 
 from collections.abc import Sequence
@@ -27,28 +29,28 @@ from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
-_FREE = 0.008  # h_0 [m], where the foot is lifted so high
-STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] so high it does not move yet, and as a share
-_SHARE_FREE = 0.5  # and as a share of the largest lift of the lap
-_LIFTED = 0.002  # [m] a foot that is never lifted more is not held
+_SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights
+_FREE = 0.008  # h_0 [m], height from which the foot moves freely
+STANDS, _SHARE_STANDS = 0.003, 0.2  # [m] height up to which it does not move; at most this share of the largest lift
+_SHARE_FREE = 0.5  # h_0 is at most this share of the largest lift of the lap
+_LIFTED = 0.002  # [m] a foot that is never lifted by more than this is not held
 _RAISE, _RAISE_FROM = 0.02, 0.003  # c, h_c [m]
 _CATCH_UP = 8.0  # κ ∫ g over a lap, at least
-_FADE = 4  # power of a clip's weight with which its own slides come back
-_LAPS = 4  # until the path repeats
+_FADE = 4  # power of a clip's weight with which its own foot skate is kept
+_LAPS = 4  # laps of integration until the path is periodic
 
 
 class BlendedFeet(NamedTuple):
-    """What the mean asks of J feet at k mixtures of m clips, at n samples of the lap.
+    """Paths of J feet in the mean, for k mixtures of m clips, at n samples of the lap.
 
     Attributes
     ----------
     height : Array, shape (n, k, J)
-        Of the lowest point of each sole over the lowest of all clips [m].
+        Height of the lowest point of each sole over the lowest of all clips [m].
     moves : Array, shape (n, k, J, 3)
-        Over the ground (x, y [m], heading [rad]) at the points that touch, from each sample to the next.
+        Slip over the ground (x, y [m], heading [rad]) at the touching points, from each sample to the next.
     angles : Array, shape (n + 1, k, J)
-        By which a foot's frame is turned [rad].
+        Heading of the frame in which a foot is given [rad].
     own : Array, shape (n, m, J)
         Heights in the clips themselves [m].
     """
@@ -60,18 +62,18 @@ class BlendedFeet(NamedTuple):
 
 
 class MeanEnd(NamedTuple):
-    """Where the mean has the end of a limb at k mixtures, at n samples of the lap.
+    """Pose of a limb's end in the mean, for k mixtures, at n samples of the lap.
 
     Attributes
     ----------
     place : Array, shape (n, k, 3)
-        Of the centre of its points [m], in a frame of its own.
+        Position of the centre of its points [m], in a frame that moves with the drift exp((s + λ) ξ).
     turn : Array, shape (n, k, 4)
-        Its orientation there.
+        Orientation in that frame.
     shift : Array, shape (n + 1, k, 2)
-        Of that frame over the ground [m], a lap on at last.
+        Position of that frame over the ground [m]; the last row is one lap later.
     angle : Array, shape (n + 1, k)
-        By which it is turned [rad].
+        Heading of that frame [rad].
     """
 
     place: Array
@@ -101,16 +103,16 @@ def _mean_rotations(quaternions: Array, weights: Array) -> Array:
 
 
 def gap(slips: Array, hold: Array, turn: Array) -> Array:
-    """How far what slips is ahead of what stands, c' = slip − κ g c, forwards and backwards round the lap on average.
+    """Accumulated slip c of a foot, c' = slip − κ g c: average of forward and backward integration round the lap.
 
     Parameters
     ----------
     slips : Array, shape (n, ..., 3)
-        Over the ground (x, y, heading) from each sample to the next.
+        Slip over the ground (x, y, heading) from each sample to the next.
     hold : Array, shape (n, ...)
         exp(−κ g Δs).
     turn : Array, shape (...)
-        Angle by which the lap turns [rad].
+        Heading change of a lap [rad].
 
     Returns
     -------
@@ -138,17 +140,17 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
     Parameters
     ----------
     channels : Array, shape (n, m, nq + 5 limbs)
-        Of the clips at equal steps of the lap (`with_ends`).
+        Channels of the clips at equal steps of the lap (`with_ends`).
     drifts : Array, shape (m, 3)
-        Their drifts ξ.
+        Drifts ξ of the clips.
     limbs : sequence of Limb
     weights : Array, shape (k, m)
-        Of the clips in each mixture.
+        Weights of the clips in each mixture.
 
     Returns
     -------
     Array, shape (n, k, 2 + 4 limbs)
-        Channels of `inbetween`: those of the root zero.
+        Channels of `inbetween`, with zeros for the root.
     """
     everything = np.concatenate([weights, np.eye(channels.shape[1])])
     found = _found(channels, drifts, limbs, everything)
@@ -158,14 +160,14 @@ def foot_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weig
 
 
 def own_shares(channels: Array, weights: Array) -> Array:
-    """How much of what clips slide alone a mixture keeps, shape (k, m); a clip that is given twice counts as one."""
+    """Share of each clip's own foot skate that a mixture keeps, shape (k, m); a clip given twice counts as one."""
     clips = range(channels.shape[1])
     alike = np.array([[np.array_equal(channels[:, i], channels[:, j]) for j in clips] for i in clips])
     return (weights @ alike) ** _FADE / alike.sum(axis=0)
 
 
 def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> BlendedFeet:
-    """What the mean asks of the feet; arguments as in `foot_corrections`."""
+    """Paths of the feet in the mean; arguments as in `foot_corrections`."""
     own = np.stack([_own_height(channels, limbs, j) for j in range(len(limbs))], axis=2)
     ground = own.min()
     height, moves, angles = [], [], []
@@ -183,7 +185,7 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
 
 
 def _own_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
-    """Of the end of limb j in each clip: position, λ and clearance (n, m, 5), and orientation (n, m, 4)."""
+    """End of limb j in each clip: position, λ and clearance (n, m, 5), and orientation (n, m, 4)."""
     at, column = channels.shape[2] - END * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
     return channels[..., at : at + END], channels[..., column : column + 4]
 
@@ -194,7 +196,7 @@ def _own_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
 
 
 def mean_end(channels: Array, drifts: Array, limbs: Sequence[Limb], j: int, weights: Array) -> MeanEnd:
-    """Where the mean has the end of limb j; arguments as in `foot_corrections`."""
+    """Pose of the end of limb j in the mean; arguments as in `foot_corrections`."""
     n = len(channels)
     ends, turns = _own_end(channels, limbs, j)
     lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
@@ -213,7 +215,7 @@ def _found(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array
     highest = up.max(axis=0)
     least = np.minimum(STANDS, _SHARE_STANDS * highest)
     free = smooth_step((up - least) / np.maximum(np.minimum(_FREE, _SHARE_FREE * highest) - least, 1e-6))
-    # A foot that the clips do not lift is left to the mean.
+    # A foot that the clips do not lift follows the mean.
     held = smooth_step(highest / _LIFTED)
     free = 1.0 - held * (1.0 - free)
     rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)

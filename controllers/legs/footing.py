@@ -1,15 +1,16 @@
-r"""Feet in stance keep their place on the floor, whatever the hand does to the blend: no foot skate.
+r"""Run-time removal of foot skate: feet in stance keep their place on the floor while the hand changes the blend.
 
-Corrections that belong to a mixture (`pair_corrections`) hold a foot as long as the mixture stays as it is. Where it
-changes on the hand's path, and with it where the mean wants the foot, or between mixtures that were looked at, the foot
-would be dragged. So each end has an offset o over the ground, kept in the memory: of what an end is moved at its points
-that touch, Δp, the offset takes back the share σ by which it stands, and it fades as the end goes on through the air,
+The corrections of a mixture (`pair_corrections`) hold a foot only while the mixture is constant. Where the hand changes
+the mixture, and with it the foot's mean position, or between the mixtures that were corrected, the foot would slide. So
+each end has an offset o over the ground, kept in the memory. It cancels the share σ, the degree of stance, of the slip
+Δp of the end's touching points, and fades as the end swings through the air,
 
 .. math:: o \leftarrow o - \sigma\,\Delta p, \qquad \frac{do}{d\theta} = -\kappa\,(1 - \sigma_0)\, o .
 
-σ = σ₀(h) μ(w) falls with the height h of the sole, and to 0 where a clip is alone: its own slides are its, and h∘α̃ = α.
-Headings likewise. A hand that goes back makes the offset grow again, until it has turned; so velocity and acceleration
-of the figure may be differences to either side. h_* is the derivative at a given offset.
+σ = σ₀(h) μ(w) falls with the height h of the sole, and to 0 where a clip is alone: a clip keeps its own foot skate, so
+that h∘α̃ = α. Headings likewise. While a hand moves back a little, the offset grows again, until the direction counts
+as reversed; so velocity and acceleration of the figure may be taken as differences to either side. h_* is the
+derivative at a given offset.
 """
 
 from collections.abc import Sequence
@@ -26,29 +27,29 @@ from controllers.work_array import work_array
 
 _STANDS, _FREE = 0.003, 0.006  # [m] height of the sole up to which σ₀ is 1, and from which it is 0
 _MIXED, _ALONE = 0.6, 0.97  # Σ w² from which μ falls, and where it is 0
-_FADE, _FADE_ALONE = 5.0, 1.0  # κ [1/rad], and what a clip that is alone adds
-_MOST, _MOST_TURN = 0.15, 0.8  # [m], [rad] that no offset exceeds
-_TOUCH = 1e-3  # [m] of the heights by which it is weighed which points touch
-_TURNED = 0.15  # [rad] that a hand has to go back to go backwards
-_JUMP = 1.0  # [rad] that no hand goes between two ticks
+_FADE, _FADE_ALONE = 5.0, 1.0  # κ [1/rad], and the additional rate where a clip is alone
+_MOST, _MOST_TURN = 0.15, 0.8  # [m], [rad] largest offset
+_TOUCH = 1e-3  # [m] scale of heights in the weights of the touching points
+_TURNED = 0.15  # [rad] way back after which the hand's direction counts as reversed
+_JUMP = 1.0  # [rad] larger than any step of the hand's angle in one tick
 _WAY, _BEHIND, _ANGLE, _ENDS = range(4)
 _OFFSET, _PLACE, _TURN, _HELD, _STOOD, _END = 0, 3, 5, 9, 10, 11
 
 
 def fresh_footing(limbs: int) -> Array:
-    """Memory of the footing of some limbs at the start of a run."""
+    """Memory of the footing of a number of limbs at the start of a run."""
     memory = np.zeros(_ENDS + _END * limbs)
     memory[_WAY], memory[_ANGLE] = 1.0, np.nan
     return memory
 
 
 def packed_soles(limbs: Sequence[Limb]) -> Array:
-    """Points of limbs that may touch, from their centre [m], one after the other: what `keep_footing` is given.
+    """Sole points of limbs, relative to their centre [m], packed one after the other for `keep_footing`.
 
     Raises
     ------
     ParameterError
-        If one limb has more of them than another.
+        If the limbs differ in their number of points.
     """
     if len({len(limb.points) for limb in limbs}) > 1:
         raise ParameterError(f"limbs must have equally many points, got {[len(limb.points) for limb in limbs]}")
@@ -63,7 +64,7 @@ def _step_down(x: float, low: float, high: float) -> float:
 
 @njit
 def go_on(footing: Array, angle: float) -> float:
-    """Note the angle of the hand; returns how far it went on [rad], negative if back from where it goes to."""
+    """Store the angle of the hand; returns its step [rad] in the hand's current direction, negative if backwards."""
     step = angle - footing[_ANGLE]
     footing[_ANGLE] = angle
     if not np.isfinite(step):
@@ -87,7 +88,7 @@ def mixed(weights: Array) -> float:
 
 @njit
 def _levers(sole: Array, q: tuple[float, float, float, float], levers: Array) -> float:
-    """Points of a sole (k, 3) turned by q, written; returns the height of the lowest."""
+    """Write the points of a sole (k, 3) turned by q; returns the height of the lowest."""
     least = np.inf
     for i in range(sole.shape[0]):
         x, y, z = rotate(q[0], q[1], q[2], q[3], sole[i, 0], sole[i, 1], sole[i, 2])
@@ -106,24 +107,24 @@ def keep_footing(
     footing: Array, limb: int, ahead: float, mixture: float, sole: Array, ground: float, frame: Array, end: Array,
     q: Quat,
 ) -> None:  # fmt: skip
-    """Move and turn an end by its offset.
+    """Update the offset of an end, then move and turn the end by it.
 
     Parameters
     ----------
     footing : Array
         The memory; updated.
     limb : int
-        Which.
+        Number of the limb.
     ahead : float
-        How far the hand went on (`go_on`) [rad].
+        Step of the hand (`go_on`) [rad].
     mixture : float
         μ.
     sole : Array, shape (k, 3)
-        Points that may touch, from their centre, in the frame of the end [m].
+        Sole points relative to their centre, in the frame of the end [m].
     ground : float
         Height of the ground [m].
     frame : Array, shape (3,)
-        Frame in which the end is, over the ground (x, y [m], heading [rad]).
+        Pose over the ground of the frame in which the end is given (x, y [m], heading [rad]).
     end : Array, shape (3,)
         Position of the centre [m]; changed.
     q : Quat
@@ -140,7 +141,7 @@ def keep_footing(
     held = stands * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0
     if known and abs(ahead) < _JUMP:
-        # Over a step half of it is as it was, else a difference to either side would count a change twice.
+        # Mean of the degree of stance before and after the step, so that steps forwards and back cancel.
         share = 0.5 * (held + state[_HELD])
         last = state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3]
         low_before = _levers(sole, last, before)

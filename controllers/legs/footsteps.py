@@ -1,18 +1,18 @@
-r"""Foot placement in a transition: feet step to where the new motion has them, one after the other, and do not slide.
+r"""Foot placement in a transition: feet step one after the other to their places in the new motion, without skate.
 
-With E_n(s) where the end of a limb is in the new motion, and E_o(s) where it was, coming to rest within half of the
-blend time, the end goes
+With E_n(s) the position of a limb's end (foot) in the new motion, and E_o(s) its position in the old motion, brought
+to rest within half of the blend time, the end follows
 
 .. math:: E(s) = E_o + \beta(x)\,(E_n - E_o) + b(x)\,\lambda\,|E_n - E_o|\,e_z
 
 with the smooth step β = 10 x³ − 15 x⁴ + 6 x⁵ and the arc b = 64 x³ (1 − x)³; orientations likewise on SO(3). x runs
-from 0 to 1 in the limb's own half of the blend time, and the other foot stands meanwhile. A foot that stands before the
-change and after it is the pivot (`pivot`): the new motion is placed where it has that foot, which steps second, and
-then hardly. Where there is none, the foot that the new motion stands on steps first; else the one that is higher, or
-has the longer way to go. So position, velocity and acceleration of the feet are continuous, a foot that moves does so
-above the ground, and one foot stands. The limb's joints follow (`stepping_limbs`).
+from 0 to 1 in the limb's own half of the blend time, while the other foot is in stance. A foot in stance both before
+and after the change is the pivot (`pivot`): the new motion is placed on the floor so that this foot coincides, and it
+steps second, hardly moving. Without a pivot, the stance foot of the new motion steps first; otherwise the foot that is
+higher, or has the longer way. So position, velocity and acceleration of the feet are continuous, a moving foot is
+above the ground, and one foot is in stance. The limb's joints follow by inverse kinematics (`stepping_limbs`).
 
-A limb is a row of `packed_steppers`: `Limb.packed`, then its points as the last segment has them.
+A limb is a row of `packed_steppers`: `Limb.packed`, then its sole points in the frame of the last segment.
 """
 
 from collections.abc import Sequence
@@ -30,38 +30,38 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 _LIFT = 0.2  # λ: height of a step over its length
-_TURN_ARM = 0.1  # [m] a foot that turns moves as if its toes went this far a radian
-_ROUND = 3e-3  # [m] a way so short is hardly worth a lift
-_LEVEL = 0.01  # [m] feet that differ by less in height are equally high
-_FIRST = 1e3  # urgency of the step to where a limb is stood on; another's is below it
-_CAUGHT = 0.12  # [m] on which a foot comes to rest at most, unless it is too fast for that
-_THROW, _TWIRL = 20.0, 100.0  # [m/s²], [rad/s²] with which it goes on to do so at most
-_SOONEST = 0.05  # [s] in which a foot that falls comes to rest at least
-# A row of `steps`: when the step begins, place and orientation where the old motion comes to rest, and the offsets
-# from there with their rates, (3, 3) each; the time to get there; and the height of the floor.
+_TURN_ARM = 0.1  # [m] lever that converts the turn of a foot to a length of its step
+_ROUND = 3e-3  # [m] length of a step below which it is hardly lifted
+_LEVEL = 0.01  # [m] feet that differ by less in height count as equally high
+_FIRST = 1e3  # urgency of a stance foot's step; that of any other foot is below it
+_CAUGHT = 0.12  # [m] largest stopping distance of a foot, unless it is too fast for that
+_THROW, _TWIRL = 20.0, 100.0  # [m/s²], [rad/s²] largest acceleration of the old motion that is continued
+_SOONEST = 0.05  # [s] least stopping time of a foot
+# A row of `steps`: begin of the step [s]; position (3) and quaternion (4) at which the old motion comes to rest;
+# offsets from there with rates, (3, 3) each, of position and orientation; stopping time [s]; height of the floor [m].
 _BEGIN, _PLACE, _TURN, _AWAY, _TURNED, _STOP, FLOOR, STEP = 0, 1, 4, 8, 17, 26, 27, 28
 
 
 def packed_steppers(limbs: Sequence[Limb]) -> Array:
-    """Limbs that step, as the kernels take them: shape (n, 36 + 3 k) for k points each.
+    """Limbs packed for the kernels, shape (n, 36 + 3 k) for k sole points each.
 
     Raises
     ------
     ParameterError
-        If one has more points than another.
+        If the limbs differ in their number of points.
     """
     return np.hstack([[limb.packed() for limb in limbs], packed_soles(limbs).reshape(len(limbs), -1)])
 
 
 @njit
 def lever(limb: Array, at: int, segment: Array) -> Vector:
-    """Vector ``limb[at:at + 3]`` in the world [m]; it is given in the frame of a segment at `segment` (7 or more,)."""
+    """Vector ``limb[at:at + 3]`` of a segment with the pose `segment` (7 or more,), turned to the world frame [m]."""
     return rotate(segment[3], segment[4], segment[5], segment[6], limb[at], limb[at + 1], limb[at + 2])
 
 
 @njit
 def sole_height(limb: Array, end: Array) -> float:
-    """Height of the lowest point of a limb's end [m], which is at `end` (7,)."""
+    """Height of the lowest sole point of a limb's end with pose `end` (7,) [m]."""
     least = np.inf
     for k in range(LIMB, limb.shape[0], 3):
         least = min(least, lever(limb, k, end)[2])
@@ -85,9 +85,10 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
 
 @njit
 def _come_to_rest(values: Array, period: float, seconds: float, most: float, rest: Array, change: Array) -> None:
-    """Where a motion with samples (3, 3) now, a period before and after comes to rest; offset from there and rates.
+    """Rest position `rest` (3,) of a motion, and its offset from there with rates, `change` (3, 3); both written.
 
-    Of its acceleration no more is taken than `most`: what is thrown does not go on to be.
+    `values` (3, 3) are its samples now, a period before and a period after. Its acceleration is limited to `most`, so
+    that a throw is not continued.
     """
     for i in range(3):
         change[1, i] = 0.5 * (values[2, i] - values[1, i]) / period
@@ -99,7 +100,7 @@ def _come_to_rest(values: Array, period: float, seconds: float, most: float, res
 
 @njit
 def _heights(limbs: Array, pose: Pose, heights: Array) -> float:
-    """Heights of the lowest points of the ends of limbs [m], written; returns the least."""
+    """Write the heights of the lowest points of the limbs' ends [m]; returns the least."""
     end = work_array(7)
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, end)
@@ -109,25 +110,26 @@ def _heights(limbs: Array, pose: Pose, heights: Array) -> float:
 
 @njit
 def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, int]:
-    """The limb on which a figure stands both before and after a change, −1 if there is none, and when after.
+    """Pivot of a change: the limb in stance both before and after it, −1 if there is none.
 
-    One on which the new motion stands throughout comes first. With all of them there is none to choose.
+    A limb that is in stance in both poses of the new motion is preferred. If several limbs are equally good, there is
+    no pivot.
 
     Parameters
     ----------
     limbs : Array, shape (n, 36 + 3 k)
         `packed_steppers`.
     shown : Pose
-        Of the old motion at the change.
+        Pose of the old motion at the change.
     ahead : Array, shape (2, nq)
-        Poses of the new motion when the first step ends, and when the second does.
+        Poses of the new motion at the ends of the first and of the second step.
     stands : Array, shape (n,)
-        Written: 1 where the new motion stands on the limb in both poses, else 0.
+        Written: 1 where the limb is in stance in both poses of the new motion, else 0.
 
     Returns
     -------
     int, int
-        Limb, and the row of `ahead` in which it stands (the last one).
+        Limb, and the last row of `ahead` in which it is in stance.
     """
     count = limbs.shape[0]
     heights, ground = np.empty((3, count)), np.inf
@@ -148,7 +150,7 @@ def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, 
 def plan_steps(
     limbs: Array, steps: Array, shown: Array, asked: Pose, period: float, seconds: float, second: int, stands: Array
 ) -> None:
-    """Note how the ends of limbs move at a change, and which of two steps first.
+    """Write how the limbs' ends come to rest at a change, and the order of their steps.
 
     Parameters
     ----------
@@ -159,11 +161,11 @@ def plan_steps(
     shown : Array, shape (3, nq)
         Poses of the old motion now, a period before and after.
     asked : Pose
-        Of the new motion now.
+        Pose of the new motion now.
     period, seconds : float
-        Between the samples, and the blend time T [s].
+        Time between the samples, and the blend time T [s].
     second, stands
-        The limb that steps second, −1 for any, and those that the new motion stands on, as `pivot` tells.
+        The limb that steps second (−1: any), and the stance of the new motion, from `pivot`.
     """
     half = 0.5 * seconds
     ends, turns, way = np.empty((3, 7)), np.empty((3, 3)), np.empty(3)
@@ -173,10 +175,10 @@ def plan_steps(
         step = steps[n]
         for j in range(3):
             limb_end(limbs[n], shown[j], ends[j])
-        # Not deeper than the foot that stands.
+        # A falling foot stops before it is lower than the stance foot.
         fall, height = 0.5 * (ends[1, 2] - ends[2, 2]) / period, heights[n] - ground
         stop = half if fall <= 0.0 else min(half, max(2.0 * height / fall, _SOONEST))
-        # Nor farther than a leg in full swing can be caught.
+        # A fast foot stops within the largest stopping distance.
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _CAUGHT / max(speed, 1e-9), _SOONEST))
         step[_STOP], step[FLOOR] = stop, ground
@@ -187,7 +189,7 @@ def plan_steps(
         change = step[_TURNED:_STOP].reshape(3, 3)
         _come_to_rest(turns, period, stop, _TWIRL, way, change)
         step[_TURN:_AWAY] = multiply(w, x, y, z, *exponential(way[0], way[1], way[2]))
-        # Seen from where it rests, exactly: rotations do not add.
+        # Again relative to the rest orientation, since rotation vectors do not add exactly.
         w, x, y, z = step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
@@ -204,14 +206,14 @@ def plan_steps(
 
 @njit
 def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> None:
-    """Move an end of the new motion, `end` (7,), to where it is s seconds after the change, in its step."""
+    """Replace the pose of an end in the new motion, `end` (7,), by that in its step, s seconds after the change."""
     stop = step[_STOP]
     x = min(max((s - step[_BEGIN]) / (0.5 * seconds), 0.0), 1.0)
     if x >= 1.0:
         return
     share = smooth_step(x)
     left, floor = work_array(3), min(step[FLOOR], sole_height(limb, end))
-    # What the old motion still carries it counts too: a foot in mid-swing would scrape.
+    # The remaining motion of the old swing counts as length of the step too, or the foot would scrape the floor.
     way = step[_AWAY] ** 2 + step[_AWAY + 1] ** 2
     offset_left(step[_AWAY:_TURNED].reshape(3, 3), stop, min(s, stop), left)
     for i in range(3):
@@ -228,7 +230,7 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
         w, a, b, c, *exponential(share * turn[0], share * turn[1], share * turn[2])
     )
     way += _TURN_ARM**2 * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
-    # Rounded at zero, where a root has no derivative.
+    # Rounded at zero, where the square root has no derivative.
     lift = 64.0 * (x * (1.0 - x)) ** 3 * _LIFT * (np.sqrt(way + _ROUND**2) - _ROUND)
-    # A foot that comes down fast, or turns, would go through the floor.
+    # Without this, a foot that comes down fast, or turns, would penetrate the floor.
     end[2] += max(0.0, floor - sole_height(limb, end)) + lift

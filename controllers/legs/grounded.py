@@ -1,13 +1,13 @@
-r"""A gait without its flight phases, for paces that are too slow for them.
+r"""Grounded form of a gait: a running gait without its flight phases, for paces that are too slow for them.
 
-A flight lasts as long as gravity lets it, whatever the pace; so a gait with flights cannot be played slowly as it is.
-Here each flight is shared out between the foot that pushed off and the one that lands: the first stands longer, the
-other lands sooner, both where they stand in the clip. A leg goes through its motion at a phase ψ(s) instead of s,
+The duration of a flight phase is given by gravity, whatever the pace; so a gait with flights cannot be played slowly.
+Here each flight phase is divided between the foot that pushes off and the one that lands: the former stands longer, the
+latter lands sooner, both at their places in the clip. A leg is played at a warped phase ψ(s) instead of s,
 
 .. math:: \psi(b - \sigma_+ g_-) = b, \qquad \psi(a + \sigma_- g_+) = a
 
-for a stance from b to a with flights g₋ before and g₊ after it: it stands longer, and swings faster. The root is
-lowered until both legs reach the ground, and keeps its height.
+for a stance from b to a with flights of durations g₋ before and g₊ after it: stance is longer, and swing faster. The
+root is lowered, smoothly over the lap, until both legs reach the ground.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,14 @@ from controllers.state import Array
 
 Mask = npt.NDArray[np.bool_]
 
-_AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: they stand together for a tenth of the flight
-_LOWEST = 0.3  # by which the root may be lowered [m]: a leap that takes more cannot become a step
+_AFTER, _BEFORE = 0.5, 0.6  # σ₋, σ₊: their excess over 1 gives a double support of a tenth of the flight
+_LOWEST = 0.3  # [m] largest lowering of the root: a leap that needs more cannot become a step
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
-    """First sample of each run of a mask that goes round, and the first sample after it, which may be beyond the end.
+    """First sample of each run of True in a cyclic mask, and the first sample after it, which may exceed the length.
 
-    A mask without an end has none.
+    A mask that is constant has no runs.
     """
     n = len(mask)
     first = np.flatnonzero(mask & ~np.roll(mask, 1))
@@ -42,21 +42,21 @@ def runs(mask: Mask) -> list[tuple[int, int]]:
 def grounded(
     rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
 ) -> Array | None:
-    """Rows of a led clip (`led`) on which no flight is left, or None: it does not fly, hops on one foot, or leaps far.
+    """Rows of a led clip (`led`) without flight phases, or None if it has none, hops on one foot, or leaps too far.
 
     Parameters
     ----------
     rows : Array, shape (n, nq + 5 limbs)
         Channels at equal steps of the lap: remainder, then each limb's end.
     signs : Array, shape (nq + 5 limbs,)
-        −1 where a channel comes back with the opposite sign after a lap.
+        −1 where a channel returns with the opposite sign after a lap.
     stride : float
-        Way of a lap [m], along x.
+        Length of a lap [m], along x.
     limbs : sequence of Limb
     standing : array of bool, shape (n, limbs)
-        Which of them stand.
+        Which limbs are in stance.
     sway : Array, shape (m, 2)
-        By which the root is moved over the floor [m], at m equal steps of the lap.
+        Displacement of the root over the floor [m], at m equal steps of the lap.
     """
     flights = runs(~np.any(standing, axis=1))
     warps = [_warp(standing, j, flights) for j in range(len(limbs))]
@@ -73,14 +73,14 @@ def grounded(
         result[:, columns] = spline(np.mod(warp, 2 * n))[:, columns]
         for joint in joints:
             result[:, joint] /= np.linalg.norm(result[:, joint], axis=1, keepdims=True)
-            # The same rotation as in the clip, so that both can be mixed.
+            # The same sign as in the clip, so that both forms can be blended.
             result[:, joint] *= np.where(np.sum(result[:, joint] * rows[:, joint], axis=1) < 0.0, -1.0, 1.0)[:, None]
         result[:, first + END * j + 3] += (warp - np.arange(n)) / n
     result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
     short = np.zeros(n)
     for j, limb in enumerate(limbs):
         at = first + END * j
-        # As straight as in the clip.
+        # The leg may be as straight as it gets in the clip.
         short = np.maximum(short, shortfall(result, stride, limb, at, extension(rows, stride, limb, at)))
     width = max(3, round(n / len(flights)))
     window = np.hanning(width + 2)[1:-1]
@@ -92,14 +92,14 @@ def grounded(
 
 
 def hastened(standing: Mask) -> float:
-    """Largest ψ' of limbs that stand as `standing` (n, limbs) says: how much faster one swings than in its clip."""
+    """Largest ψ' of limbs with the stance mask `standing` (n, limbs): ratio of a limb's swing speed to the clip's."""
     flights, n = runs(~np.any(standing, axis=1)), len(standing)
     warps = [_warp(standing, j, flights) for j in range(standing.shape[1])]
     return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
 
 
 def _warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
-    """ψ n of a limb at the samples of the lap; None if it never stands, or would land before it has left."""
+    """ψ n of limb j at the samples of the lap; None if it is never in stance, or would land before it lifts off."""
     n, own = len(standing), runs(standing[:, j])
     if not own:
         return None

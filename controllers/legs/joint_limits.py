@@ -1,13 +1,13 @@
-r"""Joint limits in a limb's inverse kinematics: held smoothly, while the limb's end is in the air.
+r"""Joint limits in a limb's inverse kinematics: smooth saturation, while the limb's end is in the air.
 
 With v the rotation vector of a joint, and c(v) its components clamped to an interval each (`saturation`), the joint
 becomes
 
 .. math:: v' = v + A\,S(|v|)\,(c(v) - v)
 
-A rises from 0 to 1 with the height of the end: on the ground a foot that stays where it stands counts for more than a
-joint that is a few degrees off. S is 1, and falls to 0 as |v| goes to π, where v jumps to its opposite: what turns so
-far is no limb's pose, and is at least continuous. Within the limits nothing is changed, to the last bit.
+A rises from 0 to 1 with the height of the end: on the ground, avoiding foot skate has priority over a joint that is a
+few degrees beyond its limit. S is 1, and falls to 0 as |v| goes to π, where v jumps to its opposite: no limb turns so
+far, and the result stays continuous. Within the limits the joint is unchanged, bit for bit.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ from controllers.rotations import angular_velocity, exponential, logarithm, rota
 from controllers.saturation import clamped
 from controllers.state import Array, Quat
 
-MARGIN = 0.1  # [rad] over which a joint that leaves its limits comes to rest, half of that beyond them
-_FROM, _TO = 2.9, 3.13  # [rad] between which S falls
-_LOW, _HIGH = 0.15, 0.35  # height of the end [m] between which A rises
+MARGIN = 0.1  # [rad] excess over a limit at which saturation is complete, at half of that beyond the limit
+_FROM, _TO = 2.9, 3.13  # [rad] range of |v| over which S falls
+_LOW, _HIGH = 0.15, 0.35  # [m] range of heights of the end over which A rises
 
 
 @njit
@@ -39,20 +39,20 @@ def in_the_air(height: float) -> tuple[float, float]:
 
 @njit
 def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int) -> None:
-    """Hold a joint near its limits.
+    """Saturate a joint near its limits.
 
     Parameters
     ----------
     limits : Array, shape (3, 2)
-        Of the components of its rotation vector [rad].
+        Limits of the components of the joint's rotation vector [rad].
     height : Array, shape (1 + k,)
-        Of the limb's end over the ground [m], and its derivatives by k parameters.
+        Height of the limb's end over the ground [m], and its derivatives by k parameters.
     q : Quat
-        Its rotation; changed.
+        Rotation of the joint; changed.
     rate : Array, shape (3, k)
         Local angular velocities with respect to the k parameters; changed.
     tangents : int
-        k, or 0 to leave the rates alone.
+        k, or 0 to leave the rates unchanged.
     """
     air, rise = in_the_air(height[0])
     if air == 0.0:

@@ -1,8 +1,8 @@
-r"""Clips with limbs by their end effectors: where the end is, how it is turned, and how high above the ground.
+r"""Clips with limbs given by their end effectors (feet): position, orientation and height above the ground.
 
-A turning clip would drag the standing feet of the others round with it. So the ends do not move with the steady
-drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests while the end stands and advances while
-it moves; λ is common to all clips, and of no consequence unless some clip turns.
+In a blend, a turning clip would drag the stance feet of the others round with it. So the ends do not move with the
+steady drift exp(s ξ) of the lap (`loops`) but with exp((s + λ(s)) ξ), which rests during stance and advances during
+swing. λ, the lag, is common to all clips, and has no effect unless some clip turns.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,9 @@ from controllers.legs.limbs import END, Limb
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SOFTNESS = 0.003  # [m] of the minimum of heights
-_HARD = 5e-4  # [m] likewise, where they tell where the ground is
-_RARE = 0.02  # share of frames in which a clip may be below the ground on which it stands
+_SOFTNESS = 0.003  # [m] softness of the minimum of heights
+_HARD = 5e-4  # [m] the same, for the height of the ground
+_RARE = 0.02  # share of frames in which a clip may be below the ground that is estimated from it
 
 
 def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
@@ -38,7 +38,7 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array, Array]:
 
 
 def _lowest(turn: Rotation, points: Array, softness: float) -> Array:
-    """Height of the lowest of points over the origin of their frame, turned; a soft minimum: no kinks."""
+    """Height of the lowest of points over the origin of their turned frame: a soft minimum, which is smooth."""
     heights = np.stack([turn.apply(point)[..., 2] for point in points])
     return -softness * np.log(np.exp(-heights / softness).sum(axis=0))
 
@@ -50,25 +50,25 @@ def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
 
 
 def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb, softness: float) -> Array:
-    """How an end moves over the ground from each sample to the next: at the points that touch, so a foot may roll.
+    """Slip of an end over the ground from each sample to the next, at the touching points, so that a foot may roll.
 
     Parameters
     ----------
     places : Array, shape (n, k, 2)
-        Of the centre of the limb's points, over the ground [m].
+        Positions of the centre of the limb's points, over the ground [m].
     quaternions : Array, shape (n, k, 4)
         Orientations of the end over the ground.
     headings : Array, shape (n, k)
-        Their turns about the vertical [rad], continuous along n.
+        Their headings [rad], continuous along n.
     limb : Limb
     softness : float
-        Of the minimum that tells which points touch [m].
+        Softness of the minimum that decides which points touch [m].
 
     Returns
     -------
     Array, shape (n - 1, k, 3)
-        Movements (x, y) of the points, weighed by how low they are, but for what the turning does to them, and the
-        turning itself.
+        Displacement (x, y) of the points, weighted towards the lowest, without the part due to the turn about the
+        vertical, [m]; and that turn [rad].
     """
     turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
     offsets = limb.points - limb.points.mean(axis=0)
@@ -87,16 +87,16 @@ def _rotations(channels: Array, joint: int) -> Rotation:
 
 
 def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array:
-    """λ of an end at equal steps of the lap: the share of the lap's movement that it has done, less that of the lap.
+    """λ of an end at equal steps of the lap: the share of its movement that it has done, minus the share of the lap.
 
     Parameters
     ----------
     places : Array, shape (n, m, 3)
-        Of the end in the remainders of m clips [m].
+        Positions of the end in the remainders of m clips [m].
     drifts : Array, shape (m, 3)
-        Their ξ.
+        Drifts ξ of the clips.
     weights : Array, shape (m,), optional
-        How much each clip counts; by default as much as it turns, for only then does λ matter to a blend.
+        Weight of each clip; by default its turn |ω| per lap, since λ matters to a blend only if a clip turns.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def end_lag(places: Array, drifts: Array, weights: Array | None = None) -> Array
         return np.zeros(n)
     rate = 0.5 * n * (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0))[..., :2]
     across = np.stack([-places[..., 1], places[..., 0]], axis=-1)
-    # Over the ground an end moves with the drift of its clip, and in its frame.
+    # The velocity over the ground is that of the drift plus that in the frame of the drift.
     square = ((rate + drifts[:, :2] + drifts[:, 2:] * across) ** 2).sum(axis=2)
     pace = square / np.maximum(square.mean(axis=0), 1e-12)
     pace = pace @ weights / weights.sum()
@@ -124,7 +124,7 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     channels : Array, shape (n, m, nq)
         Remainders of m clips at n phases.
     drifts : Array, shape (m, 3)
-        Their ξ.
+        Drifts ξ of the clips.
     limb : Limb
     lag : Array, shape (n,)
         λ at the phases.
@@ -132,14 +132,14 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     Returns
     -------
     quaternions : Array, shape (n, m, 4)
-        Of the end, in the frame that moves by exp(λ ξ).
+        Orientations of the end, in the frame that moves by exp(λ ξ).
     ends : Array, shape (n, m, 5)
-        Its position in that frame, λ, and the height of its lowest point.
+        Position of the end in that frame (3) [m], λ, and the height of its lowest point [m].
 
     Raises
     ------
     ParameterError
-        If the limb has a joint that the poses do not have.
+        If the poses lack a joint of the limb.
     """
     place, quaternions, height = end_poses(channels, limb)
     shift, angle = plane_exponential(lag[:, None, None] * drifts)
@@ -149,26 +149,26 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
 
 
 def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
-    """Channels in which limbs are given by their ends.
+    """Channels with limbs given by their ends.
 
     Parameters
     ----------
     channels : Array, shape (n, m, nq)
         Remainders of m aligned loops at equal steps of the lap (see `alignment`).
     drifts : Array, shape (m, 3)
-        Their drifts ξ.
+        Drifts ξ of the loops.
     limbs : sequence of Limb
 
     Returns
     -------
     Array, shape (n, m, nq + 5 limbs)
-        Each limb's last joint has the end's orientation instead of its own; appended are, limb by limb, the end's
-        position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
+        The quaternion of each limb's last joint is replaced by the end's orientation; appended are, limb by limb, the
+        end's position, λ, and the clearance: the height of its lowest point above the lowest of all clips and limbs.
 
     Raises
     ------
     ParameterError
-        If a limb has a joint that the poses do not have.
+        If the poses lack a joint of a limb.
     """
     result, ends = channels.copy(), list[Array]()
     for limb in limbs:
@@ -183,16 +183,16 @@ def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb]) -> Array:
 
 
 def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> Array:
-    """Height of the lowest point of all limbs [m], a soft minimum over each one's, of channels with ends.
+    """Height of the lowest point of all limbs [m], with a soft minimum over the points of each limb.
 
     Parameters
     ----------
     channels : Array, shape (n, m, nq + 5 limbs)
-        Of `with_ends`.
+        From `with_ends`.
     limbs : sequence of Limb
         At least one.
     softness : float
-        [m].
+        Softness of the minimum [m].
 
     Returns
     -------
@@ -207,8 +207,8 @@ def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> 
 
 
 def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
-    """Height of the ground on which each clip stands [m], shape (m,): few of its frames are below.
+    """Height of the ground on which each clip stands [m], shape (m,): the 2 % quantile over its frames.
 
-    `channels` and `limbs` are as `lowest_of_limbs` takes them.
+    `channels` and `limbs` are as in `lowest_of_limbs`.
     """
     return np.quantile(lowest_of_limbs(channels, limbs, _HARD), _RARE, axis=0)

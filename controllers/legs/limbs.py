@@ -1,16 +1,17 @@
-r"""Inverse kinematics of a limb in closed form: feet of a blend stand where those of its clips do on average.
+r"""Closed-form inverse kinematics of a limb: feet of a blend are placed at the mean of their poses in the clips.
 
-A mean of joint angles leaves the feet anywhere. So the pose of the end of a limb (a foot) is blended too, as root
-and joints are, and the limb's three joints are corrected in closed form so that its end is exactly there:
+A mean of joint angles does not control the feet. So the pose of a limb's end (a foot) is blended like root and joints,
+and the limb's three joints are corrected in closed form so that its end has exactly this pose:
 
 - the middle joint turns by δ about its flexion axis, the law of cosines in the form A + B cos δ + C sin δ = D²;
-- the first joint turns the shortest way, until the last joint lies in the direction where it should;
+- the first joint turns the shortest way, until the last joint lies in the required direction;
 - the last joint gives the end its blended orientation.
 
-With c = (D² − A)/√(B² + C²), the cosine of the flexion asked for, and c₀ that of the blended joints, δ = f(c) − f(c₀);
-f is the arc cosine, levelled off near ±1 with two continuous derivatives. A limb asked to be longer than it is stays
-short, by a millimetre for a human leg, and moves smoothly; and δ is zero where nothing is to be corrected, however
-straight: a clip alone is left as it is. In the air, joints that would leave their limits are held (`joint_limits`).
+With D the required distance of the last joint from the first, c = (D² − A)/√(B² + C²) the cosine of the required
+flexion and c₀ that of the blended joints, δ = f(c) − f(c₀); f is the arc cosine, levelled off near ±1 with two
+continuous derivatives. A limb whose target is out of reach stays short of straight, by a millimetre for a human leg,
+and moves smoothly. δ is zero where nothing is to be corrected, however straight the limb: a clip alone is unchanged. In
+the air, joints are kept within their limits (`joint_limits`).
 """
 
 from collections.abc import Sequence
@@ -25,36 +26,36 @@ from controllers.legs.joint_limits import hold_joint
 from controllers.motion.vectors import cross, dot, minus, plus, product, turned, turned_back, vector_at
 from controllers.state import Array, Vec3
 
-# A packed limb (`Limb.packed`): places of its three joints, their offsets (3, 3), flexion axis, centre of the end,
-# limits (3, 3, 2); a limb that steps has the points of its sole behind that (`footsteps`).
+# A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
+# points, limits (3, 3, 2); a limb that steps has the points of its sole behind that (`footsteps`).
 FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB = 0, 1, 2, 3, 12, 15, 18, 36
 THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # the offsets of the middle and the last joint: the limb's two segments
-END = 5  # channels a limb adds to a clip: its end's position (3), λ, clearance
+END = 5  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`), clearance
 
-_STRAIGHT = 0.2  # [rad] flexion below which the reach goes soft
-_SLACK = 0.03  # [rad] flexion that is never undercut by asking for more length
-_ANY = 2.0 * np.pi  # [rad] that no rotation vector has
-_ROOM = 0.01  # [rad] left to what a clip uses, for what is between its frames
+_STRAIGHT = 0.2  # [rad] flexion below which the correction saturates
+_SLACK = 0.03  # [rad] least flexion, for a target out of reach
+_ANY = 2.0 * np.pi  # [rad] beyond any rotation vector: no limit
+_ROOM = 0.01  # [rad] margin on the range that a clip uses, for poses between its frames
 _SOFT, _HARD = float(np.cos(_STRAIGHT)), float(np.cos(_SLACK))
 
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """Three joints in a row, the first on the root.
+    """Kinematic chain of three joints, such as hip, knee and ankle, the first on the root.
 
     Parameters
     ----------
     joints : tuple of three int
-        Their places in a pose: joint k has the numbers 3 + 4k to 6 + 4k, the root is 0.
+        Indices of the joints: joint k has the numbers 3 + 4k to 6 + 4k of a pose, the root is 0.
     offsets : Array, shape (3, 3)
-        Origin of each in the segment before it, in the rest pose [m].
+        Origin of each joint in the segment before it, in the rest pose [m].
     axis : Vec3
         Flexion axis of the middle joint, in the frame of its own segment.
     points : Array, shape (k, 3)
-        Of the last segment, those that may touch the ground; their centre is to be where it should [m].
+        Points of the last segment that may touch the ground (sole), in its frame [m]; their centre is the end that the
+        inverse kinematics places.
     limits : Array, shape (3, 3, 2), optional
-        Of the components of the joints' rotation vectors, beyond which they are held (`joint_limits`) [rad]. By
-        default there are none.
+        Limits of the components of the joints' rotation vectors (`joint_limits`) [rad]. By default there are none.
 
     Raises
     ------
@@ -84,14 +85,14 @@ class Limb:
                 raise ParameterError(f"flexion about {self.axis} does not move a limb with offsets {self.offsets}")
 
     def packed(self) -> Array:
-        """What the kernel reads: joints, offsets, unit axis, centre of the points, limits; shape (36,)."""
+        """The limb packed for the kernel: joints, offsets, unit axis, centre of the points, limits; shape (36,)."""
         axis = np.asarray(self.axis, dtype=np.float64)
         unit = axis / max(float(np.linalg.norm(axis)), 1e-300)
         centre, limits = np.mean(self.points, axis=0), np.ravel(self.limits)
         return np.concatenate([self.joints, np.ravel(self.offsets), unit, centre, limits])
 
     def allowing(self, clips: Sequence[Array]) -> "Limb":
-        """The same limb with limits that hold none of the poses of clips, each of shape (n, nq).
+        """The same limb with limits extended to include all poses of clips, each of shape (n, nq).
 
         Raises
         ------
@@ -113,11 +114,11 @@ class Limb:
 
 @njit
 def flexion(c: float) -> tuple[float, float]:
-    """Angle f(c) [rad] of a cosine, and f': the arc cosine, but levelled off beyond ±cos 0.2; C² for every number."""
+    """Angle f(c) [rad] of a cosine, and f': the arc cosine, levelled off beyond ±cos 0.2; C² for every number."""
     over = (abs(c) - _SOFT) / (_HARD - _SOFT)
     soft, slope = c, 1.0
     if over > 0.0:
-        # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
+        # x / (1 + x³)^(1/3) departs from the identity with a C² onset.
         root = np.cbrt(1.0 + over**3)
         soft, slope = np.copysign(_SOFT + (_HARD - _SOFT) * over / root, c), root**-4
     return np.arccos(soft), -slope / np.sqrt(1.0 - soft * soft)
@@ -125,21 +126,21 @@ def flexion(c: float) -> tuple[float, float]:
 
 @njit
 def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
-    """Correct the joints of a limb so that its end is where it should be.
+    """Correct the joints of a limb so that its end has the given pose.
 
     Parameters
     ----------
     limb : Array, shape (36,)
         `Limb.packed`.
     rotations : Array, shape (joints, 4)
-        Root orientation, then joint rotations; the limb's last holds the orientation of the end and becomes its
-        joint's rotation, the others are corrected.
+        Root orientation, then joint rotations. On entry the row of the limb's last joint contains the orientation of
+        the end; it is replaced by the joint's rotation, and the limb's other joints are corrected.
     rates : Array, shape (joints, 3, k)
-        Their local angular velocities with respect to k parameters; updated likewise.
+        Local angular velocities of the rows of `rotations` with respect to k parameters; updated likewise.
     root, end : Array, shape (1 + k, 3)
-        Position of root and end, and the derivatives by each parameter.
+        Position of root and end [m], and the derivatives by each parameter.
     tangents : int
-        k, or 0 to leave the rates alone.
+        k, or 0 to leave the rates unchanged.
     """
     first, second, last = int(limb[FIRST]), int(limb[MIDDLE]), int(limb[LAST])
     a, b, axis, point = vector_at(limb, THIGH), vector_at(limb, SHANK), vector_at(limb, AXIS), vector_at(limb, CENTRE)
@@ -148,7 +149,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
     q_second = rotations[second, 0], rotations[second, 1], rotations[second, 2], rotations[second, 3]
     q_end = rotations[last, 0], rotations[last, 1], rotations[last, 2], rotations[last, 3]
 
-    # The last joint as the root sees it, from its own origin and from the first joint's.
+    # The last joint's position in the frame of the root, from the root's origin and from the first joint.
     from_root = turned_back(q_root, minus(minus(vector_at(end[0], 0), turned(q_end, point)), vector_at(root[0], 0)))
     line = minus(from_root, vector_at(limb, OFFSETS))
     m, normal = turned_back(q_second, a), cross(axis, b)
@@ -166,7 +167,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
     to_last = plus(a, turned(n_second, b))
     u = turned(q_first, to_last)
     length, distance = max(np.sqrt(dot(u, u)), 1e-9), max(np.sqrt(dot(line, line)), 1e-9)
-    # Half-angle form of the shortest rotation from u to the line; not defined half a turn apart.
+    # Half-angle form of the shortest rotation from u to the line; not defined if they are half a turn apart.
     scalar, vector = length * distance + dot(u, line), cross(u, line)
     norm = max(np.sqrt(scalar * scalar + dot(vector, vector)), 1e-12)
     swing = scalar / norm, vector[0] / norm, vector[1] / norm, vector[2] / norm

@@ -1,19 +1,20 @@
-r"""Feet of a clip without foot skate: in each stance a sole keeps one place on the floor, or rolls on it.
+r"""Removal of foot skate from motion captures: in each stance a sole keeps one place on the floor, or rolls on it.
 
-Captured feet slide, hover over the floor and sink into it by centimetres. What they do of that in their stances is
-taken from the path of each foot, smoothly, and little else. With h, which is 1 while a foot stands and 0 while it
-swings, and g, which is the other way round, both C² and never above 0 together:
+Captured feet slide, hover over the floor and sink into it by centimetres. These errors are removed smoothly from the
+stance phases of each foot's path, which is otherwise little changed. With h, which is 1 in stance and 0 in swing, and
+g, which is 1 in swing and 0 in stance, both C² and never positive together:
 
-- Its own clock (`led`) advances at the pace g, so that it rests in a stance to the last bit.
-- Place and heading are p = p̄ − c, with the slip c' = h p̄' − κ g c. Forwards round the lap this holds a foot where it
-  landed, backwards where it will leave; the average of both is taken.
-- It is turned about its length until its breadth is level: on one corner a foot turns and creeps. Of the slope β of
-  its length β³/(β² + β_0²) remains, so that what rolls from heel to toes lies flat in between. Within a hundredth of a
-  second a body's weight does not change ends: its foot lags behind by a degree, and stood on neither.
-- Its height is lessened by what it is in the stance, and by the median of that in the swing, which goes on smoothly
-  from one stance to the next. In a swing it is h_0 over the floor at least.
+- The phase of the foot's frame (s + λ, see `led`) advances at the rate g, so that it is exactly constant in stance.
+- Position and heading are p = p̄ − c, with p̄ the captured ones and the slip c' = h p̄' − κ g c. Integrated forwards
+  round the lap this holds a foot where it landed, backwards where it will lift off; the average of both is taken.
+- The foot is turned about its length until its breadth is level, since a foot on one corner turns and creeps. Of the
+  slope β of its length β³/(β² + β_0²) remains, so that a foot that rolls from heel to toes lies flat in between.
+  Otherwise contact would change from heel to toes within a hundredth of a second, and a physical foot that lags behind
+  by a degree would stand on neither.
+- In stance its captured height is subtracted, in swing a smooth transition between the median heights of the two
+  neighbouring stances. In swing its height over the floor is at least h_0.
 
-The root is lower by as much as the legs would be too short for that.
+The root is lowered by as much as the legs would be too short otherwise.
 """
 
 from collections.abc import Sequence
@@ -30,23 +31,23 @@ from controllers.legs.reaching import reached, shortfall
 from controllers.motion.loops import plane_exponential, turned, yawed
 from controllers.state import Array
 
-_SWINGS = 0.35  # share of a swing at each end in which g rises
-_STANDS = 0.01  # and of a stance in which h does: feet land and leave with a little speed of their own
-_RESTS, _LONGEST_REST = 0.15, 0.03  # of a stance, and at most [s], in which its height comes to rest
-_LIFTS = 0.12  # of a swing, in which a foot comes to be clear of the floor
-_SMOOTH = 0.0025  # [m]
-_CLEAR = 0.01  # h_0, how high a foot swings at least [m]
+_SWINGS = 0.35  # share of a swing at each end over which g rises
+_STANDS = 0.01  # share of a stance at each end over which h rises: feet touch down and lift off with a small slip
+_RESTS, _LONGEST_REST = 0.15, 0.03  # share of a stance at each end, and at most [s], in which its height settles
+_LIFTS = 0.12  # share of a swing at each end over which the least clearance is reached
+_SMOOTH = 0.0025  # [m] smoothing of a maximum of heights
+_CLEAR = 0.01  # h_0 [m], least height of a foot in swing
 _CATCH_UP = 8.0  # κ ∫ g over a lap
-_NARROW = 0.02  # [m] an end of less breadth has no level
-_LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which on its level counts less, and nothing
+_NARROW = 0.02  # [m] an end of less breadth is not levelled
+_LYING, _UPRIGHT = 0.7, 0.95  # vertical component of an end's length from which it is levelled less, and not at all
 _FLAT = 0.05  # β_0 [rad]
-_SOFTNESS = 5e-4  # [m] of the minimum of a sole's heights
+_SOFTNESS = 5e-4  # [m] softness of the minimum of a sole's heights
 
 
 def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
-    """0 outside the runs of a mask that goes round, 1 within but for a share of each run at its ends; C².
+    """Smooth version of a cyclic mask: 0 outside its runs, 1 within, rising over a share of each run at its ends; C².
 
-    At most so many samples `longest` of each run.
+    The rise takes at most `longest` samples.
     """
     n, result = len(mask), np.zeros(len(mask))
     for start, end in runs(mask):
@@ -59,39 +60,42 @@ def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
 def planted_ends(
     channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float, duration: float
 ) -> tuple[Array, Array]:
-    """Orientation and channels of a limb's end that stands where it stands; see `limb_ends.end_channels`.
+    """Orientation and channels of a limb's end without skate in stance; see `limb_ends.end_channels`.
 
     Parameters
     ----------
     channels : Array, shape (n, nq)
         Remainder of the clip at equal steps of the lap.
     drift : Array, shape (3,)
-        Its ξ.
+        Drift ξ of the clip.
     limb : Limb
     stands : array of bool, shape (n,)
+        Samples at which the limb is in stance.
     radius : float
-        How high its points are that stand [m].
+        Height of the sole points over the floor in stance [m].
     duration : float
-        Of the lap [s].
+        Duration of the lap [s].
 
     Returns
     -------
     quaternions : Array, shape (n, 4)
+        Orientations of the end.
     ends : Array, shape (n, 5)
+        Position (3), λ, height of the lowest point.
     """
     n, stays, free = len(channels), window(stands, _STANDS), window(~stands, _SWINGS)
     if stands.all() or not stands.any():
-        # Without steps, or without stances, the clock is even.
+        # Without swing, or without stance, the phase advances uniformly.
         free = np.ones(n)
     lag = (np.cumsum(free) - 0.5 * free) / free.sum() - (np.arange(n) + 0.5) / n
     lag -= lag.mean()
     turns, parts = end_channels(channels[:, None], drift[None], limb, lag)
     quaternions, ends = _level(turns[:, 0], limb, 1.0 - free), parts[:, 0]
     heights = ends[:, 2] + lowest_point(quaternions, limb, _SOFTNESS) - radius
-    # Over the ground, once round: the last sample is the first one a lap on.
+    # Over the ground, for one lap: the last sample is the first one a lap later.
     shift, angle = plane_exponential((np.arange(n + 1) / n + np.append(lag, lag[0]))[:, None] * drift)
     places = turned(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
-    # Heading first: how a foot rolls depends on it.
+    # First the heading, then the position, since the roll of a foot depends on its heading.
     for kept in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
         over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
@@ -106,9 +110,9 @@ def planted_ends(
 
 
 def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
-    """Orientations of an end (n, 4), laid on the floor by a share (n,): its breadth, and its length if it nearly is.
+    """Orientations of an end (n, 4), levelled by a share (n,): its breadth, and its length if nearly level.
 
-    See the module's text.
+    See the module.
     """
     _, sizes, axes = np.linalg.svd(limb.points - limb.points.mean(axis=0))
     if len(sizes) < 2 or sizes[1] < _NARROW:
@@ -117,7 +121,7 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
     length, breadth = turn.apply(axes[0]), turn.apply(axes[1])
     tilt = np.arctan2(breadth[:, 2], np.cross(length, breadth)[:, 2])
     tilt -= np.pi * np.round(tilt / np.pi)
-    # What is upright has no level.
+    # An end whose length is nearly vertical is not levelled.
     lies = smooth_step((_UPRIGHT - np.abs(length[:, 2])) / (_UPRIGHT - _LYING))
     slope = np.arctan2(length[:, 2], np.hypot(length[:, 0], length[:, 1]))
     across = np.cross(length, [0.0, 0.0, 1.0])
@@ -130,7 +134,7 @@ def _level(quaternions: Array, limb: Limb, share: Array) -> Array:
 
 
 def levels(heights: Array, stands: Mask) -> Array:
-    """Height at which a foot of the clip stands, shape (n,): in a stance its median, smoothly to the next between."""
+    """Height of a foot's stance [m], shape (n,): in a stance its median, in between a smooth step to the next."""
     n, level = len(heights), np.zeros(len(heights))
     stances = runs(stands)
     for (start, end), (following, last) in zip(stances, [*stances[1:], *stances[:1]], strict=True):
@@ -142,7 +146,7 @@ def levels(heights: Array, stands: Mask) -> Array:
 
 
 def _above(least: float, heights: Array) -> Array:
-    """The larger of heights and the least [m], smooth within some millimetres."""
+    """Smooth maximum of heights and `least` [m], rounded over some millimetres."""
     return 0.5 * (heights + least + np.hypot(heights - least, _SMOOTH))
 
 
@@ -157,7 +161,7 @@ def with_planted_ends(
     stride: float,
     sway: Array,
 ) -> Array:
-    """Rows of a led clip whose feet stand where they stand, and whose root is low enough for that.
+    """Rows of a led clip without foot skate, with the root low enough for the legs to reach.
 
     Parameters
     ----------
@@ -169,15 +173,15 @@ def with_planted_ends(
         ξ of the clip, along x.
     limbs : sequence of Limb
     stands : array of bool, shape (n, limbs)
-        Which of them stand.
+        Which limbs are in stance.
     radius : float
-        How high over the floor their points are then [m].
+        Height of their sole points over the floor in stance [m].
     duration : float
-        Of the lap [s].
+        Duration of the lap [s].
     stride : float
-        Way of a lap [m]; shorter than the clip's, each step is shorter by the same share.
+        Length of a lap [m]; if shorter than the clip's, each step is shortened in proportion.
     sway : Array, shape (m, 2)
-        By which the root is moved over the floor [m], at m equal steps of the lap.
+        Displacement of the root over the floor [m], at m equal steps of the lap.
     """
     first, result, short = channels.shape[1], rows.copy(), list[Array]()
     result[:, 0] *= stride / drift[0]
@@ -187,6 +191,6 @@ def with_planted_ends(
         quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
         result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
         short.append(shortfall(result, stride, limb, at))
-    # By the same all the time: a root that bobbed for its legs would weigh more and less.
+    # By a constant: vertical motion of the root would change the ground reaction forces.
     result[:, 2] -= np.max(short)
     return reached(result, stride, limbs)

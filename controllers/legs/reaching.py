@@ -1,7 +1,7 @@
-"""Limbs of a led clip, at equal steps of its lap: how low the root must be for them to reach their ends, and how bent.
+"""Offline inverse kinematics of a led clip: height of the root at which limbs reach their ends, and joint rotations.
 
-The map corrects limbs as it goes (`limbs`), by little and softly. What is known beforehand is done beforehand, exactly:
-rows whose joints reach the ends already are left as they are where the path is straight.
+At run time the map corrects limbs softly and by little (`limbs`). Rows whose joints already reach the ends exactly are
+left unchanged by that correction where the path is straight, so the exact solution is computed here beforehand.
 """
 
 from collections.abc import Sequence
@@ -12,29 +12,29 @@ from scipy.spatial.transform import Rotation
 from controllers.legs.limbs import END, Limb
 from controllers.state import Array
 
-_STRETCHED = 0.99  # of its length a limb may have between its ends: straighter, its joint turns ever faster
-_LEAST_BEND = 0.03  # [rad]
+_STRETCHED = 0.99  # largest extension of a limb over its length: nearer to straight, its middle joint turns too fast
+_LEAST_BEND = 0.03  # [rad] least flexion of the middle joint
 
 
 def extension(rows: Array, stride: float, limb: Limb, at: int) -> float:
-    """How long a limb is between its first joint and its last at most [m]; parameters as in `shortfall`."""
+    """Largest distance between a limb's first and last joint over the lap [m]; parameters as in `shortfall`."""
     return float(np.linalg.norm(_line(rows, stride, limb, at), axis=1).max())
 
 
 def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 0.0) -> Array:
-    """How much lower the root must be for a limb to reach its end [m], shape (n,).
+    """Lowering of the root that a limb needs to reach its end [m], shape (n,).
 
     Parameters
     ----------
     rows : Array, shape (n, nq + 5 limbs)
         Channels (`led`).
     stride : float
-        Way of a lap [m], along x.
+        Length of a lap [m], along x.
     limb : Limb
     at : int
-        First column of its end.
+        First column of the limb's end.
     longest : float
-        How long it may be [m], if that is more than what leaves its middle joint well bent.
+        Largest allowed extension [m], if more than `_STRETCHED` times the limb's length.
     """
     longest = max(_STRETCHED * float(np.linalg.norm(limb.offsets[1]) + np.linalg.norm(limb.offsets[2])), longest)
     line = _line(rows, stride, limb, at)
@@ -43,10 +43,10 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
 
 
 def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
-    """The same channels (n, nq + 5 limbs), the first two joints of each limb so that its third is where its end asks.
+    """Channels (n, nq + 5 limbs) with the first two joints of each limb solved so that its last joint meets its end.
 
-    The middle joint turns about its flexion axis, to the side on which it is bent on average; the first one the
-    shortest way.
+    The middle joint turns about its flexion axis, to the side to which it is bent on average; the first joint turns
+    the shortest way.
     """
     result, first = rows.copy(), rows.shape[1] - END * len(limbs)
     for j, limb in enumerate(limbs):
@@ -63,7 +63,7 @@ def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
         size, straight = np.hypot(cosine, sine), np.arctan2(sine, cosine)
         wanted = (0.5 * ((line**2).sum(axis=1) - a @ a - b @ b) - along) / size
         bend = np.arccos(np.clip(wanted, -1.0, np.cos(_LEAST_BEND)))
-        # A knee that is overstretched now and then bends like one that is not.
+        # The side of flexion is that of the mean, so that a knee that is hyperextended in some frames bends normally.
         turn = straight - np.sign(straight.mean()) * bend
         middle = middle * Rotation.from_rotvec(turn[:, None] * axis)
         reach = upper.apply(a + middle.apply(b))
@@ -76,7 +76,7 @@ def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
 
 
 def _line(channels: Array, stride: float, limb: Limb, at: int) -> Array:
-    """From a limb's first joint to its last, in the axes of the path [m], shape (n, 3)."""
+    """Vector from a limb's first joint to its last, in the axes of the path [m], shape (n, 3)."""
     place = 3 + 4 * limb.joints[2]
     end = Rotation.from_quat(channels[:, place : place + 4], scalar_first=True)
     root = Rotation.from_quat(channels[:, 3:7], scalar_first=True)

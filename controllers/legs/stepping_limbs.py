@@ -1,15 +1,16 @@
-r"""Inverse kinematics of a limb that steps: near its singularities the foot gives way, so that no joint leaps.
+r"""Inverse kinematics of a stepping limb: near singularities the foot target is moved, so that no joint jumps.
 
-A limb leaps where it snaps straight, where it folds up under its first joint, and where its last joint flips. With d
-the distance of the last joint from the first, of a limb of length ℓ, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot
-comes nearer by
+Joints jump where the limb snaps straight, where it folds up under its first joint, and where its last joint flips. With
+d the distance of the last joint from the first, ℓ the length of the limb, and x = 1 + (d − (1 − b) ℓ) / (g ℓ), the foot
+is drawn nearer by
 
 .. math:: g\,\ell\,\bigl(x - x / (1 + x^3)^{1/3}\bigr), \qquad x > 0
 
-so d stays short of (1 − b) ℓ, and to x = 0 three derivatives are continuous. A foot that comes too near to the first
-joint goes by below it, at ½ + n³ − ½ n⁴ of where that begins for n of the distance there; one in mid-swing that turns
-against its leg by almost half a turn goes back with it. b, g and the second are scaled by a share, 0 where a change
-begins and ends: there the limb is as its motion has it.
+so d stays below (1 − b) ℓ, with a C³ onset at x = 0. A foot too near to the first joint is moved below it, to the
+distance ½ + n³ − ½ n⁴ from the first joint for an original distance n, both in units of the distance at which this
+begins. A foot in mid-swing that is turned against its leg by almost half a turn is turned back with the leg. b, g and
+the folding distance are scaled by a share that is 0 at the beginning and end of a change, where the limb is left as in
+its motion.
 """
 
 import numpy as np
@@ -23,30 +24,30 @@ from controllers.rotations import exponential, logarithm, multiply, relative
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-_TOUCHES = 0.12  # [m] height from which a foot does not have to reach what it is asked for
-_EASE = 0.95  # of its length, that a limb is long at ease
-_BENT, _GIVES = 0.01, 0.1  # of its length, by which a limb stays short of straight, and from where on it gives way
-_ROLL, _LEVER = 0.7, 0.15  # [rad] by which a sole rolls over its edge at most, [m] of height won by a radian
-_AHEAD, _EDGE = 0.1, 0.02  # [m] by which the first joint is ahead where it does; over which its edge is rounded
-_FINE = 2e-3  # [m]
-_FOLDED = 0.55  # of its length, a distance from which on it is folded no further
-_TWIST, _SWUNG = 1.8, 0.15  # [rad], [m] from which on a foot so high goes with its leg
-_FARTHEST, _LOST = 0.5, 1.0  # of a limb's length, the way over the floor from which it is given up, and at which it is
-_BACK = 0.04  # [rad] half of which a knee bends backwards at most, before it is bent as it has to be
+_TOUCHES = 0.12  # [m] height of a foot above which the root is not lowered for it
+_EASE = 0.95  # extension of a limb over its length that the root is lowered for
+_BENT, _GIVES = 0.01, 0.1  # b and g, in lengths of the limb
+_ROLL, _LEVER = 0.7, 0.15  # [rad] largest roll of a sole over its edge, [m] gain of reach per radian
+_AHEAD, _EDGE = 0.1, 0.02  # [m] horizontal offset of the first joint for a full roll; [m] rounding of the sole's edge
+_FINE = 2e-3  # [m] rounding of a distance at zero
+_FOLDED = 0.55  # distance below which a limb is folded no further, in lengths of the limb
+_TWIST, _SWUNG = 1.8, 0.15  # [rad] twist above which, [m] height at which in full, a foot is turned back with its leg
+_FARTHEST, _LOST = 0.5, 1.0  # horizontal distances, in limb lengths, at which lowering of the root begins to fade, ends
+_BACK = 0.04  # [rad] twice the largest hyperextension of a knee that is kept
 
 
 @njit
 def _bend_forwards(limb: Array, rotations: Array) -> None:
-    """Take back what a limb's middle joint is bent backwards, all but a little: `place_limb` takes it for forwards.
+    """Undo hyperextension of a limb's middle joint except for a little, which `place_limb` would take for flexion.
 
-    An angle α < 0 becomes α / (1 + (α/a)²), which leaves α = 0 with two derivatives alike.
+    An angle α < 0 becomes α / (1 + (α/a)²), with a C² onset at α = 0.
     """
     q = rotations[int(limb[MIDDLE])]
     a, b, axis = vector_at(limb, THIGH), vector_at(limb, SHANK), vector_at(limb, AXIS)
     m = turned_back((q[0], q[1], q[2], q[3]), a)
     angle = np.arctan2(dot(m, cross(b, axis)), dot(m, b) - dot(m, axis) * dot(b, axis))
     if angle < 0.0:
-        # Beyond −π/2 it is bent forwards by more than half a turn.
+        # Beyond −π/2 the joint is regarded as flexed, by −α.
         wanted = angle / (1.0 + (angle / _BACK) ** 2) if angle > -0.5 * np.pi else -angle
         half = 0.5 * (wanted - angle)
         sine = np.sin(half)
@@ -57,7 +58,7 @@ def _bend_forwards(limb: Array, rotations: Array) -> None:
 
 @njit
 def _leg(limb: Array, pose: Pose, end: Array, line: Array) -> float:
-    """Write the way from a limb's first joint to its last, were its end at `end` (7,); returns its length, straight."""
+    """Write the vector from a limb's first joint to its last for the end pose `end` (7,); returns the full length."""
     hip, longest = lever(limb, OFFSETS, pose), 0.0
     sole = lever(limb, CENTRE, end)
     for i in range(3):
@@ -69,19 +70,19 @@ def _leg(limb: Array, pose: Pose, end: Array, line: Array) -> float:
 
 @njit
 def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
-    """How much lower the root must be for a limb to reach its end at ease, `end` (7,), if that is on the floor [m]."""
+    """Lowering of the root [m] with which a limb reaches its `end` (7,) without stretching, if that is on the floor."""
     line = work_array(3)
     longest = _EASE * _leg(limb, pose, end, line)
     way = np.sqrt(line[0] ** 2 + line[1] ** 2) / longest
     short = max(0.0, -line[2] - longest * np.sqrt(1.0 - min(way, _FARTHEST) ** 2))
-    # For a foot that is left far behind the figure does not stoop.
+    # The root is not lowered for a foot that is far behind.
     short *= 1.0 - min(max((way - _FARTHEST) / (_LOST - _FARTHEST), 0.0), 1.0) ** 2
     return short * smooth_step(1.0 - (sole_height(limb, end) - step[FLOOR]) / _TOUCHES)
 
 
 @njit
 def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
-    """Roll a sole by an angle over its edge in a direction over the floor, (2,): that stays where it is, and as low."""
+    """Roll a sole by an angle over its edge in a horizontal direction (2,); the edge keeps its place and height."""
     low = sole_height(limb, end)
     point, total = work_array(2), 0.0
     point[:] = 0.0
@@ -100,9 +101,9 @@ def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
 
 @njit
 def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
-    """Bring an end that a limb hardly reaches nearer to it, by a share that is 0 or up to 1: no knee snaps straight.
+    """Move an end that a limb hardly reaches nearer to it, scaled by a share from 0 to 1: no knee snaps straight.
 
-    It rolls over its edge first, such that a foot goes on to bear, and then it is drawn.
+    The foot first rolls over its edge, so that it stays in contact; the rest is a displacement.
     """
     line, along = work_array(3), work_array(2)
     longest = _leg(limb, pose, end, line)
@@ -110,7 +111,7 @@ def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
     room = max(_GIVES * share * longest, 1e-9)
     over = (distance - (1.0 - _BENT * share) * longest) / room + 1.0
     if over > 0.0:
-        # x / (1 + x³)^(1/3) leaves the identity with two derivatives alike.
+        # x / (1 + x³)^(1/3) departs from the identity with a C² onset.
         back = room * over * (1.0 - 1.0 / np.cbrt(1.0 + over**3))
         way = np.sqrt(line[0] ** 2 + line[1] ** 2) + 1e-9
         for i in range(2):
@@ -119,12 +120,12 @@ def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
         wanted = distance - back
         _leg(limb, pose, end, line)
         distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
-        # Rounded at zero, as far as it may be too near.
+        # Rounded at zero, since after the roll the end may already be nearer than wanted.
         back = distance - wanted
         back = 0.5 * (back + np.sqrt(back**2 + _FINE**2) - _FINE) / distance
         for i in range(3):
             end[i] -= back * line[i]
-    # Nor folds up: what comes too near to the first joint goes by below it.
+    # The limb does not fold up either: an end too near to the first joint is moved below it.
     least = _FOLDED * share * longest
     if 0.0 < distance < least:
         level = line[0] ** 2 + line[1] ** 2
@@ -135,9 +136,9 @@ def _hold_back(limb: Array, pose: Pose, end: Array, share: float) -> None:
 
 @njit
 def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Array) -> None:
-    """Turn an end in mid-swing with its limb, where it would be turned almost half a turn from `own`, its joint's.
+    """Turn an end in mid-swing back with its limb, where it is almost half a turn from the joint's own rotation `own`.
 
-    Half a turn off no way round is the shorter one: the joint would flip. So nothing is left of that turn there.
+    At half a turn neither direction is shorter and the joint would flip, so the turn is reduced to zero there.
     """
     swings = smooth_step((sole_height(limb, end) - step[FLOOR]) / _SWUNG)
     w, a, b, c = rotations[0]
@@ -162,12 +163,12 @@ def _turn_along(limb: Array, step: Array, rotations: Array, own: Array, end: Arr
 
 @njit
 def put_limb(limb: Array, step: Array, pose: Pose, end: Array, share: float) -> None:
-    """Correct the joints of a limb such that its end, in a step, is where `end` (7,) says; `share` of `_hold_back`."""
+    """Correct the joints of a stepping limb so that its end has the pose `end`, adjusted by `share` (`_hold_back`)."""
     rotations, last = pose[3:].reshape(-1, 4), int(limb[LAST])
     _bend_forwards(limb, rotations)
     _hold_back(limb, pose, end, share)
     own = rotations[last].copy()
-    # Once from a limb that is straight leaves up to two centimetres.
+    # Twice, since from a straight limb one iteration leaves an error of up to two centimetres.
     for again in range(2):
         rotations[last] = end[3:]
         place_limb(limb, rotations, work_array((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)

@@ -1,13 +1,13 @@
-r"""Blends of standing clips stand: not lifted off the ground because one clip lifts one foot and another the other.
+r"""Ground support of blends: keeps the lowest foot on the ground when the clips of a blend stand on different feet.
 
-With the clearances h̄_j of the ends of the limbs in the blend and h_ij in clip i, all ends are lowered by
+With the clearances h̄_j of the limbs' ends in the blend and h_ij in clip i, all ends are lowered by
 
 .. math:: c = S(m(\bar h)) - \textstyle\sum_i w_i\, S(m(h_i))
 
-m is a soft minimum over the limbs, S(x) = y³/(y² + s²) with y = x − x₀, 0 where y < 0: c takes back what the blend's
-lowest end rises above the clips' own, smoothly, and not the heights at which all clips fly. A clip alone is left as
-it is, and an end on the ground is not pushed into it. x₀ leaves a step that has to be made room to be made: an end
-that moves is not dragged over the ground.
+m is a soft minimum over the limbs, S(x) = y³/(y² + s²) with y = x − x₀, 0 where y < 0: c is, smoothly, the excess of
+the blend's lowest clearance over those of the clips, so that flights common to all clips remain. A clip alone is left
+unchanged, and an end on the ground is not pushed into it. The threshold x₀ leaves room for a swing foot, which is not
+dragged over the ground.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ from numba import njit
 from controllers.state import Array
 from controllers.work_array import work_array
 
-_SOFTNESS = 0.003  # [m] of the minimum, and s
+_SOFTNESS = 0.003  # [m] softness of the minimum, and s
 _ROOM = 0.006  # [m] x₀
 
 
 @njit
 def _raised(clearance: Array, rates: Array, change: Array) -> float:
-    """S(m(h)) of clearances (limbs,); `change` (k,) becomes its derivatives, `rates` (limbs, k) being theirs."""
+    """S(m(h)) of clearances (limbs,); writes its derivatives `change` (k,) from those of the clearances (limbs, k)."""
     least = clearance.min()
     total = 0.0
     for h in clearance:
@@ -49,9 +49,9 @@ def lowering(value: Array, slope: Array, weights: Array, changes: Array, lower: 
     value, slope : Array, shape (clips, limbs)
         Clearances [m] and their derivatives by θ.
     weights, changes : Array, shapes (clips,), (3, clips)
-        Of the clips, and their derivatives by θ and two other parameters.
+        Weights of the clips, and their derivatives by θ and two other parameters.
     lower : Array, shape (4,)
-        Written: c [m] and its derivatives by θ and the two.
+        Written: c [m] and its derivatives by the three parameters.
     """
     clips, limbs = value.shape
     mean, rates, own, change = work_array(limbs), work_array((limbs, 3)), work_array((limbs, 1)), work_array(1)

@@ -1,1 +1,1 @@
-"""Motions as functions of time, whatever they drive: loops, means, changes from one to another."""
+"""Motions as functions of time: loops, means, in-betweens, and transitions from one motion to another."""

@@ -1,13 +1,13 @@
-r"""Captures that are led: noise above the frequencies of a gait is filtered out, and far leaps become steps.
+r"""Motion captures of gaits that are led: low-pass filter against noise, and parameters of their footsteps.
 
-A millimetre of noise is 1 m/s² at 5 Hz, and 25 m/s² at 25 Hz: more than the floor can give. So the channels of a lap
-go through a Butterworth filter of second order, forwards and backwards, as is the custom for captured gaits (Winter
-2009, *Biomechanics and Motor Control of Human Movement*, section 3.4),
+A millimetre of noise is 1 m/s² at 5 Hz, and 25 m/s² at 25 Hz: more than ground reaction forces can give. So the
+channels of a lap are filtered by a Butterworth filter of second order, forwards and backwards (zero phase), as is
+usual for captured gaits (Winter 2009, *Biomechanics and Motor Control of Human Movement*, section 3.4),
 
 .. math:: H(f) = \frac{1}{1 + (f/f_c)^4} ,
 
-round the lap, so that its seam is not an end. A led figure goes at paces of its own, at which no captured flight lasts
-as long as gravity lets it: what flies in a capture steps when it is led.
+periodically over the lap, so that its seam is not an end. A led figure moves at varying paces, at which the flight
+phases of a capture would not last as long as gravity requires: they are replaced by steps when the capture is led.
 """
 
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from controllers.state import Array
 
 @dataclass(frozen=True)
 class Capture:
-    """What is made of a captured clip that is led.
+    """Parameters of the clean-up of a motion capture that is led.
 
     Parameters
     ----------
     radius : float
-        How high over the floor the points of a limb are that stand on it [m].
+        Height over the floor of a limb's sole points in stance [m].
     cutoff : float
         f_c [Hz].
     step : float
-        Longest way from foot to foot of a gait that flies in the capture, and steps when it is led [m].
+        Longest step of a gait that has flight phases in the capture and is led without them [m].
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Capture:
 
 
 def lap_signs(rows: Array, quaternions: int) -> Array:
-    """−1 for the numbers of a quaternion that comes back with the opposite sign after a lap, 1 for all others.
+    """−1 for the channels of a quaternion that returns with the opposite sign after a lap, 1 for all others.
 
     Parameters
     ----------
@@ -66,20 +66,20 @@ def lap_signs(rows: Array, quaternions: int) -> Array:
 
 
 def low_passed(channels: Array, duration: float, cutoff: float) -> Array:
-    """Channels of a lap (n, 3 + 4 k), position and k quaternions, without what is above the cutoff.
+    """Low-passed channels of a lap (n, 3 + 4 k): position and k quaternions.
 
     Parameters
     ----------
     channels : Array, shape (n, 3 + 4 k)
-        At equal steps of the lap.
+        Channels at equal steps of the lap.
     duration : float
-        Of the lap [s].
+        Duration of the lap [s].
     cutoff : float
         f_c [Hz], at which amplitudes are halved.
     """
     n, numbers = channels.shape
     signs = lap_signs(channels, (numbers - 3) // 4)
-    # Twice round: a quaternion may come back with the opposite sign.
+    # Over two laps, since a quaternion may return with the opposite sign.
     spectrum = np.fft.rfft(np.concatenate([channels, signs * channels]), axis=0)
     frequency = np.arange(len(spectrum)) / (2.0 * duration)
     spectrum /= (1.0 + (frequency / cutoff) ** 4)[:, None]

@@ -1,10 +1,10 @@
-r"""What a blend is corrected by between its clips: a smooth table over the lap and two coordinates across the blend.
+r"""Table of corrections of a blend between its clips: a smooth function of the lap's phase and two blend coordinates.
 
 .. math:: D(\theta, a, b) = \textstyle\sum_{ijk} B_i(\theta)\, B_j(a)\, B_k(b)\, C_{ijk}
 
 Tensor products of uniform cubic B-splines, periodic in θ, natural in a and b. D has two channels for the root and
-four for each limb (`CHANNELS`): how far root and end are moved in the plane, how high the end is raised, how far it
-is turned about the vertical. It is zero at the corners, where a clip is alone.
+four for each limb (`ROOT`, `FOOT`): displacements of root and end (foot) in the plane [m], the rise of the end [m], and
+its turn about the vertical [rad]. It is zero at the corners, where one clip has all the weight.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ _ROWS, _NODES, _CHANNELS, _TABLE = range(4)
 
 
 def packed_table(values: Array) -> Array:
-    """What `correction` reads, of values (n, nodes, nodes, channels) at equal steps of θ, a and b; nodes ≥ 4."""
+    """Table for `correction` from values (n, nodes, nodes, channels) at equal steps of θ, a and b; nodes ≥ 4."""
     rows, nodes, _, channels = values.shape
     # Second derivatives vanish at the ends.
     system = np.zeros((nodes + 2, nodes + 2))
@@ -32,7 +32,7 @@ def packed_table(values: Array) -> Array:
 
 
 def interpolation(nodes: int, places: Array) -> Array:
-    """Shares (k, nodes) that values at equal steps of [0, 1] have in the table at places (k,) along one way."""
+    """Interpolation weights (k, nodes) of values at equal steps of [0, 1], at points (k,), along one coordinate."""
     return CubicSpline(np.linspace(0.0, 1.0, nodes), np.eye(nodes), bc_type="natural")(places)
 
 

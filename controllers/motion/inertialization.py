@@ -1,18 +1,19 @@
-r"""Inertialisation: from one motion into another without a jump (Bollo, GDC 2018, "Inertialization").
+r"""Inertialisation: transition from one motion to another without a jump (Bollo, GDC 2018, "Inertialization").
 
-Only the new motion goes on. At the change the old one is ahead of it by an offset o with rates ȯ and ö, in the
-tangent space of the new pose; the offset is added to the new motion and decays to rest within the blend time T:
+Only the new motion is evaluated after the change. At the change the old pose differs from the new one by an offset o
+with rates ȯ and ö, in the tangent space of the new pose; it is added to the new motion and decays to zero within the
+blend time T:
 
 .. math:: o(s) = (1 - x)^3 \bigl(o\,(1 + 3x + 6x^2) + T \dot o\,(x + 3x^2) + \tfrac12 T^2 \ddot o\,x^2\bigr),
           \qquad x = s/T
 
-the quintic with o, ȯ, ö at s = 0 and zero, at rest and without acceleration, at s = T. So pose, velocity and
-acceleration are continuous there and here. We keep every component's own rate, also where it points away from the new
-motion, which Bollo clips: a joint may then swing on by up to 0.16 T ȯ, as an inert one does. A leg in full kick would
-be thrown out of its joints by that; so where it exceeds a greatest swing, what ȯ and ö add decays within a T of their
-own, in which it is just that.
+the quintic with o, ȯ, ö at s = 0 and value, velocity and acceleration zero at s = T. So pose, velocity and acceleration
+are continuous at both ends. Every component keeps its own rate, also where it points away from the new motion, which
+Bollo clips: a joint then overshoots by up to 0.16 T ȯ, as by its inertia. That could throw a fast leg beyond its joint
+limits; so where the overshoot would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their
+own, for which it equals that swing.
 
-Where the figure stands does not come back: see `stopping_way`.
+For the position of the figure on the floor, which need not return, see `stopping_way`.
 """
 
 import math
@@ -22,12 +23,12 @@ from numba import njit
 from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose, Tangent
 
-_SWING = 0.16  # of T ȯ: how far the rate alone carries an offset
+_SWING = 0.16  # largest overshoot of an offset due to its rate, as a share of T ȯ
 
 
 @njit
 def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing: float = math.inf) -> None:
-    """What is left of an offset s seconds after the change.
+    """Remaining offset s seconds after the change.
 
     Parameters
     ----------
@@ -36,11 +37,11 @@ def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing:
     seconds : float
         T > 0 [s].
     s : float
-        Time since the change [s], below T; before the change the polynomial goes on.
+        Time since the change [s], below T; for negative times the polynomial is continued.
     offset : Tangent, shape (n,)
         Written.
     swing : float
-        How far a component may swing on by its rate, by default without limit.
+        Largest overshoot of a component due to its rate, by default without limit.
     """
     x = s / seconds
     value = (1.0 - x) ** 3 * (1.0 + x * (3.0 + 6.0 * x))
@@ -57,9 +58,9 @@ def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing:
 
 @njit
 def stopping_way(speed: float, acceleration: float, seconds: float) -> float:
-    """Way from o = 0 with rates ȯ, ö to rest within T, such that the velocity is a cubic: T ȯ/2 + T² ö/12.
+    """Stopping distance T ȯ/2 + T² ö/12 from the rates ȯ, ö to rest within T, with a velocity that is a cubic.
 
-    A new motion that begins this much ahead is reached without coming back: then the quintic of `offset_left` is the
+    A new motion that is placed this far ahead is reached without a return: the quintic of `offset_left` is then the
     quartic whose velocity is ȯ (1 − x)² (1 + 2x) + T ö x (1 − x)².
     """
     return seconds * speed / 2.0 + seconds**2 * acceleration / 12.0

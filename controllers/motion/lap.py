@@ -1,13 +1,13 @@
-r"""The frame of the lap: how a drift over the ground moves the figure, over the seam and where the drift changes.
+r"""The frame of the lap: moves the figure over the ground at the seam of the lap, and compensates changes of the drift.
 
-In the frame A of the lap a pose is at exp(s ξ), s the share of the lap. Where the drift ξ changes with the hand, clips
-that travel differently are blended differently, and how far the figure has come must not follow: a hand that goes
-aside late in a lap would else carry it over the floor by metres. So A takes up the change,
+In the frame A ∈ SE(2) of the lap the root is at exp(s ξ), s the share of the lap, ξ the drift per lap. ξ changes when
+the hand changes the blend of clips that travel differently. The distance covered so far must not change with it:
+otherwise a hand that moves aside late in a lap would carry the figure over the floor by metres. So A compensates it,
 
 .. math:: A \leftarrow A\,\exp(\bar s\,\xi_{before})\,\exp(-\bar s\,\xi_{now}), \qquad
           \bar s = \tfrac12 (s_{before} + s_{now}),
 
-and the figure goes by ∫ ξ ds along the hand's path (by the trapezoid rule, to second order in the step).
+and the figure moves by ∫ ξ ds along the hand's path (by the trapezoid rule, to second order in the step).
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ def sine_quotients(angle: float) -> tuple[float, float, float, float]:
 
 @njit
 def _move_frame(memory: Array, s: float, drift: Array) -> None:
-    """A ← A·exp(s ξ), for a drift ξ in the memory or of the map, shape (3,)."""
+    """A ← A·exp(s ξ), for a drift ξ, shape (3,)."""
     q_s, q_c, _, _ = sine_quotients(s * drift[2])
     x, y = s * (q_s * drift[0] - q_c * drift[1]), s * (q_c * drift[0] + q_s * drift[1])
     cosine, sine = np.cos(memory[LAP_HEADING]), np.sin(memory[LAP_HEADING])
@@ -51,7 +51,7 @@ def update_lap(memory: Array, angle: float, drift: Array) -> None:
     """Carry the frame of the lap over the seam, A·exp(ξ) forwards and A·exp(−ξ) backwards, and over changes of ξ."""
     before, last = memory[LAST_ANGLE], memory[LAST_DRIFT : LAST_DRIFT + 3]
     memory[LAST_ANGLE] = angle
-    # False for NaN, the first tick.
+    # The comparison is false for the NaN of the first tick.
     if abs(angle - before) > np.pi:
         way = 1.0 if angle < before else -1.0
         _move_frame(memory, way, last)
@@ -66,7 +66,7 @@ def update_lap(memory: Array, angle: float, drift: Array) -> None:
 
 @njit
 def drift_motion(drift: Array, s: float, pace: float, local: Array, turn: Array) -> tuple[float, float]:
-    """Translation of exp(s ξ), and the rates of it and of its angle.
+    """Translation of exp(s ξ) [m]; writes the derivatives of translation and angle.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ def drift_motion(drift: Array, s: float, pace: float, local: Array, turn: Array)
     pace : float
         2π ds/dθ.
     local : Array, shape (2, 3)
-        Written: derivatives of the translation by the three.
+        Written: derivatives of the translation by the three parameters.
     turn : Array, shape (3,)
-        Written: derivatives of the angle s ω by the same.
+        Written: derivatives of the angle s ω by the three parameters.
     """
     angle = s * drift[0, 2]
     q_s, q_c, d_s, d_c = sine_quotients(angle)
@@ -90,7 +90,7 @@ def drift_motion(drift: Array, s: float, pace: float, local: Array, turn: Array)
         v_x, v_y = drift[1 + k, 0], drift[1 + k, 1]
         local[0, k] = s * (q_s * v_x - q_c * v_y + e_s * drift[0, 0] - e_c * drift[0, 1])
         local[1, k] = s * (q_c * v_x + q_s * v_y + e_c * drift[0, 0] + e_s * drift[0, 1])
-    # By θ there is also the way along the drift.
+    # The derivative by θ also has a part from s(θ).
     turn[0] += rate * drift[0, 2]
     local[0, 0] += rate * (cosine * drift[0, 0] - sine * drift[0, 1])
     local[1, 0] += rate * (sine * drift[0, 0] + cosine * drift[0, 1])

@@ -1,10 +1,10 @@
-r"""Clips as closed loops: each is split into a steady drift over the ground and a remainder that repeats.
+r"""Clips as closed loops: each is split into a steady drift over the ground and a periodic remainder.
 
 .. math:: X_{root}(s) = \exp(s\,\xi)\,\rho(s), \qquad s \in [0, 1],\; \rho(1) = \rho(0)
 
-ξ = (v, ω) is the twist in the plane whose exponential is the displacement of one lap: the walk goes on from where
-the lap ended, the spin comes back to where it began having turned by ω = 2π. Everything else (ρ and the joints) is
-a periodic C² spline, in R³ for the root's position and in R⁴, normalised, for each rotation.
+ξ = (v, ω) is the planar twist whose exponential is the displacement of one lap: a walk goes on from where the lap
+ended, a spin returns to its start after a turn of ω = 2π. Everything else (ρ and the joints) is a periodic C² spline,
+in R³ for the root's position and in R⁴, normalised, for each rotation.
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from scipy.interpolate import CubicSpline
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # a lap that ends so near to its start is meant to return
+_STILL_LENGTH, _STILL_ANGLE = 0.02, np.deg2rad(2.0)  # [m], [rad] a lap that ends this near to its start has no drift
 _UPRIGHT = 0.3  # least vertical component of the pelvis axis at which its turning about the vertical counts
 _SEAM = 0.2  # share of the lap at each end that the closing of an open clip may change
-_CLOSES = 0.01  # [rad], [m] by which the ends of a closed clip may differ
-_MOVES, _GOES = 1.5, 0.6  # [rad/s] RMS of the joints, [m/s] of the root, from which an end is in the middle of a motion
-_BRAKES = 0.15  # [s] of an open clip at each end that are played ever slower, in twice the time
+_CLOSES = 0.01  # components of quaternions, or [m]: largest difference between the ends of a closed clip
+_MOVES, _GOES = 1.5, 0.6  # [rad/s] RMS of the joints, [m/s] of the root: a faster end of a clip does not rest
+_BRAKES = 0.15  # [s] at each end of an open clip that are slowed down to rest, in twice the time
 
 
 def plane_exponential(twist: Array) -> tuple[Array, Array]:
@@ -55,21 +55,21 @@ def _periodic_spline(s: Array, values: Array, sign: float) -> CubicSpline:
 
 
 def _hermite(x: Array) -> Array:
-    """Quintics on [0, 1], shape (3, n): value, slope or second derivative 1 at 0, all others 0 there and at 1."""
+    """Quintic Hermite polynomials on [0, 1], shape (3, n): value, slope or second derivative 1 at 0, all others 0."""
     x = np.minimum(x, 1.0)
     rest = (1.0 - x) ** 3
     return np.stack([rest * (1.0 + 3.0 * x + 6.0 * x**2), rest * (x + 3.0 * x**2), rest * 0.5 * x**2])
 
 
 def _end_derivatives(s: Array, values: Array) -> Array:
-    """Value, slope and second derivative at s = 0, shape (3, c); the latter two by a cubic fit, for noise's sake."""
+    """Value, slope and second derivative at s = 0, shape (3, c); the latter two by a cubic fit, against noise."""
     n = min(len(s), max(6, len(s) // 12))
     fit = np.polynomial.polynomial.polyfit(s[:n], values[:n], min(3, n - 1))
     return np.stack([values[0], fit[1], 2.0 * fit[2] if len(fit) > 2 else np.zeros_like(fit[0])])
 
 
 def _closed(s: Array, values: Array, sign: float) -> Array:
-    """Lead the ends of an open motion half way to each other: value, slope and second derivative meet."""
+    """Close an open motion: move each end half way to the other, so that value, slope and second derivative meet."""
     start, end = _end_derivatives(s, values), _end_derivatives(1.0 - s[::-1], values[::-1])
     gaps = sign * end * [[1.0], [-1.0], [1.0]] - start
     reach = _SEAM ** np.arange(3)[:, None]
@@ -80,7 +80,7 @@ def _closed(s: Array, values: Array, sign: float) -> Array:
 
 
 def _full_turns(quaternions: Array, net: float) -> int:
-    """Whole turns about the vertical beyond the net one, counted while the pelvis is upright: not a somersault's."""
+    """Whole turns about the vertical beyond the net turn, counted while the pelvis is upright: no somersaults."""
     upright = 1.0 - 2.0 * (quaternions[:, 1] ** 2 + quaternions[:, 2] ** 2)
     change = quaternions[1:] - quaternions[:-1]
     middle = 0.5 * (quaternions[1:] + quaternions[:-1])
@@ -102,15 +102,15 @@ class Loop:
     Attributes
     ----------
     drift : Array, shape (3,)
-        ξ = (v_x, v_y [m], ω [rad]) a lap.
+        ξ = (v_x, v_y [m], ω [rad]) per lap.
     duration : float
-        Of a lap [s].
+        Duration of a lap [s].
     gap : float
-        Angle [rad] by which the joint that closes worst did not close in the clip, and was made to.
+        Largest angle [rad] of a joint between the clip's ends, before they were closed.
     splines : list of CubicSpline
-        ρ's position, then root and joint rotations in R⁴, each of period 1 or 2 (when it comes back as −q).
+        ρ's position, then root and joint rotations in R⁴, each of period 1, or 2 if q returns as −q.
     share : float
-        How much of the splines' period 1 a lap goes round (see `strides`).
+        Number of repeats of the clip (period 1 of the splines) in a lap (see `strides`).
     """
 
     drift: Array
@@ -120,7 +120,7 @@ class Loop:
     share: float = 1.0
 
     def channels(self, s: Array, lead: Array) -> Array:
-        """Remainder at phases s, all rotations of unit length, shape (n, nq); the root moved by exp(lead ξ)."""
+        """Remainder at phases s (n,), with unit quaternions, shape (n, nq); the root is moved by exp(lead ξ)."""
         parts = [spline(np.mod(self.share * s, float(spline.x[-1]))) for spline in self.splines]
         rotations = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts[1:]]
         shift, angle = plane_exponential(lead[:, None] * self.drift)
@@ -130,7 +130,7 @@ class Loop:
 
 
 def checked_clip(poses: Array, fps: float, name: str) -> Array:
-    """Poses of a clip as an array of floats with unit quaternions of continuous sign, or what is wrong with them."""
+    """Validated poses of a clip, with unit quaternions of continuous sign; raises `ParameterError`."""
     array = np.array(poses, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] < 7 or (array.shape[1] - 7) % 4 != 0:
         raise ParameterError(f"{name}: poses must have shape (n, 7 + 4 joints), got {array.shape}")
@@ -171,7 +171,7 @@ def drift_of(poses: Array) -> Array:
     if abs(net) < _STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
     if abs(net) < 1.0:
-        turns = 0  # a twist of whole turns cannot move on: a turn while travelling is in the remainder
+        turns = 0  # the exponential of a twist of whole turns has no translation, so these stay in the remainder
     angle = net + 2.0 * np.pi * turns
     columns, _ = plane_exponential(np.array([[1.0, 0.0, angle], [0.0, 1.0, angle]]))
     return np.append(np.linalg.solve(columns.T, step), angle)
@@ -191,7 +191,7 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
     placed = poses.copy()
     placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
     w, _, _, z = remainder(placed, s, drift_of(placed))[:, 3:7].T
-    # Mean heading by the doubled half angle, which does not know the sign of a quaternion.
+    # Mean heading by the doubled half angle, which is independent of the sign of a quaternion.
     heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
     placed[:, :2] = turned(np.array(-heading), placed[:, :2])
     placed[:, 3:7] = yawed(np.full(len(s), -heading), placed[:, 3:7])
@@ -199,11 +199,11 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
 
 
 def there_and_back(poses: Array, fps: float) -> Array:
-    r"""A clip that is open and (nearly) rests at both ends, followed by itself backwards; any other one as it is.
+    r"""Append to an open clip that (nearly) rests at both ends its time reversal; any other clip is left as it is.
 
     q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with
-    the same torques and contact forces it is as feasible, its flights as ballistic, and its feet stand where they
-    stood. What still moves at an end is brought to rest there: the last 0.15 s are played at a pace that falls to 0.
+    the same torques and contact forces it is equally feasible, its flights are ballistic, and its feet stand in the
+    same places. Remaining motion is brought to rest: the 0.15 s at each end are played at a pace that falls to 0.
     """
     first, last = poses[0], poses[-1]
     signs = np.sign(np.einsum("jx,jx->j", first[3:].reshape(-1, 4), last[3:].reshape(-1, 4)))
@@ -216,7 +216,7 @@ def there_and_back(poses: Array, fps: float) -> Array:
             return poses
     seconds = (len(poses) - 1) / fps
     brakes = min(_BRAKES, 0.25 * seconds)
-    # Own time u of what goes on at a pace of 1 after 2 brakes of rising pace: u = t²/(4 brakes) first.
+    # Clip time u: u = t²/(4 brakes) while the pace rises, for 2 brakes; then pace 1; then the same in reverse.
     times = np.linspace(0.0, seconds + 2.0 * brakes, int(np.ceil((seconds + 2.0 * brakes) * fps)) + 1)
     rest = times[-1] - times
     own = np.where(times < 2.0 * brakes, times**2 / (4.0 * brakes), times - brakes)
@@ -229,15 +229,15 @@ def there_and_back(poses: Array, fps: float) -> Array:
 
 
 def closed_loop(poses: Array, fps: float) -> Loop:
-    """Loop of a clip; one that is open and about rests at both ends is played there and back (`there_and_back`)."""
+    """Loop of a clip; an open clip that nearly rests at both ends is played there and back (`there_and_back`)."""
     return forward_loop(there_and_back(poses, fps), fps)
 
 
 def forward_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip of poses (n, nq) that passed `checked_clip`, moved to the origin and facing +x on average.
 
-    A clip that does not close by itself is made to: over the first and last fifth of the lap its ends are led half way
-    to each other by quintics, so that value, slope and second derivative meet.
+    A clip that does not close is closed: over the first and last fifth of the lap its ends are moved half way to each
+    other by quintics, so that value, slope and second derivative meet.
     """
     s = np.linspace(0.0, 1.0, len(poses))
     placed = placed_at_origin(poses, s)

@@ -23,7 +23,7 @@ _Normal = tuple[float, float, float, float, float, float, float, float, float]
 
 @njit(forceinline=True)
 def _normal_equations(unit: Array, weights: Array, q: Quat) -> _Normal:
-    """Entries A11, A12, A13, A22, A23, A33 and g1, g2, g3."""
+    """Entries A11, A12, A13, A22, A23, A33 of A and g1, g2, g3 of g (see the module)."""
     a11 = a12 = a13 = a22 = a23 = a33 = g1 = g2 = g3 = 0.0
     for i in range(unit.shape[0]):
         w = weights[i]
@@ -57,7 +57,7 @@ def _solve(e: _Normal, x: float, y: float, z: float) -> tuple[float, float, floa
 
 @njit(forceinline=True)
 def _polish(unit: Array, weights: Array, q: Quat) -> bool:
-    """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; tells whether A is positive definite at the end."""
+    """Newton steps q ← q ⊗ (1, A⁻¹ g), which converge cubically; returns whether A is then positive definite."""
     e = _normal_equations(unit, weights, q)
     for _ in range(8):
         x, y, z = _solve(e, e[6], e[7], e[8])
@@ -74,11 +74,11 @@ def _polish(unit: Array, weights: Array, q: Quat) -> bool:
 
 @njit
 def _dominant(unit: Array, weights: Array, q: Quat) -> None:
-    """Eigenvector of the largest eigenvalue of M by squaring it 24 times: slow, and sure."""
+    """Eigenvector of the largest eigenvalue of M by squaring M 24 times: slow, but always converges."""
     m, square = work_array((4, 4)), work_array((4, 4))
     m[:] = 0.0
     for i in range(unit.shape[0]):
-        # Negative weights are made up for by a multiple of the identity, which turns no eigenvector.
+        # A multiple of the identity makes M positive in spite of negative weights, and changes no eigenvector.
         for j in range(4):
             m[j, j] += max(-weights[i], 0.0)
         for j in range(4):
@@ -113,7 +113,7 @@ def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
     unit : Array, shape (m, 4)
         Unit quaternions wxyz, of any sign.
     weights : Array, shape (m,)
-        Of sum 1; negative ones are taken as long as M has one largest eigenvalue.
+        Sum 1; negative ones are allowed as long as the largest eigenvalue of M is simple.
     q : Quat
         Written: the mean, with the sign of the heaviest quaternion.
     """
@@ -126,7 +126,7 @@ def mean_rotation(unit: Array, weights: Array, q: Quat) -> None:
         dot = 0.0
         for j in range(4):
             dot += unit[i, j] * unit[heaviest, j]
-        # A negative weight would only spoil the beginning, which without it is never zero.
+        # Negative weights are left out of the initial guess, so that it is never zero.
         w = max(weights[i], 0.0) if dot >= 0.0 else -max(weights[i], 0.0)
         for j in range(4):
             q[j] += w * unit[i, j]
@@ -158,7 +158,7 @@ def mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q:
     spin : Array, shape (m, 3)
         ω_i, local angular velocities of the rotations with respect to one parameter.
     changes : Array, shape (k, m)
-        Derivatives of the weights with respect to k parameters, that of the spins first.
+        Derivatives of the weights with respect to k parameters; the first is the parameter of `spin`.
     tangent : Array, shape (3, k)
         Written: local angular velocity of the mean with respect to each parameter.
     """

@@ -1,15 +1,16 @@
-r"""How often a lap plays each clip: travelling clips in step with each other, all near their own pace.
+r"""Repeats of each clip in a lap: travelling clips stride in step with each other, and all play near their own pace.
 
-A walk of two strides and a run of three have no phase in common but at the lap's ends, and a jog of 0.8 s beside a
-dance of 4 s would be played five times too slowly: its flights would ask for a 25th of gravity. A loop can be played
-round any number of times: it stays closed, and its drift and time are in proportion. So with d_i the time of a clip,
-s_i its strides and T the time of the lap, clip i is played k_i / s_i times,
+A walk of two strides and a run of three have no common phase except at the lap's ends, and a jog of 0.8 s beside a
+dance of 4 s would be played five times too slowly: its flights would need a 25th of gravity. A loop can be repeated
+any number of times: it stays closed, and its drift and duration scale. So with d_i the duration of a clip, s_i its
+number of strides and T the duration of the lap, clip i is played k_i / s_i times,
 
 .. math:: k = \arg\min_k \max_i w\!\left(\log \frac{k\,d_i}{s_i\,T}\right), \qquad w(x) = \max(-x, 3 x)
 
-over all that travel, which so take as many strides, and k_i likewise of each other clip alone (s_i = 1); of each clip
-alone where legs are one clip's, so that strides need not be in step. Faster counts thrice, for a body played f times as
-fast needs f² of its forces, and one that jumps cannot fall faster than it does.
+where k is common to all travelling clips, which therefore take the same number of strides; for every other clip k_i is
+chosen by itself with s_i = 1. If the legs are those of one clip, strides need not be in step, and k_i is chosen for
+each clip by itself. Faster counts three times as much as slower, since motion played f times as fast needs f² of its
+forces, and a jump cannot fall faster than gravity lets it.
 """
 
 from collections.abc import Sequence
@@ -21,14 +22,14 @@ from controllers.motion.loops import Loop
 from controllers.state import Array, IntArray
 
 _SAMPLES = 128
-_MOST = 12  # repeats looked for in a clip
-_SAME = 1e-3  # by which lengths [m] and components of rotations may differ from one repeat to the next
-_FASTER = 3.0  # times as bad as slower
-_FURTHEST = 0.3  # [m] a lap that goes less far is no gait
+_MOST = 12  # largest number of repeats searched in a clip
+_SAME = 1e-3  # [m], or components of rotations: largest difference between repeats
+_FASTER = 3.0  # cost of playing faster relative to slower
+_FURTHEST = 0.3  # [m] a lap that travels less is not a gait
 
 
 def strides(loop: Loop) -> int:
-    """How many times a loop repeats itself in a lap."""
+    """Number of strides of a loop: repeats of the same motion in a lap."""
     phase, still = np.arange(_SAMPLES) / _SAMPLES, np.zeros(_SAMPLES)
     channels = loop.channels(phase, still)
     if np.ptp(channels, axis=0).max() < _SAME:
@@ -44,17 +45,17 @@ def strides(loop: Loop) -> int:
 
 
 def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False) -> list[Loop]:
-    """The loops, each played as often as it fits a lap.
+    """The loops, each repeated as often as it fits a lap.
 
     Parameters
     ----------
     loops : sequence of Loop
         Clips as closed loops.
     lap : float, optional
-        T [s]. Without it clips are played once, and those that travel and repeat themselves with as many strides as the
-        first of them.
+        T [s]. Without it clips are played once, except that travelling clips of several strides get as many strides as
+        the first of them.
     apart : bool
-        Each by itself, travelling ones too.
+        Whether each clip is fitted by itself, travelling ones too.
     """
     counts = [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
     if lap is None:
@@ -75,7 +76,7 @@ def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False
 
 
 def _times(durations: Array, lap: float) -> int:
-    """How often what lasts so long [s] (n,) fits a lap [s], the worst of them best."""
+    """Number of repeats of durations [s] (n,) that fits a lap [s] best in the worst case."""
     logs = np.log(durations / lap)
     first = max(1, int(np.exp(-logs.max())))
     ways = np.arange(first, int(np.exp(-logs.min())) + 2)
@@ -84,11 +85,11 @@ def _times(durations: Array, lap: float) -> int:
 
 
 def natural_lap(loops: Sequence[Loop], shortest: float = 3.0, longest: float = 6.0) -> float:
-    """Time of a lap [s] in which the first loop goes at its own pace, and the others `in_step` are as near as can be.
+    """Duration of a lap [s] in which the first loop plays at its own pace, and the others `in_step` as nearly.
 
-    The legs of a blend may be the first loop's, so the lap is a number of its strides: from the shortest to the
-    longest time, or that of the longest loop; of those within 2 % of the best the shortest. A lap of several short
-    cycles leaves a hand the time of all of them to change the blend.
+    Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from the
+    shortest to the longest duration, or that of the longest loop; of all within 2 % of the best, the shortest is taken.
+    A lap of several short cycles gives the hand more time to change the blend.
     """
     first = loops[0]
     stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)

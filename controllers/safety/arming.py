@@ -1,7 +1,7 @@
-r"""When a device may push: disarmed → arming → ramping → active, and fault from everywhere.
+r"""Arming state machine of a device: disarmed → arming → ramping → active, and fault from every state.
 
-A machine is its table: what is not in it changes nothing. There is no way from a fault to a force but by being cleared,
-armed again, quiet, and ramped in.
+The machine is the table `TRANSITIONS`; an event without an entry changes nothing. After a fault there is no force until
+the device is cleared and armed again, the demanded force has been small, and the force has been ramped in.
 """
 
 from enum import IntEnum
@@ -11,7 +11,7 @@ from numba import njit
 
 
 class State(IntEnum):
-    """Of a device: only a `RAMPING` or `ACTIVE` one has its motors on."""
+    """State of a device; the motors are on only in `RAMPING` and `ACTIVE`."""
 
     DISARMED = 0
     ARMING = 1
@@ -21,10 +21,10 @@ class State(IntEnum):
 
 
 class Event(IntEnum):
-    """What may happen to a state.
+    """Event of the state machine.
 
-    ARM, DISARM and CLEAR are the user's. QUIET: the force that is asked for has been small for long enough. RELEASED:
-    the dead-man switch is not held. FAULTED: a fault is latched.
+    ARM, DISARM and CLEAR are requests of the user. QUIET: the demanded force has been small for long enough. RAMPED:
+    the force is fully ramped in. RELEASED: the dead-man switch is not held. FAULTED: a fault is latched.
     """
 
     ARM = 0
@@ -46,11 +46,11 @@ TRANSITIONS: dict[tuple[State, Event], State] = {
     **{(state, Event.FAULTED): State.FAULT for state in State},
     (State.FAULT, Event.CLEAR): State.DISARMED,
 }
-"""All that can happen."""
+"""All transitions of the machine."""
 
 _NEXT = np.array([[TRANSITIONS.get((state, event), state) for event in Event] for state in State], dtype=np.int64)
 
-# numba freezes globals; a member of an enumeration would be looked up in each kernel.
+# Plain integers: numba freezes globals, but would look up a member of an enumeration in each kernel.
 DISARMED, ARMING, RAMPING, ACTIVE, FAULT = (int(state) for state in State)
 ARM, QUIET, RAMPED, RELEASED, DISARM, FAULTED, CLEAR = (int(event) for event in Event)
 NO_REQUEST = -1
@@ -58,7 +58,7 @@ NO_REQUEST = -1
 
 @njit
 def next_state(state: int, event: int) -> int:
-    """State after an event; the same where the table has none."""
+    """State after an event; unchanged where the table has no entry."""
     return _NEXT[state, event]
 
 
@@ -69,7 +69,7 @@ def pushes(state: int) -> bool:
 
 
 def mermaid() -> str:
-    """The table as a state diagram, for the documents."""
+    """The table as a Mermaid state diagram, for the documentation."""
     lines = [
         f"    {a.name.lower()} --> {b.name.lower()}: {event.name.lower()}" for (a, event), b in TRANSITIONS.items()
     ]

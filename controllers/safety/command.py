@@ -1,8 +1,8 @@
-"""From what a field asks for to what a device is commanded: ramp, ceiling, energy tank, slew, and the faults of these.
+"""From the field's wrench to the commanded force: ceiling, ramp, energy tank, slew limit, and the faults of these.
 
-The slew limit comes last, so that a tank that cuts a force is held to it as well: what the hand then gets beyond the
-tank's share, for some ticks, is booked as what it is, and a store that is overdrawn by it holds the next forces back.
-A fault is not held to it: it lets go at once.
+The slew limit comes last, so that it also applies when the tank cuts a force. For some ticks the hand then gets more
+than the tank allows; this energy is booked, and if it overdraws the tank, the next forces are reduced. A fault is
+exempt from the slew limit: the force drops to zero at once.
 """
 
 import numpy as np
@@ -26,20 +26,20 @@ from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
 def command_force(
     limits: Array, limiter: Array, budget: Array, tank: Array, faults: Array, hand: Array, wrench: Array, force: Array
 ) -> None:
-    """Force that a device is commanded at this tick; zero from a fault on.
+    """Force commanded to a device at this tick; zero from a fault on.
 
     Parameters
     ----------
     limits, limiter : Array
-        Of `controllers.safety.limiter`; the memory is updated.
+        Limits and memory of `controllers.safety.limiter`; the memory is updated.
     budget, tank : Array
-        Of `controllers.safety.energy_tank`; likewise.
+        Parameters and memory of `controllers.safety.energy_tank`; the memory is updated.
     faults : Array
-        Of the device (`controllers.safety.faults`); what is not finite is latched.
+        Faults of the device (`controllers.safety.faults`); a non-finite value is latched.
     hand : Array
         The hand vector as measured.
     wrench : Array
-        What the field asks for, shape (6,).
+        Wrench demanded by the field, shape (6,).
     force : Array
         Written [N], shape (3,).
     """
@@ -55,7 +55,7 @@ def command_force(
     ramp_in(faults, force)
     if faults[FAULT_CODE] != 0.0:
         force[0] = force[1] = force[2] = 0.0
-    # Before it is used: min(e_max, NaN) would be a full tank.
+    # Checked before use, since min(e_max, NaN) would give a full tank.
     if not np.isfinite(np.sum(tank)):
         latch(faults, TANK_NOT_FINITE, t, first_not_finite(tank))
     guard_energy(budget, tank, p, v, force)

@@ -1,13 +1,13 @@
-r"""Energy tank: what a field may inject is a store that it drains and a power that fills it, kept at run time.
+r"""Energy tank (passivity layer): bounds the energy that a field injects, by a store refilled at a power P.
 
 .. math:: \dot e = P - F \cdot v, \qquad e(0) = e_0, \quad e \le e_{max}, \qquad
           F \cdot v \le \frac{\max(e, 0)}{\tau} + P
 
-The certificate of energy says what P has to be for a river to run freely (b_d |φ̇|²/4 and what friction takes); the tank
-holds it to that when something is not as certified: a late loop, a user's own law, a wrong gain. So the energy that a
-hand gets is at most e₀ + P (t + τ), up to what speeds change within one period, which is booked when it has been seen:
-a store that is overdrawn by it lets all forces through only in part, F ← F ⟨1 + e/(P τ)⟩ for e < 0. What a hand puts
-into a spring it may have back, for e rises above e₀ by it, up to e_max: the most that the springs hold.
+The energy certificate gives the P that a river needs to run freely (b_d |φ̇|²/4 plus friction losses); the tank
+enforces this bound when something is not as certified: a late loop, a user's own law, a wrong gain. The energy that the
+hand gets is at most e₀ + P (t + τ), up to the change of speed within one period. That work is booked once measured:
+if it overdraws the store, all forces are reduced, F ← F ⟨1 + e/(P τ)⟩ for e < 0. Work that the hand does on a spring
+can be returned, since it raises e, up to e_max: the most that the springs store.
 """
 
 from dataclasses import dataclass
@@ -31,13 +31,13 @@ def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -
     params : Array
         `EnergyTank.params`.
     tank : Array
-        Memory [e, scale of this tick, last p (3), last force (3), started], written. The store changes by flows only:
-        work done, work taken back, filling; what does not fit into it is lost.
+        Memory [e, scale of this tick, last p (3), last force (3), started], written. The store changes only by work
+        done, work returned and refilling; what exceeds its capacity is lost.
     p, v : Array
         Measured position [m] and velocity [m/s] of the tip in H, shape (3,).
     force : Array
-        [N], scaled in place, shape (3,). A force that takes energy from the hand, or finds it at rest, is not touched
-        unless the store is overdrawn: by what is measured late it may be giving.
+        [N], scaled in place, shape (3,). A force that takes energy from the hand, or acts on a hand at rest, is left
+        unchanged unless the store is overdrawn: since velocity is measured with a delay, it may in fact inject energy.
     """
     period = params[_PERIOD]
     if tank[TANK_STARTED] > 0.0:
@@ -48,7 +48,7 @@ def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -
     tank[TANK_STARTED] = 1.0
     power = force[0] * v[0] + force[1] * v[1] + force[2] * v[2]
     allowed = max(tank[TANK_ENERGY], 0.0) * params[_DRAIN] + params[_POWER]
-    # A quotient of two powers, only where the divisor is the larger, positive one: no speed is divided by.
+    # Divides only by the larger, positive one of two powers, never by a speed.
     scale = allowed / power if power > allowed else 1.0
     if tank[TANK_ENERGY] < 0.0:
         scale *= max(0.0, 1.0 + tank[TANK_ENERGY] * params[_DRAIN] / params[_POWER])
@@ -60,13 +60,13 @@ def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -
 
 @njit
 def book_force(tank: Array, force: Array) -> None:
-    """Tell the tank which force (3,) the hand really gets, where another limit came after the tank's."""
+    """Store the force (3,) [N] that the hand actually gets, after limits that follow the tank's."""
     for i in range(3):
         tank[TANK_FORCE + i] = force[i]
 
 
 def renew_tank(tank: Array) -> None:
-    """Make a memory usable after a fault: an energy that was lost is taken for none."""
+    """Make a memory usable after a fault: a non-finite energy is set to zero."""
     if not np.isfinite(tank[TANK_ENERGY]):
         tank[TANK_ENERGY] = 0.0
     tank[TANK_SCALE], tank[TANK_STARTED] = 1.0, 0.0
@@ -82,13 +82,13 @@ class EnergyTank:
     period : float
         Servo period T [s].
     power : float
-        P, what flows in all the time [W].
+        P, constant refilling power [W].
     capacity : float
         e_max [J].
     drain_time : float
-        τ, in which a full tank may be emptied [s]; at least 2 T, so that one period cannot take more than there is.
+        τ, time constant of draining [s]; at least 2 T, so that one period cannot take more than the tank contains.
     initial : float, optional
-        e₀, what the tank holds at first [J]; by default it is full.
+        e₀, initial energy [J]; by default the tank is full.
 
     Raises
     ------
@@ -129,12 +129,12 @@ class EnergyTank:
 
 
 def river_power(b_d: float, pace: float) -> float:
-    """Most power [W] that the damper of a river injects, b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4, at |φ̇| ≤ pace [m/s]."""
+    """Largest power [W] that the damper of a river injects, b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4, at |φ̇| ≤ pace [m/s]."""
     return 0.25 * b_d * pace**2
 
 
 def spring_store(stiffness: float, distance: float, force: float = np.inf) -> float:
-    r"""Most energy [J] that a spring holds up to a distance [m] when no more than a force [N] gets through.
+    r"""Energy [J] of a spring stretched by a distance R [m] whose force saturates at F [N].
 
     .. math:: \int_0^R \min(k s, F)\,ds
     """

@@ -1,8 +1,8 @@
-r"""Faults of a device and of what commands it: what cannot be a reading, and what is done about it.
+r"""Faults of a device and its controller: plausibility checks of readings, and latching of faults.
 
-A fault is **latched**: from the tick in which it is seen the motors are off, until somebody calls `rearm`. Which it
-was, when, and what the value was stays in the device's `faults`, one array that the device's kernels, the loop and
-whoever drives the device read; it is recorded tick by tick.
+A fault is **latched**: from the tick in which it is detected the motors are off, until `rearm` is called. Its code,
+time and value stay in the device's `faults`, one array that the device's kernels, the loop and the driver of the device
+read; it is recorded tick by tick.
 
 | fault | evidence |
 |---|---|
@@ -13,8 +13,8 @@ whoever drives the device read; it is recorded tick by tick.
 | clock back | a reading is numbered after the last one, and made before it |
 | ended | a replayed hand has no more rows |
 
-A **gap** is no fault: when there is more than the silence between two readings, the servo did not run. Then the device
-let go by itself (`is_silent`), the gap is counted, and the force is ramped in again.
+A **gap** is not a fault: if two readings are further apart than the silence, the servo did not run in between. The
+device has then switched its force off by itself (`is_silent`); the gap is counted, and the force is ramped in again.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from controllers.state import Array
 
 
 class Fault(IntEnum):
-    """Why a device let go; `words` says it."""
+    """Why a device switched its force off; `words` describes it."""
 
     NONE = 0
     FORCE_NOT_FINITE = 1
@@ -89,27 +89,27 @@ _WORDS = {
     Fault.CLOCK_BACK: "the device's clock went back by {:.3g} s",
 }
 
-# numba freezes globals; a member of an enumeration would be looked up in each kernel.
+# Plain integers: numba freezes globals, but would look up a member of an enumeration in each kernel.
 FORCE_NOT_FINITE, LIMITER_NOT_FINITE, TANK_NOT_FINITE = 1, 2, 3
 READING_NOT_FINITE, RATE_IMPOSSIBLE, READING_STALE, ENCODERS_FROZEN, READINGS_ENDED = 4, 5, 6, 7, 8
 CLOCK_BACK = 24
 
-# Layout of a device's `faults`: what is told, what is remembered, and the limits.
+# Layout of a device's `faults`: public values, internal state, limits.
 FAULT_CODE, FAULT_TIME, FAULT_VALUE, FAULT_GAPS, FAULT_LAST_GAP, FAULT_RAMP = range(6)
 _STARTED, _CLOCK, _ELAPSED, _SEQUENCE, _FRESH, _STILL_SINCE, _LOAD, _COMMANDED = range(6, 14)
 _PERIOD, _RATE, _STEP, _SILENCE, _RAMP_TIME, _STILL, _STILL_LOAD, FAULT_SIZE = 14, 15, 18, 21, 22, 23, 24, 25
 
 NO_SEQUENCE = -1.0
-"""Number of a reading of a device that does not number them."""
+"""Sequence number of readings of a device that does not number them."""
 HELD, TAKEN, RESTARTED = 0, 1, 2
-"""What to do about a reading: keep the last one, take it, or take it and forget the speed."""
+"""What to do with a reading: keep the last one, use it, or use it and reset the velocity estimate."""
 
-_LATE = 1.5  # periods between two readings, from which on their true distance is taken for the speed
+_LATE = 1.5  # periods between two readings, above which their true distance in time is used for the speed
 
 
 @njit
 def latch(faults: Array, code: int, t: float, value: float) -> None:
-    """Latch a fault at time t [s]; the first stays."""
+    """Latch a fault at time t [s]; the first one is kept."""
     if faults[FAULT_CODE] == 0.0:
         faults[FAULT_CODE], faults[FAULT_TIME], faults[FAULT_VALUE] = code, t, value
 
@@ -134,29 +134,29 @@ def judge_reading(
     sequence: float,
     held: bool,
 ) -> int:
-    """Judge the joint angles that a device tells, and latch what cannot be.
+    """Check the joint angles of a reading for plausibility, and latch faults.
 
     Parameters
     ----------
     faults : Array
-        Of the device; updated.
+        Faults of the device; updated.
     theta, gimbal : three floats each
-        As read [rad]. No motor acts on the gimbal, and a free one swings as it likes: it only has to be finite.
+        Joint angles as read [rad]. The gimbal has no motors and may swing freely, so it only has to be finite.
     last : Array
-        Angles of the last reading taken [rad], shape (3,) or longer.
+        Angles of the last reading that was used [rad], shape (3,) or longer.
     t : float
         Time of the tick [s], for the latch.
     clock : float
-        When the reading was made, by the device's own clock [s].
+        Time of the reading by the device's own clock [s].
     sequence : float
-        Number of the reading, or `NO_SEQUENCE`.
+        Sequence number of the reading, or `NO_SEQUENCE`.
     held : bool
-        Whether the stylus is known to be in a hand that can hold it without a count: not a real one, which trembles.
+        Whether a simulated hand may hold the stylus still without an encoder count; a real hand trembles.
 
     Returns
     -------
     int
-        `HELD`, `TAKEN` or `RESTARTED`; `elapsed` tells for what time the reading is.
+        `HELD`, `TAKEN` or `RESTARTED`; `elapsed` gives the time that the reading spans.
     """
     if sequence >= 0.0:
         if sequence == faults[_SEQUENCE]:
@@ -164,7 +164,7 @@ def judge_reading(
                 faults[_FRESH] = t
             if faults[_STARTED] == 0.0:
                 faults[FAULT_RAMP] = 0.0
-            # In whole periods: five times one is not always five.
+            # Compared with half a period of tolerance, since sums of periods are rounded.
             if t - faults[_FRESH] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
                 latch(faults, READING_STALE, t, t - faults[_FRESH])
             return HELD
@@ -207,7 +207,7 @@ def judge_reading(
 
 @njit
 def ramp_in(faults: Array, force: Array) -> None:
-    """Scale a force (3,) by the share that is ramped in, in place, and raise the share by a period's."""
+    """Scale a force (3,) in place by the share that is ramped in, then raise the share by one period's increment."""
     if faults[FAULT_RAMP] < 1.0:
         for i in range(3):
             force[i] *= faults[FAULT_RAMP]
@@ -216,24 +216,24 @@ def ramp_in(faults: Array, force: Array) -> None:
 
 @njit
 def elapsed(faults: Array) -> float:
-    """Time that the last reading's change of angle took [s]: the period, unless readings were left out."""
+    """Time that the last reading's change of angle spans [s]: the period, unless readings were missed."""
     return faults[_ELAPSED]
 
 
 @njit
 def note_command(faults: Array, t: float, load: float) -> None:
-    """Remember what was commanded at time t [s]: `load`, the largest torque of a joint over its Coulomb friction."""
+    """Store the time t [s] of a command and its `load`, the largest ratio of joint torque to Coulomb friction."""
     faults[_COMMANDED], faults[_LOAD] = t, load
 
 
 @njit
 def is_silent(faults: Array, t: float) -> bool:
-    """Whether the last command is older than the silence at time t [s], or there is a fault: then a device lets go."""
+    """Watchdog: whether at time t [s] there is a fault or the last command is older than the silence; no force then."""
     return faults[FAULT_CODE] != 0.0 or t - faults[_COMMANDED] > faults[_SILENCE]
 
 
 def rearm(faults: Array) -> None:
-    """Forget a latched fault: the force is ramped in from zero, from the next reading on. Gaps stay counted."""
+    """Clear a latched fault: the force is ramped in from zero, from the next reading on. The count of gaps is kept."""
     faults[FAULT_CODE] = faults[FAULT_TIME] = faults[FAULT_VALUE] = faults[FAULT_RAMP] = 0.0
     faults[_STARTED] = faults[_LOAD] = 0.0
     faults[_FRESH] = faults[_COMMANDED] = np.nan
@@ -241,7 +241,7 @@ def rearm(faults: Array) -> None:
 
 @dataclass(frozen=True)
 class Plausibility:
-    r"""What readings of a device may be, and how it lets go.
+    r"""Limits of plausible readings of a device, and times of its watchdog and ramp.
 
     Parameters
     ----------
@@ -252,15 +252,15 @@ class Plausibility:
     steps : three floats
         δ, a count of each encoder [rad].
     silence : float
-        Time without a reading or a command after which a device lets go [s]; at least two periods.
+        Time without a reading or a command after which a device switches its force off [s]; at least two periods.
     ramp : float
-        In which the force comes back after a gap or a fault [s]; of the order of a reaction time, so that a hand can
-        meet it.
+        Time in which the force is ramped in after a gap or a fault [s]; of the order of a reaction time, so that a hand
+        can respond.
     still, still_load : float
-        Longest that no encoder counts [s] while a joint's torque is more than `still_load` times its Coulomb friction.
-        A free stylus then moves: at four times the friction, and the Premium's 0.04 N and 75 g at the tip, by a count
-        (0.03 mm) in 6 ms. One that is held trembles with the hand, at 8 to 12 Hz and by several counts: four periods of
-        that in half a second. A hand at rest on a device that asks for little may be as still as it likes.
+        Longest time without an encoder count [s] while a joint's torque exceeds `still_load` times its Coulomb
+        friction. A free stylus then moves: at four times the friction, and the Premium's 0.04 N and 75 g at the tip, by
+        a count (0.03 mm) in 6 ms. A held stylus trembles with the hand, at 8 to 12 Hz and by several counts: four
+        periods of that in half a second. At smaller torques a hand may rest without any count.
 
     Raises
     ------
@@ -286,7 +286,7 @@ class Plausibility:
             raise ParameterError(f"a silence of {self.silence} s is shorter than two periods of {self.period} s")
 
     def fresh(self, ramp: float = 1.0) -> Array:
-        """Faults of a device before its first reading: none; `ramp` is the share of the force it begins with."""
+        """`faults` of a device before its first reading, without a fault; `ramp` is the initial share of the force."""
         faults = np.zeros(FAULT_SIZE)
         faults[FAULT_RAMP] = ramp
         faults[_FRESH] = faults[_COMMANDED] = np.nan
@@ -298,7 +298,7 @@ class Plausibility:
 
 @dataclass(frozen=True)
 class LatchedFault:
-    """A fault that was latched: which, at what time [s], and what the value was."""
+    """A latched fault, its time [s] and its value."""
 
     fault: Fault
     t: float
@@ -310,7 +310,7 @@ class LatchedFault:
 
 
 def latched(faults: Array) -> LatchedFault | None:
-    """The fault that a device's `faults` hold, if any."""
+    """The fault latched in a device's `faults`, or None."""
     code = Fault(int(faults[FAULT_CODE]))
     if code is Fault.NONE:
         return None

@@ -1,15 +1,15 @@
-r"""The last thing before the motors of a real device: what of a commanded force gets through, and when.
+r"""Safety gate, the last stage before the motors of a real device: limits the commanded force and decides when it acts.
 
 .. math:: F = g\, s\, w(p)\, u(v)\, \min(1, L/|F_w|)\, F_w, \qquad |F_k - F_{k-1}| \le r\,T
 
-g is the gain of the oscillation detector, s the share that is ramped in (0 in every state but `RAMPING` and `ACTIVE`),
-w and u fall from 1 to 0 between a limit of workspace or speed and the margin behind it, where a fault is latched. It
-trusts nothing that comes before it: whatever force is asked for, what leaves is finite, within L and the slew rate r.
-Letting go is not held to the slew rate.
+g is the gain of the oscillation detector, s the share that is ramped in (0 in every state but `RAMPING` and `ACTIVE`);
+w and u fall from 1 to 0 between a limit of workspace or speed and the end of the margin behind it, where a fault is
+latched. The gate does not rely on earlier stages: for any input its output is finite, within L and the slew rate r.
+Switching off is exempt from the slew rate.
 
-What is required of it is collected from what haptic devices do: no force before the commanded one has been small
-(CHAI3D), limits of force, its rate, speed and temperature (OpenHaptics' HDAPI, with their errors), brakes above a
-speed and a watchdog (Force Dimension's DHD), reflexes that stop and stay (Franka's).
+Its requirements are those of existing haptic devices: no force until the commanded force has been small (CHAI3D);
+limits of force, force rate, speed and temperature (OpenHaptics' HDAPI, with their errors); brakes above a speed, and a
+watchdog (Force Dimension's DHD); reflexes that stop and stay stopped (Franka).
 """
 
 from dataclasses import dataclass, field
@@ -47,22 +47,22 @@ OSCILLATION, LEFT_WORKSPACE, TOO_FAST = int(Fault.OSCILLATION), int(Fault.LEFT_W
 def pass_gate(
     params: Array, shaking: Array, gate: Array, shaken: Array, faults: Array, hand: Array, request: int, force: Array
 ) -> None:
-    """Decide the state of this tick, and what of a force gets through.
+    """Update the state of the gate at this tick, and limit the force.
 
     Parameters
     ----------
     params, shaking : Array
         `Gate.params`, and those of its `OscillationDetector`.
     gate, shaken : Array
-        Memory [state, share, quiet ticks' time, gain, last force (3)], and the detector's; written.
+        Memory [state, share, quiet time [s], gain, last force (3)], and that of the detector; written.
     faults : Array
-        Of the device; what is wrong is latched.
+        Faults of the device; detected faults are latched.
     hand : Array
         The hand vector as measured.
     request : int
-        `ARM`, `DISARM`, `CLEAR` or `NO_REQUEST`; whoever passes `CLEAR` has called `rearm` before.
+        `ARM`, `DISARM`, `CLEAR` or `NO_REQUEST`; before `CLEAR` the caller must have called `rearm`.
     force : Array
-        What is asked for [N]; what gets through is written, shape (3,).
+        Demanded force [N], shape (3,); replaced by the force that is let through.
     """
     t, period = hand[HAND_TIME], params[_PERIOD]
     if not np.isfinite(force[0] + force[1] + force[2]):
@@ -83,7 +83,7 @@ def pass_gate(
         if gain < 0.0:
             latch(faults, OSCILLATION, t, -gain)
     else:
-        # An open loop shakes nothing.
+        # Without force the loop is open and cannot oscillate: the detector is reset.
         gain = 1.0
         shaken[:] = 0.0
         shaken[OSCILLATION_GAIN] = 1.0
@@ -102,7 +102,7 @@ def pass_gate(
 
 @njit
 def _requested(params: Array, state: int, request: int, held: bool, quiet: float) -> int:
-    """State after what the user asks for, the dead-man switch, and how long the force has been small [s]."""
+    """State after the user's request, the dead-man switch, and the time that the force has been small [s]."""
     if request == DISARM or (request == ARM and params[_PERMITTED] > 0.0):
         state = next_state(state, request)
     if not held:
@@ -114,7 +114,7 @@ def _requested(params: Array, state: int, request: int, held: bool, quiet: float
 
 @njit
 def _judge_motion(params: Array, faults: Array, hand: Array) -> None:
-    """Latch a hand that is beyond the margin of workspace or speed; a NaN is beyond."""
+    """Latch a fault if the hand is beyond the margin of workspace or speed; the comparisons also catch NaN."""
     speed, outside = _speed(hand), _outside(params, hand)
     if not outside <= params[_MARGIN]:
         latch(faults, LEFT_WORKSPACE, hand[HAND_TIME], outside)
@@ -148,7 +148,7 @@ def _room(params: Array, hand: Array) -> float:
 
 @njit
 def _slew(params: Array, gate: Array, scale: float, force: Array) -> None:
-    """Scale a force, hold it to the slew rate from the last one, and remember it."""
+    """Scale a force, limit its change from the last one to the slew rate, and store it."""
     change = 0.0
     for i in range(3):
         force[i] *= scale
@@ -164,7 +164,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Gate:
-    """Limits of what gets to a real device.
+    """Limits of the force on a real device.
 
     Parameters
     ----------
@@ -175,22 +175,22 @@ class Gate:
     slew : float
         r, largest change of the force [N/s].
     speed, speed_margin : float
-        Speed of the tip from which on the force fades, and over how much more, until a fault [m/s].
+        Tip speed above which the force fades, and the further speed range over which it does, until a fault [m/s].
     low, high : three floats
-        Corners of the workspace's box in H [m]; the Premium 1.5's is 191 × 381 × 267 mm (data sheet) about its middle.
+        Corners of the workspace box in H [m]; the Premium 1.5's is 191 × 381 × 267 mm (data sheet) about its middle.
     margin : float
-        Over which the force fades behind the box, until a fault [m].
+        Distance over which the force fades outside the box, until a fault [m].
     small, quiet : float
-        No force before the one that is asked for has been at most `small` [N] for `quiet` [s]. A river pulls along
-        with b_d |φ̇| also where the hand is on its curve: 0.6 N at 8 N s/m and 8 cm/s.
+        No force until the demanded force has been at most `small` [N] for `quiet` [s]. A river pulls along with
+        b_d |φ̇| also where the hand is on its curve: 0.6 N at 8 N s/m and 8 cm/s.
     ramp : float
-        In which the force is brought in [s].
+        Time in which the force is ramped in [s].
     dead_man : bool
-        Whether the stylus's switch has to be held for any force.
+        Whether the stylus switch must be held for any force (dead-man switch).
     permitted : bool
-        Whether it may be armed at all: by a certificate of this field and device, and a calibration.
+        Whether the device may be armed at all: requires a certificate of this field and device, and a calibration.
     oscillation : OscillationDetector, optional
-        By default one of the same period.
+        By default a detector with the same period.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the device may be asked for: a force limiter with a memory of heat, and a latch that lets go on a fault."""
+"""Force limiter: saturation at a ceiling that depends on motor heat, a slew-rate limit, and a latch for faults."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ LIMITER_HEAT, LIMITER_FORCE, LIMITER_FAULT, LIMITER_SIZE = 0, 1, 4, 5
 
 @njit
 def force_ceiling(heat: float, continuous: float, peak: float) -> float:
-    """Largest force [N] for a mean square h of the past: L² = F_c² + (F_p² − F_c²) max(0, 1 − h/F_c²)."""
+    """Largest force L [N] for a past mean square h [N²]: L² = F_c² + (F_p² − F_c²) max(0, 1 − h/F_c²)."""
     cold = np.maximum(0.0, 1.0 - heat / (continuous * continuous))
     return np.sqrt(continuous * continuous + (peak * peak - continuous * continuous) * cold)
 
 
 @njit
 def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> bool:
-    """Force of a wrench within the device's ceiling at this tick.
+    """Saturate the force of a wrench at the device's ceiling for this tick.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
         Memory [h, last force (3), fault], written. Once a fault is set the force stays zero until the memory is
         renewed.
     wrench : Array, shape (6,)
-        What the field asks for; the moment is dropped, the device has motors for a force only.
+        Wrench demanded by the field; the moment is dropped, since the device has motors for a force only.
     force : Array
         Written [N].
 
@@ -45,7 +45,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
         limiter[LIMITER_FAULT] = LIMITER_NOT_FINITE
     elif not np.isfinite(wrench[0] + wrench[1] + wrench[2]):
         limiter[LIMITER_FAULT] = FORCE_NOT_FINITE
-    # A comparison that a fault which is NaN itself does not pass.
+    # Written as a comparison with 0 that is also true if the fault code itself is NaN.
     if limiter[LIMITER_FAULT] != 0.0:
         for i in range(3):
             force[i] = limiter[LIMITER_FORCE + i] = 0.0
@@ -62,7 +62,7 @@ def bound_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> b
 
 @njit
 def slew_force(limits: Array, limiter: Array, force: Array) -> None:
-    """Hold a bounded force to the slew rate from the last one, in place, and remember it and its heat."""
+    """Limit the change of a bounded force from the last one to the slew rate, in place; store it, update the heat."""
     ceiling = force_ceiling(limiter[LIMITER_HEAT], limits[_CONTINUOUS], limits[_PEAK])
     change = 0.0
     for i in range(3):
@@ -73,7 +73,7 @@ def slew_force(limits: Array, limiter: Array, force: Array) -> None:
             last = limiter[LIMITER_FORCE + i]
             force[i] = last + (force[i] - last) * (limits[_STEP] / change)
     norm = np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-    # The last force may have been allowed by a higher ceiling than today's.
+    # The last force may have been allowed by a higher ceiling than the present one.
     scale = min(1.0, ceiling / max(norm, 1e-300))
     heat = limiter[LIMITER_HEAT]
     limiter[LIMITER_HEAT] = heat + limits[_SHARE] * ((scale * norm) ** 2 - heat)
@@ -84,7 +84,7 @@ def slew_force(limits: Array, limiter: Array, force: Array) -> None:
 
 @njit
 def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> None:
-    """Force that the device is asked for at this tick: `bound_force`, then `slew_force`, where no tank stands between.
+    """Commanded force at this tick: `bound_force`, then `slew_force`, for a device without an energy tank.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def limit_force(limits: Array, limiter: Array, wrench: Array, force: Array) -> N
 
 
 def renew_limiter(limits: Array, limiter: Array) -> None:
-    """Clear the fault of a memory: the force comes from zero, and a heat that was lost is taken for the highest."""
+    """Clear the fault in a memory: the force starts from zero, and an invalid heat is set to its highest value F_c²."""
     if not (np.isfinite(limiter[LIMITER_HEAT]) and limiter[LIMITER_HEAT] >= 0.0):
         limiter[LIMITER_HEAT] = limits[_CONTINUOUS] ** 2
     limiter[LIMITER_FORCE:LIMITER_SIZE] = 0.0
@@ -104,13 +104,13 @@ def renew_limiter(limits: Array, limiter: Array) -> None:
 
 @dataclass(frozen=True)
 class ForceLimiter:
-    r"""Limits of the force at the stylus: continuous, peak, and how fast it may change.
+    r"""Limits of the force at the stylus: continuous force, peak force, and slew rate.
 
     .. math:: |F| \le L(h), \qquad T\,|\dot F| \le T\,r, \qquad \dot h = (|F|^2 - h)/\tau
 
     The magnitude is scaled, the direction kept. h is the mean square of the force over the thermal time τ: a cold
-    motor gives the peak force, a motor that has worked for some τ the continuous one (see `force_ceiling`). A force
-    that is not finite is a fault, and so is such a memory: zero from then on.
+    motor gives the peak force, a motor that has worked for some τ the continuous one (see `force_ceiling`). A
+    non-finite force or memory is a fault: the force is zero from then on.
 
     Parameters
     ----------

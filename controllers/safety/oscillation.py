@@ -1,17 +1,17 @@
-r"""A loop that shakes the hand: found by how often the fast part of the force turns round, and quieted by a gain.
+r"""Oscillation detector: counts reversals of the force's high-frequency part, and lowers a gain until they stop.
 
 .. math:: F_h = F - F_l, \quad \dot F_l = \omega_c (F - F_l), \qquad \dot n = -n/\tau + \sum_k \delta(t - t_k)
 
-t_k are the times at which F_h, larger than a threshold, points against where it last did. A limit cycle of f Hz makes n
-rise to 2 f τ; a step or a wall makes it 1 or 2, tremor (8–12 Hz) and what a hand means to do (below 10 Hz) at most
-2.4. While
-n is above its limit the force is multiplied by a gain that falls, g' = −g/τ_d; it comes back slowly. F is what the hand
-gets, so the gain settles where it is no longer shaken: a loop that is too stiff ends up at the edge of its stability, a
-noisy one at a whisper. Shaking for more than a share of the time all the same is a fault.
+t_k are the times at which F_h, larger than a threshold, points against its direction at the last such time. A limit
+cycle of f Hz raises n to 2 f τ; a step or a wall raises it to 1 or 2, tremor (8–12 Hz) and voluntary motion (below
+10 Hz) to at most 2.4. While n is above its limit the force is multiplied by a falling gain, g' = −g/τ_d, which
+recovers slowly. F is the force that the hand gets, so the gain settles where the oscillation stops: a loop that is too
+stiff ends up at its stability limit, a noisy one at a very small gain. Oscillation that persists nevertheless is a
+fault.
 
 The index of Dimeas & Aspragathos, "Online stability in human-robot cooperation with admittance control", IEEE Trans.
-Haptics 9(2), 2016, compares the fast part of the force's spectrum with the whole, and lowers gains by it; here turns
-are counted, which needs no window and no transform.
+Haptics 9(2), 2016, compares the high-frequency part of the force's spectrum with the whole, and lowers gains by it;
+counting reversals needs no window and no transform.
 """
 
 from dataclasses import dataclass
@@ -30,21 +30,21 @@ OSCILLATION_LAST, OSCILLATION_COUNT, OSCILLATION_GAIN, OSCILLATION_TIME, OSCILLA
 
 @njit
 def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
-    """Take note of the force that is asked for at this tick, and give the gain for it.
+    """Update the detector with the force demanded at this tick; returns the gain for it.
 
     Parameters
     ----------
     params : Array
         `OscillationDetector.params`.
     memory : Array
-        [slow part (3), fast part at the last turn (3), n, g, time of shaking], written.
+        [slow part (3), fast part at the last reversal (3), n, g, time of oscillation [s]], written.
     force : Array
         [N], shape (3,).
 
     Returns
     -------
     float
-        g in 0…1; negative, minus the size of the fast part [N], if the gain has not stopped it.
+        g in 0…1; minus the norm of the fast part [N], a negative value, if the gain has not stopped the oscillation.
     """
     dot, size, gain = 0.0, 0.0, memory[OSCILLATION_GAIN]
     for i in range(3):
@@ -69,24 +69,25 @@ def oscillation_gain(params: Array, memory: Array, force: Array) -> float:
 
 @dataclass(frozen=True)
 class OscillationDetector:
-    """What counts as shaking, and what is done about it.
+    """Thresholds and time constants of the oscillation detector.
 
     Parameters
     ----------
     period : float
         Servo period T [s].
     corner : float
-        ω_c/2π, above what a hand means to do [Hz].
+        ω_c/2π, corner frequency of the high-pass, above voluntary motion [Hz].
     threshold : float
-        Size of the fast part from which on it counts [N]; a hand feels 0.1 N.
+        Norm of the fast part above which reversals count [N]; a hand feels 0.1 N.
     memory : float
-        τ of the count [s].
+        τ, time constant of the count [s].
     turns : float
-        Count above which it is shaking; a frequency of ``turns / (2 memory)``: 15 Hz.
+        Count n above which the loop oscillates; a frequency of ``turns / (2 memory)``: 15 Hz.
     fall, rise : float
-        Time constant of the gain's fall, and time in which it comes back from 0 to 1 [s].
+        Time constant of the gain's fall, and time of its recovery from 0 to 1 [s].
     longest, forget : float
-        Time of shaking that is a fault, forgotten with this time constant [s]: 1 s at once, or a fifth of the time.
+        Accumulated time of oscillation that is a fault, and the time constant with which it decays [s]: 1 s on end, or
+        a fifth of the time.
 
     Raises
     ------
@@ -119,27 +120,26 @@ class OscillationDetector:
         )
 
     def fresh_memory(self) -> Array:
-        """Memory of a loop that has not shaken."""
+        """Memory of a loop that has not oscillated."""
         memory = np.zeros(OSCILLATION_SIZE)
         memory[OSCILLATION_GAIN] = 1.0
         return memory
 
 
 def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> npt.NDArray[np.bool_]:
-    """At which of the ticks of a recorded force the detector finds a loop shaking, its gain left at 1.
+    """Ticks of a recorded force at which the detector finds an oscillation, with the gain kept at 1; shape (n,).
 
     Parameters
     ----------
     detector : OscillationDetector
-        What counts.
     force : Array, shape (n, 3)
-        At the hand [N].
+        Force on the hand [N].
     memory : list of float
-        `fresh_memory` as a list, written, for what comes in blocks.
+        `fresh_memory` as a list, written, so that a record can be processed in blocks.
     """
     params = detector.params()
     params[_DOWN], params[_UP], params[_LONGEST] = 1.0, 0.0, np.inf
-    # Plain numbers: the compiled law would cost a second of compilation for a tenth of a second of work.
+    # In plain Python: compiling the kernel would take a second for a tenth of a second of work.
     given: Any = params.tolist()
     step: Any = oscillation_gain.py_func
     found = np.zeros(len(force), dtype=np.bool_)

@@ -1,12 +1,12 @@
-r"""Heat of the motors: each one's i²t, and the torque that it leaves.
+r"""Thermal model of the motors: i²t of each, and the torque ceiling that follows from it.
 
 .. math:: \dot h_i = (\tau_i^2 - h_i)/\tau_{th}, \qquad |\tau_i| \le L_i(h_i),
           \quad L_i^2 = c_i^2 + (p_i^2 - c_i^2) \max(0, 1 - h_i/c_i^2)
 
-Copper loss goes with the square of the current, and the winding cools: h is the mean square of the torque over the
-winding's time constant, and h = c² its temperature at the continuous torque c for ever. p is the torque at stall. With
-the ceiling L no demand takes h above c². (Maxon's data sheets give c, the stall torque and the time constant; the
-`ForceLimiter` has the same law for the force at the tip.)
+Copper loss is proportional to the square of the current, and the winding cools: h is the mean square of the torque over
+the winding's time constant, and h = c² the steady state at the continuous torque c. p is the stall torque. With the
+ceiling L no demand takes h above c². (Maxon's data sheets give c, p and the time constant; the `ForceLimiter` has the
+same law for the force at the tip.)
 """
 
 import numpy as np
@@ -20,14 +20,14 @@ from controllers.state import Array
 def hold_to_heat(
     heat: Array, continuous: tuple[float, float, float], peak: tuple[float, float, float], share: float, torque: Array
 ) -> float:
-    """Scale joint torques to what the motors' heat leaves, in place, and book them.
+    """Scale joint torques in place to the ceilings that the motors' heat allows, and update the heat.
 
     All three are scaled alike, so that the force keeps its direction.
 
     Parameters
     ----------
     heat : Array
-        h_i [N² m²], shape (3,); written. One that is not finite counts as the highest.
+        h_i [N² m²], shape (3,); written. An invalid value is set to the highest, c_i².
     continuous, peak : three floats
         c_i, p_i [N m].
     share : float
@@ -38,7 +38,7 @@ def hold_to_heat(
     Returns
     -------
     float
-        Largest share of what a motor can dissipate that is used, max h_i/c_i².
+        Largest used share of a motor's thermal capacity, max h_i/c_i².
     """
     scale = 1.0
     for i in range(3):

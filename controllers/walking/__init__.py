@@ -1,1 +1,1 @@
-"""The walker that is led: its path over the floor, its gait."""
+"""The walker that follows the stylus: its path over the floor, its gait, its state."""

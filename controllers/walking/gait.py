@@ -1,13 +1,13 @@
-r"""A gait that is led, and when it flies: at the entry of a stance it is decided whether the next flight is flown.
+r"""Gait of a led figure, and the decision, made at the entry of each stance, whether the next flight phase is taken.
 
-What flies must have the pace for it, and in the air nothing can be changed. So u, how far a figure stays on the ground
-(0: it flies as its clip does, 1: it does not, see `controllers.legs.grounded`), changes in stances only,
+A flight phase needs speed, and nothing can be changed in the air. So u, the share of the grounded form (0: flight
+phases as in the clip, 1: none, see `controllers.legs.grounded`), changes in stances only,
 
 .. math:: u = u_0 + (u_1 - u_0)\,S(x), \qquad S(x) = x^3 (10 - 15 x + 6 x^2)
 
-from what it was at the entry to what is decided there. x goes from 0 to 1 in the first `WITHIN` of a stance before a
-flight, so that the figure pushes off as in its clip, and in the last of one after a flight, where it lands as in its
-clip. Going back in a stance takes back what was done in it.
+from its value u_0 at the entry to the value u_1 decided there. If u falls (a flight follows), x goes from 0 to 1 in the
+first share `WITHIN` of the stance, so that the figure pushes off as in its clip; if u rises, in the last share
+`WITHIN`, so that it lands as in its clip. Going back within a stance reverses the change.
 """
 
 from dataclasses import dataclass
@@ -20,23 +20,24 @@ from controllers.checks import checked
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-# A decision: u, u at the entry of the stance, what it becomes, and the share of the stance at
-# which it was entered, 0 or 1; −1 in flight.
+# A decision: u, u_0 at the entry of the stance, u_1, and the end of the stance at which it was entered
+# (0: begin, 1: end, when going backwards; −1 in flight).
 _HELD, _BEFORE, _AIM, _ENTRY, DECISION = range(5)
 
-# Of a stance. With less the floor would have to pull a figure down that lands, with more one that pushes off.
+# Share of a stance in which u changes. With less, the floor would have to pull at a landing figure; with more, at one
+# that pushes off.
 WITHIN = 0.8
 
 
 def fresh_decision(flies: bool) -> Array:
-    """What is decided of a figure that has not been led yet: it stays on the ground, in a stance."""
+    """Decision of a figure that has not been led yet: grounded, in a stance; `flies`: the gait has flight phases."""
     held = float(flies)
     return np.array([held, held, held, 0.0])
 
 
 @njit
 def share_of_stance(stances: Array, lap: float) -> float:
-    """How much of the stance at a place in the lap is over, −1 in flight; `stances` as `Gait.stances`, flat."""
+    """Elapsed share of the stance at a phase `lap` [laps], −1 in flight; `stances` are `Gait.stances`, flattened."""
     for k in range(len(stances) // 2):
         begin, length = stances[2 * k], stances[2 * k + 1]
         gone = lap - begin - np.floor(lap - begin)
@@ -47,16 +48,16 @@ def share_of_stance(stances: Array, lap: float) -> float:
 
 @njit
 def decide_flight(decision: Array, share: float, speed: float, take_off: float, landing: float) -> float:
-    """Update what is decided of the next flight; returns u.
+    """Update the decision on the next flight phase, with hysteresis; returns u.
 
     Parameters
     ----------
     decision : Array, shape (4,)
         See `fresh_decision`; written.
     share : float
-        Of the stance that is over, −1 in flight.
+        Elapsed share of the stance, −1 in flight.
     speed, take_off, landing : float
-        Of the figure, and from which on it begins to fly, and goes on to fly [m/s].
+        Speed of the figure, and the least speeds at which flight phases begin, and at which they continue [m/s].
     """
     if share < 0.0:
         decision[_ENTRY] = -1.0
@@ -74,20 +75,20 @@ def decide_flight(decision: Array, share: float, speed: float, take_off: float, 
 
 @dataclass(frozen=True, eq=False)
 class Gait:
-    """How a figure goes straight on, over one lap of its clip.
+    """Straight gait of a figure over one lap of its clip.
 
     Parameters
     ----------
     stride : float
         Arc length of a lap [m].
     speed : float
-        The clip's own [m/s].
+        The clip's own speed [m/s].
     support : Array
-        Feet that bear at equal steps of the lap, from s = 0 on: 0, 1 or 2.
+        Number of feet that bear load at equal steps of the lap, from s = 0 on: 0, 1 or 2.
     reach : float
-        How far ahead of the figure, or behind it, a foot is on the path, at most [m].
+        Largest distance along the path of a foot from the figure, ahead or behind [m].
     grounded : bool
-        Whether it is a run of which no flight is left: its limbs swing as fast already as they do in a run.
+        Whether it is a run without its flight phases, with limbs that already swing as fast as in the run.
 
     Raises
     ------
@@ -110,14 +111,14 @@ class Gait:
 
     @property
     def flies(self) -> bool:
-        """Whether there are moments at which no foot bears."""
+        """Whether the gait has flight phases, in which no foot bears load."""
         return not self.support.all()
 
     @property
     def stances(self) -> Array:
-        """Where in the lap each time on the ground begins and how long it lasts, shares of the lap, shape (k, 2).
+        """Begin and duration of each interval with ground contact, as shares of the lap, shape (k, 2).
 
-        There are none if it is always on the ground.
+        Empty if the gait has no flight phases.
         """
         n, stands = len(self.support), self.support > 0
         first = np.flatnonzero(stands & ~np.roll(stands, 1))

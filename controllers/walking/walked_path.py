@@ -1,14 +1,14 @@
-r"""A path that grows at its front while it is walked, and is remembered: uniform cubic B-splines in a ring.
+r"""Path of a walking figure, extended at its front and stored in a ring buffer: uniform cubic B-splines.
 
 .. math:: A(s) = \sum_j B(s/\Delta - j)\,(x_j, y_j, \theta_j, \varphi_j)
 
-s is the arc length [m], (x, y) the place on the floor [m] and θ the heading [rad]. A is C², its arc length is s to
-second order in κΔ, and its heading turns where neighbouring rows differ and nowhere else: between rows j and j + 1
-that is for s from (j − 1) Δ to (j + 2) Δ. φ [rad] is how far the figure leans to the left there. A row also keeps
-how far the path was meant to bend before it, |κ| [1/m], and the acceleration to the left that this takes [m/s²].
+s is the arc length [m], (x, y) the position on the floor [m], θ the heading [rad] and φ the lean of the figure to the
+left [rad]. A is C², and its arc length is s to second order in κΔ. The difference of rows j and j + 1 turns the heading
+only for s from (j − 1) Δ to (j + 2) Δ. A row also stores the commanded curvature before it, |κ| [1/m], and the
+centripetal acceleration to the left that it needs [m/s²].
 
-The ring holds the last `ROWS` rows, 61 m: an endless walk needs no more memory, and what lies farther back is
-forgotten. A packed path is ``[front, rows (ROWS × 6)]``; row j is at ``j mod ROWS``, front is the last j.
+The ring contains the last `ROWS` rows, 61 m, so that an endless walk needs no more memory; older rows are overwritten.
+A packed path is ``[front, rows (ROWS × 6)]``; row j is at ``j mod ROWS``, front is the last j.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ PACKED_PATH = 1 + ROW * ROWS
 
 
 def straight_path(x: float, y: float, heading: float, ahead: float) -> Array:
-    """Packed path straight on through (x, y) [m] at s = 0, laid up to `ahead` [m] of it; so was it always before."""
+    """Packed straight path through (x, y) [m] at s = 0, laid up to s = `ahead` [m], and backwards to fill the ring."""
     last = int(np.ceil(ahead / STEP)) + 1
     rows = np.arange(last - ROWS + 1, last + 1)
     path = np.zeros((ROWS, ROW))
@@ -39,19 +39,19 @@ def straight_path(x: float, y: float, heading: float, ahead: float) -> Array:
 
 @njit
 def path_front(path: Array) -> float:
-    """Largest s [m] at which the path is laid."""
+    """Largest s [m] at which the path is defined."""
     return (path[0] - 1.0) * STEP
 
 
 @njit
 def path_back(path: Array) -> float:
-    """Least s [m] that is remembered."""
+    """Smallest s [m] at which the path is still stored."""
     return (path[0] - ROWS + 3.0) * STEP
 
 
 @njit
 def path_value(path: Array, s: float, channel: int) -> tuple[float, float]:
-    """A channel of A(s) and its derivative by s; behind the back and beyond the front, those there."""
+    """A channel of A(s) and its derivative by s; s is clamped to the stored path."""
     place = min(max(s, path_back(path)), path_front(path)) / STEP
     row = min(np.floor(place), path[0] - 2.0)
     u = place - row
@@ -59,7 +59,7 @@ def path_value(path: Array, s: float, channel: int) -> tuple[float, float]:
     p0, p1 = path[at + ROW * ((j - 1) % ROWS)], path[at + ROW * (j % ROWS)]
     p2, p3 = path[at + ROW * ((j + 1) % ROWS)], path[at + ROW * ((j + 2) % ROWS)]
     b0, b1, _, b3 = basis(u)
-    # By differences, so that a straight path has the same heading everywhere, to the last bit.
+    # By differences, so that a straight path has exactly the same heading everywhere.
     a, b, c = p1 - p0, p2 - p1, p3 - p2
     value = p1 - b0 * a + (1.0 - b0 - b1) * b + b3 * c
     slope = 0.5 * (1.0 - u) * (1.0 - u) * a + (0.5 + u * (1.0 - u)) * b + 0.5 * u * u * c
@@ -68,7 +68,7 @@ def path_value(path: Array, s: float, channel: int) -> tuple[float, float]:
 
 @njit
 def lay_row(path: Array, turn: float, bend: float, sidewards: float) -> None:
-    """One more row in front, its heading turned by `turn` [rad] from the last; the oldest row is forgotten."""
+    """Append a row at the front, its heading turned by `turn` [rad] from the last; the oldest row is overwritten."""
     front = int(path[0])
     last, new = 1 + ROW * (front % ROWS), 1 + ROW * ((front + 1) % ROWS)
     middle = path[last + PATH_HEADING] + 0.5 * turn
@@ -81,22 +81,22 @@ def lay_row(path: Array, turn: float, bend: float, sidewards: float) -> None:
 
 @njit
 def lean_row(path: Array, back: int, decay: float, past: float) -> float:
-    r"""Lean of the row that lies `back` rows behind the front, from the accelerations before and after it.
+    r"""Write the lean of the row `back` rows behind the front, from the lateral accelerations before and after it.
 
     .. math:: \tan\varphi_m = \frac{1}{g N}\sum_j r^{|j - m|}\,a_j
 
-    is how an inverted pendulum, whose foot goes on the path, moves its weight before a bend and after it.
+    It is the lean of a linear inverted pendulum with its foot on the path, which leans before, in and after a bend.
 
     Parameters
     ----------
     path : Array
-        Packed; the lean of that row is written.
+        Packed path; the lean of the row is written.
     back : int
-        Rows in front of it that count.
+        Number of rows in front of the row, all of which count.
     decay : float
-        r, from row to row.
+        r, factor from row to row.
     past : float
-        Σ r^(m − 1 − j) a_j over the rows behind it.
+        Σ r^(m − 1 − j) a_j over the rows j < m behind the row.
 
     Returns
     -------

@@ -1,8 +1,9 @@
-r"""A figure that is led: where it is on its path, how fast it goes, and what is laid before it.
+r"""State and dynamics of a walker (a led figure): its arc length and speed on its path, and the laying of the path.
 
-The figure walks on its own path A(s) (`controllers.walking.walked_path`): s is how far along it the figure is, and
-everything about the figure is a function of s. So going back is s growing less, and poses come back as they were.
-A law of force moves the walker, and a haptic map shows it: both are given a `Walker`.
+The figure walks on its own path A(s) (`controllers.walking.walked_path`) at the arc length s, and its pose is a
+function of s (and u). So walking backwards is a decrease of s, and the same poses return. The law of force
+(`controllers.fields.leading`) advances the walker, the haptic map (`controllers.haptic_map.led`) displays it; both use
+a `Walker`.
 """
 
 from typing import NamedTuple
@@ -31,10 +32,10 @@ from controllers.walking.walked_path import (
 _ARGUMENT = 7
 _DECIDED = _ARGUMENT + 5
 _PATH = _DECIDED + DECISION
-_SEARCHES = 4  # steps of the search for the nearest place, warm-started
-_LONGEST_TICK = 0.05  # [s] a walker that was not asked for longer has not moved on
-_STEERING = 0.15  # [m] of path over which the bend follows the stylus
-MARGIN = 4  # rows of the path that a figure may be ahead of itself, by the filter before its map
+_SEARCHES = 4  # Newton steps of the search for the nearest point, warm-started
+_LONGEST_TICK = 0.05  # [s] bound on one time step, so that the walker does not jump after a pause
+_STEERING = 0.15  # [m] of path, the length constant with which the curvature follows the stylus
+MARGIN = 4  # rows of path kept in reserve, since the filter before the map may evaluate it ahead of the walker
 
 
 class Walker(NamedTuple):
@@ -43,20 +44,19 @@ class Walker(NamedTuple):
     Attributes
     ----------
     argument : Array, shape (7,)
-        What a haptic map is evaluated at, ``[s, u, 0, 1, 0, 0, 0]``: arc length [m], and how far it stays on the
-        ground, 0 to 1.
+        Argument of the haptic map, ``[s, u, 0, 1, 0, 0, 0]``: arc length [m], and share of the grounded form, 0 to 1.
     speed : Array, shape (1,)
         ṡ [m/s].
     goal : Array, shape (1,)
-        g, the place on the path that is nearest to the stylus [m].
+        g, arc length of the path's point nearest to the stylus [m].
     time : Array, shape (1,)
-        Of the last tick [s].
+        Time of the last tick [s].
     bend : Array, shape (1,)
-        With which the path is laid [1/m].
+        Curvature with which the path is laid [1/m].
     sway : Array, shape (1,)
-        Sum of which its lean is made [m/s²].
+        Running sum of the lateral accelerations for the lean [m/s²] (see `lean_row`).
     flight : Array, shape (4,)
-        What is decided of the next flight (see `controllers.walking.gait`).
+        Decision on the next flight phase (see `controllers.walking.gait`).
     path : Array
         Packed path.
     """
@@ -83,7 +83,7 @@ def walker_at(numbers: Array, at: int) -> Walker:
 
 
 def fresh_walker(gait: Gait, ahead: float, path: Array) -> Array:
-    """Numbers of a walker at rest: s = 0, on a packed path that is laid `ahead` [m] of it."""
+    """Numbers of a walker at rest at s = 0, on a packed path that is laid up to `ahead` [m]."""
     numbers = np.zeros(_PATH + PACKED_PATH)
     walker = walker_at.py_func(numbers, 0)
     walker.argument[1], walker.argument[3] = float(gait.flies), 1.0
@@ -93,17 +93,17 @@ def fresh_walker(gait: Gait, ahead: float, path: Array) -> Array:
 
 
 class Following(NamedTuple):
-    """How a walker follows, as numbers; in an array there are the two lengths in the place of shares and stances.
+    """Parameters with which a walker follows; packed: the numbers, the lengths of shares and stances, then these.
 
     Attributes
     ----------
     rate, pull, forward, backward, turn, lateral, curvature, take_off, landing, haste : float
-        ω [1/s], largest |s̈| [m/s²], speeds [m/s], Ω [rad/s], a [m/s²], κ_max [1/m], and those of its flights [m/s],
-        [m/s²] (see `controllers.fields.leading.Leading`).
+        ω [1/s], largest |s̈| [m/s²], largest speeds [m/s], Ω [rad/s], a [m/s²], κ_max [1/m], speeds of take-off and
+        landing [m/s], largest |s̈| with flight phases [m/s²] (see `controllers.fields.leading.Leading`).
     ahead, decay, stride : float
-        D [m], what is left of a lean after a row of the path, and the length of a lap [m].
+        D [m], decay factor of the lean per row of the path, and length of a lap [m].
     shares, stances : Array
-        `Leading.shares` and `Gait.stances`, flat.
+        `Leading.shares` and `Gait.stances`, flattened.
     """
 
     rate: float
@@ -127,7 +127,7 @@ _NUMBERS = len(Following._fields) - 2
 
 
 def packed_following(following: Following) -> Array:
-    """As `following_at` takes it."""
+    """The parameters as an array for `following_at`."""
     numbers = [float(number) for number in following[:_NUMBERS]]
     lengths = [len(following.shares), following.stances.size]
     return np.concatenate([numbers, lengths, following.shares, following.stances.ravel()])
@@ -135,7 +135,7 @@ def packed_following(following: Following) -> Array:
 
 @njit
 def following_at(numbers: Array, at: int) -> Following:
-    """What is packed at ``numbers[at:]``."""
+    """Parameters packed at ``numbers[at:]``."""
     first = at + _NUMBERS + 2
     middle = first + int(numbers[first - 2])
     return Following(
@@ -153,14 +153,14 @@ def walker_acceleration(lag: float, speed: float, rate: float) -> float:
 
 @njit
 def path_place(path: Array, s: float) -> tuple[float, float, float, float]:
-    """Place [m], heading [rad] and curvature [1/m] of the path at s, within what there is of it."""
+    """Position x, y [m], heading [rad] and curvature [1/m] of the path at s, clamped to the stored path."""
     heading, curvature = path_value(path, s, PATH_HEADING)
     return path_value(path, s, PATH_X)[0], path_value(path, s, PATH_Y)[0], heading, curvature
 
 
 @njit
 def _nearest(path: Array, guess: float, x: float, y: float) -> float:
-    """Arc length of the place next to (x, y), near a guess, on the path and the straight line on from its front."""
+    """Arc length of the point nearest to (x, y), near a guess, on the path or its straight continuation."""
     front, back = path_front(path), path_back(path)
     goal = guess
     for _ in range(_SEARCHES):
@@ -176,7 +176,7 @@ def _nearest(path: Array, guess: float, x: float, y: float) -> float:
 
 @njit
 def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
-    """Lay the path as far ahead of the figure as its feet need it, bent towards the stylus's place (x, y)."""
+    """Lay the path up to D ahead of the figure, bent towards the stylus's point (x, y) on the floor by pure pursuit."""
     path, speed, ahead = walker.path, max(walker.speed[0], 0.1), follow.ahead
     limit = min(follow.curvature, follow.turn / speed, follow.lateral / (speed * speed))
     phases = float(len(follow.shares))
@@ -184,7 +184,7 @@ def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
         a, b, heading, _ = path_place(path, path_front(path))
         c, s = np.cos(heading), np.sin(heading)
         forward, side = c * (x - a) + s * (y - b), c * (y - b) - s * (x - a)
-        # Pure pursuit: the arc that is tangent to the path and meets the stylus.
+        # Pure pursuit: the arc that is tangent to the path and passes through the stylus's point.
         bend = 2.0 * side / max(forward * forward + side * side, ahead * ahead) if forward > 0.0 else 0.0
         bend = walker.bend[0] + (min(max(bend, -limit), limit) - walker.bend[0]) * STEP / _STEERING
         bend = min(max(bend, -limit), limit)
@@ -197,7 +197,7 @@ def _lay_path(follow: Following, walker: Walker, x: float, y: float) -> None:
 
 @njit
 def _bent_speed(follow: Following, path: Array, s: float, speed: float) -> float:
-    """Largest speed at s [m/s] from which the figure can brake for every bend that lies before it."""
+    """Largest speed at s [m/s] from which the figure can brake for every bend ahead in its direction of motion."""
     pull, front = min(follow.pull, follow.haste), path[0]
     square = follow.forward**2
     rows = int(0.5 * speed * speed / (pull * STEP)) + 6
@@ -205,7 +205,7 @@ def _bent_speed(follow: Following, path: Array, s: float, speed: float) -> float
     for k in range(rows):
         row = min(max(first + k, front - ROWS + 1.0), front)
         bend = max(path[1 + ROW * (int(row) % ROWS) + PATH_BEND], 1e-9)
-        # The turn to a row from the one before is made over three steps.
+        # The turn from one row to the next extends over three steps.
         distance = max(abs(s / STEP - row + 0.5) - 1.5, 0.0) * STEP
         most = min((follow.turn / bend) ** 2, follow.lateral / bend)
         square = min(square, most + 2.0 * pull * distance)
@@ -214,7 +214,7 @@ def _bent_speed(follow: Following, path: Array, s: float, speed: float) -> float
 
 @njit
 def _walk(follow: Following, walker: Walker, dt: float) -> None:
-    """The figure follows with inertia: s̈ = ω² (g − D − s) − 2 ω ṡ, bounded, and slower where the path bends."""
+    """Integrate s̈ = ω² (g − D − s) − 2 ω ṡ over `dt` [s], with bounded |s̈| and a speed limit where the path bends."""
     on_ground = walker.argument[1] > 0.5 or len(follow.stances) == 0
     pull = follow.pull if on_ground else follow.haste
     s, speed = walker.argument[0], walker.speed[0]
@@ -231,7 +231,7 @@ def _walk(follow: Following, walker: Walker, dt: float) -> None:
 
 @njit
 def _decide_flight(follow: Following, walker: Walker) -> None:
-    """How far the figure stays on the ground, by its place in the lap and its pace (see `controllers.walking.gait`)."""
+    """Update u by the phase of the lap and the speed (see `controllers.walking.gait`)."""
     share = share_of_stance(follow.stances, walker.argument[0] / follow.stride)
     walker.argument[1] = decide_flight(
         walker.flight, share, walker.speed[0], follow.take_off, follow.landing
@@ -240,11 +240,11 @@ def _decide_flight(follow: Following, walker: Walker) -> None:
 
 @njit
 def lead(follow: Following, walker: Walker, time: float, x: float, y: float) -> None:
-    """Move a walker on to a time [s], towards the stylus's place (x, y) on the floor [m]; all must be finite."""
+    """Advance a walker to a time [s], towards the stylus's point (x, y) on the floor [m]; all must be finite."""
     walker.goal[0] = _nearest(walker.path, walker.goal[0], x, y)
     dt = time - walker.time[0]
     walker.time[0] = time
-    # False for NaN, the first tick.
+    # The comparison is false for the NaN of the first tick.
     if dt > 0.0:
         _walk(follow, walker, min(dt, _LONGEST_TICK))
         _decide_flight(follow, walker)

@@ -1,1 +1,1 @@
-"""Certificates of flights and turns of a motion, and their repair."""
+"""Certificates of a motion's flight phases, turns and contacts, and the repair of infeasible motions."""

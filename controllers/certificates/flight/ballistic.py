@@ -1,11 +1,11 @@
-r"""Ballistic certificate: whether the flights of a motion can be flown, and at which rates they may be played.
+r"""Ballistic certificate: whether the flights of a motion are physically feasible, and at which playing rates.
 
 A flight recorded under gravity ĝ falls with σ² ĝ at the rate σ. Two tolerances bound σ:
 
 .. math:: g_{min} \le \sigma^2 \hat g \le g_{max} \quad\text{(seen)}, \qquad
           \min_{p_0, v_0} \max_t \lVert c_\sigma(t) - p_0 - v_0 t + \tfrac12 g t^2 e_z \rVert \le d \quad\text{(done)} .
 
-The first is about the viewer, the second about a body that takes off as well as it can and then really falls.
+The first is the perception of viewers; the second the feasibility for a body with the best take-off, in free fall.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ from controllers.state import Array
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """A motion as the certificate sees it, of n frames.
+    """Data of a motion of n frames for the certificate.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ class BodyMotion:
     com, angular : array, shape (n, 3)
         Centre of mass [m] and angular momentum about it [kg m²/s], in the world.
     inertia : array, shape (n, 3, 3)
-        About the centre of mass [kg m²].
+        Inertia tensor about the centre of mass [kg m²].
     clearance : array, shape (n,)
         Height of the lowest point of the body over the floor [m].
     supported : array of bool, shape (n,)
-        Whether anything bears load.
+        Whether any contact bears load.
 
     Raises
     ------
@@ -67,20 +67,20 @@ class BodyMotion:
 
 @dataclass(frozen=True, eq=False)
 class FlightJudgement:
-    """What is known of one flight.
+    """Verification result of one flight.
 
     Attributes
     ----------
     fit : FlightFit
-        Its parabola.
+        The fitted parabola.
     verdict : {"certified", "refuted", "unknown"}
-        Whether it can be flown as recorded.
+        Whether the flight is feasible as recorded.
     reason : str
-        Why, with numbers.
+        Explanation with numbers.
     seen : (float, float)
-        Rates σ at which viewers take it for natural.
+        Rates σ at which viewers accept it as natural.
     done : (float, float) or None
-        Rates at which a body that really falls stays within the tolerance; None if at no rate.
+        Rates at which a body in free fall stays within the tolerance; None if there are none.
     """
 
     fit: FlightFit
@@ -91,7 +91,7 @@ class FlightJudgement:
 
     @property
     def admissible(self) -> tuple[float, float]:
-        """Rates that are both seen as natural and can be done; the former where no rate can be done."""
+        """Rates in both `seen` and `done`; `seen` alone if there are none in both."""
         if self.done is None:
             return self.seen
         low, high = max(self.seen[0], self.done[0]), min(self.seen[1], self.done[1])
@@ -142,14 +142,14 @@ def ballistic_verdict(
     doubts: Sequence[str] = (),
     measures: Mapping[str, object] | None = None,
 ) -> Verdict:
-    """The verdict on a whole motion: its worst flight's, and unknown where what supports it may be no contact.
+    """Verdict on a whole motion: that of its worst flight, but unknown if its support may not be contact.
 
     `doubts` and `measures` are those of `contact_doubts`.
 
-    The margin is the distance of the rate 1 from the nearest end of what is seen as natural, over all flights:
-    how much faster or slower the motion may be played; negative when refuted for its gravity.
-    The counterexample of a refuted motion is the take-off of its first refuted flight: a body that takes off with this
-    velocity, the best there is, and really falls, is that far from the recorded centre of mass at some time.
+    The margin is the least distance, over all flights, of the rate 1 from the ends of the interval `seen`: how much
+    faster or slower the motion may be played; negative when refuted for its gravity.
+    The counterexample of a refuted motion is the best take-off of its first refuted flight: position and velocity with
+    which free fall stays nearest to the recorded centre of mass, and its largest ``distance`` from it [m].
     """
     assumptions = (
         f"gravity is {GRAVITY} m/s², without drag, on the figure's own size and mass",

@@ -1,16 +1,16 @@
-r"""Whether what supports a motion between its flights can be contact: near the floor, held there, and without jumps.
+r"""Plausibility of contacts: whether the support of a motion between its flights can be real contact with the floor.
 
-Contacts are told leniently, since captures miss the floor: a foot 5 cm up that is slow counts as support. That finds
-flights; it does not make a floor where there is none. So what is certified has to pass besides:
+Contacts are detected leniently, since captures miss the floor: a slow foot 5 cm above it counts as support. This finds
+flights, but does not prove contact. So for a certificate the following must hold too:
 
-- the floor that it stands on, the median height of the body's lowest point while supported, is near z = 0;
-- nine tenths of the supported time that point is near that floor, above and below;
-- something is at rest most of the time, and nothing at rest travels far: a body that glides is not held by friction;
-- the centre of mass is not carried off faster than legs push: with d the noise of a recording's centre of mass,
+- the floor level, the median height of the body's lowest point while supported, is near z = 0;
+- for nine tenths of the supported time that point is near the floor level, above and below;
+- some contact is at rest most of the time, and no resting contact slides far: a gliding body is not held by friction;
+- the centre of mass does not accelerate more than legs can push: with d the noise of a recording's centre of mass,
 
 .. math:: |\ddot c| \le a_{max} + 4 d f^2, \quad \ddot c \text{ by second differences at } f \text{ frames a second};
 
-- no joint turns in one frame by many times what it does before and after.
+- no joint turns in one frame by many times as much as in the frames before and after.
 """
 
 from dataclasses import dataclass
@@ -24,16 +24,16 @@ from controllers.state import Array
 
 @dataclass(frozen=True, eq=False)
 class BodyContact:
-    """What touches the floor in n frames, and how the joints turn.
+    """Contacts with the floor in n frames, and turns of the joints.
 
     Parameters
     ----------
     lowest : array, shape (n,)
         Height of the lowest point of the body over the floor [m].
     supported, held : array of bool, shape (n,)
-        Whether anything bears load, and whether any of that is at rest.
+        Whether any contact bears load, and whether any of these contacts is at rest.
     skate : float
-        Furthest that a contact point of a foot travels over the floor while it is taken to be at rest [m].
+        Largest slide (foot skate) of a foot's contact point while it counts as at rest [m].
     turned : array, shape (n − 1,)
         Largest turn of a joint from frame to frame [rad].
     """
@@ -48,7 +48,7 @@ class BodyContact:
 def contact_doubts(
     touched: BodyContact, com: Array, fps: float, tolerance: ContactTolerance
 ) -> tuple[list[str], dict[str, object]]:
-    """Why the support of a motion is no contact, a clause each, and its measures; com is the centre of mass (n, 3)."""
+    """Doubts whether the support of a motion is contact, as clauses, and measures; com: centre of mass (n, 3) [m]."""
     doubts: list[str] = []
     figures: dict[str, object] = {}
     if touched.supported.any():
@@ -97,6 +97,6 @@ def _jumps(
 
 
 def _longest(mask: Mask) -> int:
-    """Frames of the longest stretch."""
+    """Number of frames of the longest run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return int(np.max(edges[1::2] - edges[::2], initial=0))

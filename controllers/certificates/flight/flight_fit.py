@@ -1,6 +1,6 @@
-r"""One flight of a motion against free fall: the gravity it shows, and how far a body that really falls would stray.
+r"""Fit of one flight of a motion to free fall: its apparent gravity, and its distance from a real free fall.
 
-While nothing touches the floor, the centre of mass c of any body is a parabola and its angular momentum L is constant:
+Without contact, the centre of mass c of any body follows a parabola and its angular momentum L is constant:
 
 .. math:: c(t) = p_0 + v_0 t - \tfrac12 g t^2 e_z, \qquad L(t) = L_0 .
 
@@ -18,21 +18,21 @@ from controllers.state import Array
 
 Mask = npt.NDArray[np.bool_]
 
-NOISE = 3e-3  # the centre of mass of a captured body is not known better [m]
-FEWEST = 5  # frames: two more than a parabola has coefficients
-_SHORTEST = 0.08  # what is shorter is a foot that rolls over [s]
+NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
+FEWEST = 5  # frames of a flight: two more than a parabola has coefficients
+_SHORTEST = 0.08  # [s] a shorter gap in support is a foot that rolls over, not a flight
 
 
 @dataclass(frozen=True)
 class FlightFit:
-    """A flight, from the last frame of support to the first one, and the parabola nearest to it.
+    """A flight, from the last frame of support before it to the first one after it, and its least-squares parabola.
 
     Attributes
     ----------
     start, end : int
-        Its first and last frame; both still (already) touch, unless the clip begins or ends in the air.
+        First and last frame; both have contact, unless the clip begins or ends in the air.
     time, duration : float
-        When it begins, and how long it is [s].
+        Begin and duration [s].
     gravity, uncertainty : float
         ĝ of the least-squares parabola, and half the width of its 95 % interval [m/s²].
     misfit : float
@@ -40,13 +40,13 @@ class FlightFit:
     rise : float
         Height of the apex over the take-off [m].
     take_off : array, shape (3,)
-        Velocity at the start, of the parabola [m/s].
+        Velocity of the parabola at the start [m/s].
     clearance : float
         Greatest height of the lowest point of the body over the floor [m].
     momentum : array, shape (3,)
         Mean angular momentum about the centre of mass [kg m²/s].
     drift, yaw : float
-        How far the body turns away from where constant angular momentum would have turned it, in all and about the
+        Largest deviation of the body's orientation from that by constant angular momentum, in total and about the
         vertical [rad].
     """
 
@@ -66,7 +66,7 @@ class FlightFit:
 
     @property
     def likely_gravity(self) -> float:
-        """The gravity nearest to the true one that the recording does not exclude [m/s²]."""
+        """Gravity in the 95 % interval that is nearest to the true one [m/s²]."""
         low, high = self.gravity - self.uncertainty, self.gravity + self.uncertainty
         return float(min(max(GRAVITY, low), high))
 
@@ -77,12 +77,12 @@ class FlightFit:
 
     @property
     def take_off_speed(self) -> float:
-        """Upward speed that true gravity asks for the recorded rise: √(2 g h) [m/s]."""
+        """Upward speed that the recorded rise needs under true gravity: √(2 g h) [m/s]."""
         return float(np.sqrt(2.0 * GRAVITY * self.rise))
 
 
 def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
-    """First and last frame of every flight: the frames of support around a stretch without any, if there are such.
+    """First and last frame of every flight: the frames of support around an interval without any.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
 def fit_flight(
     span: tuple[int, int], fps: float, com: Array, angular: Array, inertia: Array, clearance: Array
 ) -> FlightFit:
-    """Fit free fall to a flight, gravity free.
+    """Fit free fall to a flight, with gravity as an unknown.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def fit_flight(
     com, angular : array, shape (n, 3)
         Centre of mass [m] and angular momentum about it [kg m²/s] of all frames of the clip.
     inertia : array, shape (n, 3, 3)
-        About the centre of mass [kg m²].
+        Inertia tensor about the centre of mass [kg m²].
     clearance : array, shape (n,)
         Height of the lowest point of the body [m].
     """
@@ -140,10 +140,10 @@ def fit_flight(
 
 
 def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
-    """The free fall that stays nearest to a flight played at a rate.
+    """The free fall nearest to a flight played at a rate.
 
-    Minimises the greatest distance over the affine part by Lawson's iteration: least squares, weighted again and again
-    by the distances they leave.
+    Minimises the greatest distance over initial position and velocity by Lawson's iteration: least squares, reweighted
+    by the remaining distances.
 
     Parameters
     ----------
@@ -180,17 +180,17 @@ def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
 
 
 def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, float] | None:
-    """Rates σ at which some free fall stays within a distance of the flight: an interval, or none.
+    """Interval of rates σ at which some free fall stays within a distance of the flight, or None.
 
-    The least distance is convex in 1/σ², since distances are convex in the fall and 1/σ² alike; so one minimum is
-    found by trisection and the two crossings by bisection.
+    The least distance is convex in 1/σ², since distances are jointly convex in the fall's parameters and 1/σ²; so its
+    minimum is found by trisection, and the two crossings of the tolerance by bisection.
 
     Parameters
     ----------
     com, fps
         As in `best_fall`.
     tolerance : float
-        [m].
+        Largest distance [m].
 
     Returns
     -------

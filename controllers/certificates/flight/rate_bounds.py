@@ -1,15 +1,17 @@
-r"""How fast a motion may be played at each frame, as plain arrays: in flight from gravity, on the floor from friction.
+r"""Admissible playing rates of a motion at each frame: in flight by gravity, on the floor by the friction cone.
 
-On the floor, a body whose centre of mass accelerates by a must be pushed by m (a + g e_z), within the cone of friction.
-At the rate σ the acceleration is σ² a, so
+On the floor, a body whose centre of mass accelerates by a needs the ground reaction force m (a + g e_z), within the
+friction cone. At the rate σ the acceleration is σ² a, so
 
 .. math:: \sigma^2 (\lVert a_h \rVert - \mu a_z) \le \mu g .
 
-In a turn of radius r at speed v this is v² / r ≤ μ g; with nothing but a_z it says that the floor cannot pull.
+In a turn of radius r at speed v this is v² / r ≤ μ g; for a vertical acceleration alone it means that the floor cannot
+pull.
 
-Accelerations are those of the best parabola through a window of frames, a = Σ c_i p_i (Savitzky & Golay 1964). As a
-mean with weights ≥ 0 of what the acceleration is in between, it is within the cone for whatever body the floor carries.
-So if a misses the cone by d, each such body misses some frame of the window by at least d / Σ|c_i|.
+Accelerations are those of the least-squares parabola through a window of frames, a = Σ c_i p_i (Savitzky & Golay 1964).
+This is a mean, with weights ≥ 0, of the accelerations in the window, so it lies within the (convex) cone for every body
+that the floor supports. If a misses the cone by d, each such body misses some frame of the window by at least
+d / Σ|c_i|.
 """
 
 from collections.abc import Sequence
@@ -24,8 +26,8 @@ from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from controllers.state import Array
 
-_ANY_RATE = 100.0  # beyond it a rate says nothing but that nobody is so fast
-_WINDOW = 0.2  # of the local parabolas whose curvature is the acceleration [s]
+_ANY_RATE = 100.0  # a larger admissible rate is no practical bound
+_WINDOW = 0.2  # [s] window of the local parabolas whose second derivative is the acceleration
 
 
 class RateBounds(NamedTuple):
@@ -34,7 +36,7 @@ class RateBounds(NamedTuple):
     Attributes
     ----------
     low, high : array, shape (n,)
-        Least and greatest σ; 0 and infinity where nothing bounds it.
+        Least and greatest σ; 0 and infinity where there is no bound.
     """
 
     low: Array
@@ -48,7 +50,7 @@ class RateBounds(NamedTuple):
         Parameters
         ----------
         phases : array, shape (m,)
-            Share of the motion that is over at samples of the curve, 0 to 1.
+            Elapsed share of the motion at samples of the curve, 0 to 1.
         speed : array, shape (m,)
             |φ̇| there when the motion is played as recorded [m/s].
 
@@ -70,7 +72,7 @@ class RateBounds(NamedTuple):
         before, after = np.floor(at + 1e-9).astype(np.int64), np.ceil(at - 1e-9).astype(np.int64)
         low = np.maximum(self.low[before], self.low[after]) * speed
         fastest = np.minimum(self.high[before], self.high[after])
-        # At rest no rate makes the stylus move.
+        # Where the curve is at rest, the speed is zero at any rate, also an infinite one.
         return low, np.where(speed > 0.0, fastest * np.maximum(speed, 1e-12), 0.0)
 
 
@@ -82,9 +84,9 @@ def rate_bounds(motion: BodyMotion, flights: Sequence[FlightJudgement], friction
     motion : BodyMotion
         n frames.
     flights : sequence of FlightJudgement
-        Its flights. A doubtful one counts as support.
+        Flights of the motion; a flight with the verdict "unknown" counts as support.
     friction : float
-        μ of soles on the floor.
+        μ, coefficient of friction of soles on the floor.
     """
     low, high = np.zeros(len(motion.com)), floor_rates(motion, friction)
     for flight in flights:
@@ -95,7 +97,7 @@ def rate_bounds(motion: BodyMotion, flights: Sequence[FlightJudgement], friction
 
 
 def floor_rates(motion: BodyMotion, friction: float) -> Array:
-    """Greatest rate at which friction and a floor that only pushes can give the acceleration of each frame, (n,).
+    """Greatest rate at which a unilateral floor with friction can give the acceleration of each frame, (n,).
 
     Raises
     ------
@@ -117,17 +119,17 @@ def _frames_of_window(fps: float) -> int:
 
 
 def _mean_acceleration(motion: BodyMotion) -> Array:
-    """Of the best parabola about each frame, (n, 3); the first and last windows serve all of their half."""
+    """Acceleration of the least-squares parabola about each frame, (n, 3); the first and last windows are extended."""
     window = _frames_of_window(motion.fps)
     return np.asarray(savgol_filter(motion.com, window, 2, deriv=2, delta=1.0 / motion.fps, axis=0))
 
 
 def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], friction: float, frames: int) -> Verdict:
-    """Whether friction can turn, start and stop the first frames as recorded; the margin is the least σ² − 1.
+    """Verdict on whether friction can turn, start and stop the first `frames` as recorded; margin is the least σ² − 1.
 
     The counterexample is the window of frames ``start`` to ``end`` about the hardest ``frame``, with the centre of mass
-    [m] and its velocity [m/s] as it begins, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which any
-    body on that floor misses the window, whatever its own state is as it begins.
+    [m] and its velocity [m/s] at its start, its mean ``acceleration`` [m/s²], and the ``distance`` [m] by which any
+    body on that floor misses the window, for any initial state.
     """
     high = floor_rates(motion, friction)
     for flight in flights:
@@ -155,7 +157,7 @@ def _missed_window(motion: BodyMotion, frame: int, friction: float) -> dict[str,
     a = _mean_acceleration(motion)[frame]
     drift = float(np.linalg.norm(a[:2]))
     push = float(a[2]) + GRAVITY
-    # The nearest point of the cone is its apex for a push that points below the cone's polar.
+    # For a force within the polar cone the nearest point of the friction cone is its apex.
     outside = (drift - friction * push) / np.hypot(1.0, friction) if push > -friction * drift else np.hypot(drift, push)
     per_metre = float(np.abs(savgol_coeffs(window, 2, deriv=2, delta=delta)).sum())
     span = slice(start, start + window)

@@ -1,13 +1,14 @@
-r"""The nearest motion that can be flown: a nonlinear program in the timing and the place of the body.
+r"""Repair of a motion: the nearest physically feasible motion, by a nonlinear program in timing and body position.
 
-Frame k keeps its posture; free are how long it lasts until the next, h_k, and how far the whole body is moved, δ_k:
+Frame k keeps its posture; the unknowns are its duration until the next frame, h_k, and the shift of the whole body,
+δ_k:
 
 .. math:: \min_{h, \delta, p, v, \bar L} \; \frac1n \sum_k
             \Bigl(\frac{\ln h_k / h}{s_h}\Bigr)^2 + \Bigl(\frac{\lVert\delta_k\rVert}{s_\delta}\Bigr)^2
             + \text{(changes of both)} + \sum_{k \in \text{flight}} \lVert L_k h / h_k - \bar L \rVert^2 / L_{max}^2
 
-subject to free fall in every flight, c_k + δ_k = p + v τ_k − ½ g τ_k² e_z; a floor that only pushes, c̈_z ≥ −g; legs
-that reach the feet that stand; and no part of a flying body below the floor.
+subject to free fall in every flight, c_k + δ_k = p + v τ_k − ½ g τ_k² e_z; a unilateral floor, c̈_z ≥ −g; legs that
+reach the feet in stance; and no part of a flying body below the floor.
 """
 
 from collections.abc import Generator, Sequence
@@ -22,13 +23,13 @@ from controllers.certificates.flight.tolerance import GRAVITY
 from controllers.errors import ControllerError, ParameterError
 from controllers.state import Array
 
-_PACE = 0.5  # s_h: a rate changed by that much (natural logarithm) costs as much as
-_PLACE = 0.05  # s_δ: a body moved by that much [m]
-_HASTE = 3.0  # 1/s: changes of the rate's logarithm
-_JOLT = 10.0  # m/s²: accelerations of the move
-_TURN = 0.5  # weight of angular momentum that is not constant
-_RATES = (0.15, 3.0)  # of playing, compared with the recording
-_REACH = 0.998  # share of a leg's length
+_PACE = 0.5  # s_h, scale of changes of the rate (natural logarithm)
+_PLACE = 0.05  # s_δ [m], scale of shifts of the body
+_HASTE = 3.0  # [1/s] scale of the rate of change of the rate's logarithm
+_JOLT = 10.0  # [m/s²] scale of accelerations of the shift
+_TURN = 0.5  # weight of deviations from constant angular momentum
+_RATES = (0.15, 3.0)  # least and greatest playing rate, relative to the recording
+_REACH = 0.998  # largest extension of a leg, as a share of its length
 
 
 class RepairError(ControllerError):
@@ -48,15 +49,15 @@ class RepairTask:
     clearance : array, shape (n,)
         Height of the lowest point of the body [m].
     flights : sequence of (int, int)
-        First and last frame of every flight, both of them still on the floor.
+        First and last frame of every flight, both still with ground contact.
     legs : array, shape (n, 2, 3)
-        From hips to ankles [m].
+        Vectors from hips to ankles [m].
     standing : array of bool, shape (n, 2)
-        Which foot stands.
+        Which foot is in stance.
     leg_length : float
-        Of a straight leg [m].
+        Length of a straight leg [m].
     held : (bool, bool)
-        Whether the first and the last frame are joined to frames that stay as they are.
+        Whether the first and the last frame must stay unchanged, to join adjacent frames.
 
     Raises
     ------
@@ -87,18 +88,18 @@ class RepairTask:
 
 @dataclass(frozen=True, eq=False)
 class RepairPlan:
-    """What makes a stretch of motion feasible.
+    """Solution of a repair: new timing and shifts of a stretch of motion.
 
     Attributes
     ----------
     times : array, shape (n,)
-        When each frame is reached, from 0 on [s].
+        Time of each frame, from 0 on [s].
     shift : array, shape (n, 3)
-        How far the body is moved in each frame [m].
+        Shift of the body in each frame [m].
     falls : array, shape (flights, 2, 3)
         Position [m] and velocity [m/s] of the centre of mass at each take-off.
     iterations : int
-        That the solver took.
+        Iterations of the solver.
     """
 
     times: Array
@@ -109,7 +110,7 @@ class RepairPlan:
 
 @contextmanager
 def _matrix_indexing() -> Generator[None, None, None]:
-    """CasADi's own indexing while a program is written, whatever other code has chosen for the process."""
+    """Context with CasADi's own indexing mode, independent of the mode that other code has set for the process."""
     chosen = ca.GlobalOptions.getNumpyMode()
     ca.GlobalOptions.setNumpyMode(0)
     try:

@@ -1,4 +1,4 @@
-"""What passes for a motion of a body: tolerances on flights, and the floor that it stands on."""
+"""Tolerances by which motions are judged: flights, contacts, and friction of the floor."""
 
 from dataclasses import dataclass, field
 
@@ -11,29 +11,29 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class BallisticTolerance:
-    """What passes for a flight.
+    """Tolerances of a flight.
 
     Parameters
     ----------
     gravity : (float, float)
-        Least and greatest gravity that viewers take for natural [m/s²] (after Reitsma & Pollard 2003; what that rests
-        on is said in docs/explanation/ballistics.md).
+        Least and greatest gravity that viewers accept as natural [m/s²] (after Reitsma & Pollard 2003; its basis is
+        explained in docs/explanation/ballistics.md).
     distance : float
-        How far a body that really falls may stray from the recorded centre of mass [m].
+        Largest distance of a body in real free fall from the recorded centre of mass [m].
     misfit : float
         RMS distance of the recorded centre of mass from its own parabola [m].
     drift : float
-        How far the body may turn away from where constant angular momentum would have turned it [rad].
+        Largest deviation of the body's orientation from that by constant angular momentum [rad].
     yaw : float
-        The same about the vertical [rad]: captures that fly stay within 1.5°, a turn of 38° that begins and ends in the
-        air makes 4°.
+        The same about the vertical [rad]: real flights in captures stay within 1.5°; a turn of 38° that begins and ends
+        in the air gives 4°.
     clearance : float
-        A body that never rises higher than this and does not fall is taken to stand on a floor that was missed [m].
+        A body that never rises higher than this and does not fall may stand on a floor that the recording misses [m].
 
     Raises
     ------
     ParameterError
-        If the interval of gravity does not hold the true one, or a tolerance is not positive.
+        If the interval of gravity does not contain the true value, or a tolerance is not positive.
     """
 
     gravity: tuple[float, float] = (9.0, 12.7)
@@ -54,30 +54,31 @@ class BallisticTolerance:
 
 @dataclass(frozen=True)
 class ContactTolerance:
-    """What passes for contact between flights.
+    """Tolerances of contacts between flights.
 
-    Chosen on 22 captures as they are retargeted: of the six whose jumps fly, soles stand within 5 mm of the floor and
-    stay within 17 mm of where they stand, a foot slides by up to 9 cm and nothing is at rest for up to 0.12 s.
+    Chosen on 22 retargeted captures: in the six with real jumps, soles stand within 5 mm of the floor and stay within
+    17 mm of that height, a foot slides by up to 9 cm, and no contact is at rest for up to 0.12 s.
 
     Parameters
     ----------
     floor : float
-        How far the median height of what stands may be from the floor [m].
+        Largest distance of the median height of the supporting points from the floor [m].
     spread : float
-        How far from there it may be for nine tenths of the supported time, up and down [m].
+        Largest deviation from that height for nine tenths of the supported time, up and down [m].
     unheld : float
-        Longest time for which nothing that touches is at rest [s].
+        Longest time for which no contact is at rest [s].
     skate : float
-        Furthest that a foot may slide in a stance [m].
+        Largest slide of a foot in a stance [m].
     push : float
-        Greatest acceleration of the centre of mass [m/s²]: legs give some ten times g.
+        Largest acceleration of the centre of mass [m/s²]: legs give some ten times g.
     leap, outlier : float
-        A joint that turns by more than this in a frame [rad], and so many times as far as before and after, leaps.
+        A joint jumps if it turns by more than `leap` in a frame [rad], and by more than `outlier` times as much as
+        before and after.
 
     Raises
     ------
     ParameterError
-        If one is not positive and finite.
+        If a tolerance is not positive and finite.
     """
 
     floor: float = 0.008
@@ -96,16 +97,16 @@ class ContactTolerance:
 
 @dataclass(frozen=True)
 class Judging:
-    """By what a clip is judged.
+    """Criteria by which a clip is judged.
 
     Parameters
     ----------
     tolerance : BallisticTolerance
-        What passes for a flight.
+        Tolerances of flights.
     friction : float
         Coefficient of friction of soles on the floor; 0.9 is that of the scene.
     contact : ContactTolerance
-        What passes for contact between flights.
+        Tolerances of contacts between flights.
 
     Raises
     ------

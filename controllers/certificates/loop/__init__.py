@@ -1,1 +1,1 @@
-"""Certificates of the sampled loop about one curve: stability, passivity, energy."""
+"""Certificates of the sampled-data loop about one curve: stability, passivity, energy."""

@@ -1,4 +1,4 @@
-"""Laws of one's own on CasADi symbols, added to the law that drives along a curve."""
+"""User-defined laws on CasADi symbols, added to the law that drives along a curve."""
 
 from typing import Any
 
@@ -14,19 +14,19 @@ _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
 def with_added(base: Law, added: tuple[FunctionLaw, ...], k_r: float) -> Law:
-    """A law with the forces of functions added, for a stylus that is upright and does not turn, its switch open.
+    """A law plus the forces of user-defined functions, for an upright stylus that does not turn, with its switch open.
 
-    A law is linear in its gains: what is added goes with its stiffness, F + (k/k_r) Σ F_i, which is the field itself at
-    the gains that it has, and the whole of it scaled where a critical gain is looked for.
+    Since a law must be linear in its gains, the added forces are scaled with the stiffness, F + (k/k_r) Σ F_i: at the
+    field's own gains this is the field itself, and the search for a critical gain scales all of it.
 
     Parameters
     ----------
     base : Law
-        That drives along the curve.
+        The law that drives along the curve.
     added : tuple of FunctionLaw
-        What is added.
+        User-defined laws.
     k_r : float
-        Stiffness that the field has [N/m].
+        Stiffness of the field [N/m].
 
     Raises
     ------
@@ -37,7 +37,7 @@ def with_added(base: Law, added: tuple[FunctionLaw, ...], k_r: float) -> Law:
         return base
     if k_r <= 0.0:
         raise ControllerError("a certificate of laws of one's own needs a stiffness k_r above zero beside them")
-    # One that cannot be evaluated says so before anything is built.
+    # Evaluated once beforehand, so that a function that cannot be evaluated on symbols raises at once.
     _force(added, casadi.SX.sym("p", 3), casadi.SX.sym("v", 3))
 
     def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b_d: Symbol, width: Symbol) -> Symbol:

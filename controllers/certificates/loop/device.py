@@ -1,4 +1,4 @@
-"""What a certificate knows of a device; the caller hands over the device's kernels."""
+"""Model of a device for the certificates: kinematics and dynamics from the device's kernels, friction and limits."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,13 +30,13 @@ class Device:
     mass, coriolis, gravity : callable
         M(θ), C(θ, θ̇) as three rows of three, N(θ) as three scalars [SI].
     angles : callable
-        θ [rad] of a point of H; numbers only.
+        Inverse kinematics: θ [rad] of a point in H [m]; numbers only.
     viscous, coulomb : three floats
-        D [N m s/rad] and f_c [N m] at the joints.
+        Friction D [N m s/rad] and f_c [N m] at the joints.
     encoder_step : three floats
-        Δ at the joints [rad].
+        Encoder resolution Δ at the joints [rad].
     peak_torque : three floats
-        [N m].
+        Largest motor torques at the joints [N m].
     numbers : callable
         θ (3,) → p_H (3,) [m], J (3, 3) [m/rad]; numbers only.
     """

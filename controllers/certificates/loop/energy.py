@@ -1,17 +1,17 @@
-r"""Energy of a river: what it injects in a lap, how fast it drives the hand, how far a bounded force moves it off.
+r"""Energy of a river: injected energy per lap, speed of a relaxed hand, and its distance under a bounded force.
 
-A river pushes along its tangent, so it is active by design. Of FOLLOW's force, k_r's part is a potential and b_d's
-injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: that bounds the power of the ideal law, whatever the hand does; what sampling,
-filter and rounding add to it for a hand that vibrates is `injected`. A relaxed hand moves at the speed at
-which the force pays for friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
+A river pushes along its tangent, so it is active by design. Of FOLLOW's force, the spring (k_r) is conservative and the
+damper (b_d) injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4: this bounds the power of the ideal law for any motion of the hand;
+`injected` bounds what sampling, filter and rounding add to it for a vibrating hand. A relaxed hand moves at the speed
+at which the force balances friction. A force U of the hand, |U| ≤ U_max, moves it off the curve by at most
 
 .. math:: R = G\,\bigl(U_{max} + U_0 + k_r R\,(1 - w(R/\varepsilon))\bigr), \qquad
           G = \sum_j \sigma_{max}(E\,A^j B)
 
-with A the loop across the curve, B its response to a force, E the displacement of the tip: the peak gain of the sampled
-loop, the least number for which this holds. U_0 bounds what the lap itself asks for: inertia, friction and the filter's
-lag; the last term is what the window takes away off the curve. The least solution R is reached from the curve, and
-cannot be left: the loop is input-to-state stable inside.
+with A the state matrix transverse to the curve, B its response to a force, E the displacement of the tip: G is the
+peak gain of the sampled loop, the least number for which this holds. U_0 bounds the force that motion along the lap
+itself needs: inertia, friction and the filter's lag. The last term is the part of the spring that the window removes
+off the curve. A hand that starts on the curve stays within the least solution R: the loop is input-to-state stable.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Drag(NamedTuple):
 
 
 def drag(river: River, linear: LinearLoop) -> Drag:
-    """The device's friction felt along the curve."""
+    """The device's friction at the tip, along the curve."""
     along = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     joints = joint_motion(linear.jacobian, along)
     return Drag(joints**2 @ np.array(river.device.viscous), np.abs(joints) @ np.array(river.device.coulomb))
@@ -50,14 +50,14 @@ def terminal_speed(river: River, linear: LinearLoop) -> Array:
 
 
 class PeakGain(NamedTuple):
-    """Largest effect that a force of 1 N of any course has: displacement across the curve, and the river's force."""
+    """Largest effect of a force of up to 1 N with any time course: displacement [m/N] and the river's force [N/N]."""
 
     distance: float
     force: float
 
 
 def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
-    """Peak gains [m/N], [N/N], the largest over the phases; infinite where the loop is not stable."""
+    """Peak gains [m/N], [N/N], the largest over the phases; infinite if the loop is unstable at any of them."""
     maps = loop.frozen(k_r, b_d)
     if np.abs(np.linalg.eigvals(maps)).max() >= 1.0:
         return PeakGain(float("inf"), float("inf"))
@@ -75,7 +75,7 @@ def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
 
 
 def own_force(river: River, linear: LinearLoop) -> Array:
-    """U_0 [N] at every phase: what the lap at its own pace asks for, as a force at the tip."""
+    """U_0 [N] at every phase: force at the tip that motion along the lap at its own pace needs."""
     kinematics = kinematics_function(river.device).map(len(linear.phases))
     acceleration = river.curve.acceleration(linear.phases)
     bend = np.array(kinematics(linear.theta.T, linear.rate.T)[1]).T
@@ -85,7 +85,7 @@ def own_force(river: River, linear: LinearLoop) -> Array:
         coriolis = np.array(river.device.coriolis(theta, rate), dtype=float)
         torque[i] += coriolis @ rate + np.array(river.device.viscous) * rate
     inertia = np.linalg.norm(joint_motion(linear.jacobian.transpose(0, 2, 1), torque), axis=1)
-    # Coulomb's torques have any sign: the worst corner of the box.
+    # Coulomb friction torques have any sign: the worst of all combinations is taken.
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1) * np.array(river.device.coulomb)[:, None]
     stiction = np.linalg.norm(np.linalg.solve(linear.jacobian.transpose(0, 2, 1), signs[None]), axis=1).max(axis=1)
     sampling = river.sampling
@@ -108,14 +108,14 @@ def distance_bound(river: River, gain: float, force: float) -> float:
 
 
 class Pushed(NamedTuple):
-    """What a hand that pushes does to a river.
+    """A river under the push of a hand.
 
     Attributes
     ----------
     river : River
     gain : PeakGain
     own : float
-        What the lap itself asks for, `own_force` at most [N].
+        Largest `own_force` [N].
     ceiling : float
         Force that the limiter lets through [N].
     """
@@ -127,23 +127,23 @@ class Pushed(NamedTuple):
 
     @property
     def room(self) -> float:
-        """Distance within which the nearest point is unique, and in the tube [m]."""
+        """Distance from the curve within which the nearest point is unique and the tube extends [m]."""
         return min(self.river.width, self.river.curve.reach)
 
     def bounds(self, push: float) -> tuple[float, float]:
-        """Distance [m] and force of the river [N] at most for a push [N]; infinite without a bound."""
+        """Bounds of the distance [m] and of the river's force [N] for a push [N]; infinite if there are none."""
         if not np.isfinite(self.gain.distance):
             return float("inf"), float("inf")
         distance = distance_bound(self.river, self.gain.distance, push + self.own)
         return distance, self.gain.force * distance / self.gain.distance if np.isfinite(distance) else float("inf")
 
     def holds(self, push: float) -> bool:
-        """Whether the bounds lie within what there is."""
+        """Whether the bounds for a push [N] lie within `room` and below the ceiling."""
         distance, felt = self.bounds(push)
         return distance < self.room and felt < self.ceiling
 
     def most(self) -> float:
-        """Largest push [N] that holds, by bisection."""
+        """Largest push [N] for which `holds` is true, by bisection."""
         allowed, beyond = 0.0, self.ceiling
         for _ in range(40):
             middle = 0.5 * (allowed + beyond)
@@ -155,7 +155,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     """Verdict on the distance from the curve of a hand that pushes with at most `push` newtons, with FOLLOW.
 
     Certified when the bound exists, stays within the tube and the curve's reach, where the nearest point is unique, and
-    the river's force below `ceiling` [N]. The margin is how much more the hand might push [N].
+    the river's force below `ceiling` [N]. The margin is the additional push that would be allowed [N].
     """
     moving = river.moving()
     gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
@@ -192,7 +192,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
 
 
 def _powers(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
-    """What a lap takes and gives, of the ideal law and of the executed one."""
+    """Figures on power and energy of a lap, for the ideal and for the executed law."""
     pace, speed, friction = _pace(moving), terminal_speed(river, moving), drag(river, moving)
     lap = river.curve.duration
     return {

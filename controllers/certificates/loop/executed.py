@@ -1,8 +1,8 @@
-r"""An executed program of laws, differentiated as it runs, for laws that do not evaluate on symbols.
+r"""Linearisation of an executed program of laws by finite differences, for laws that do not evaluate on symbols.
 
 The torques τ(θ, ω) = J(θ)ᵀ F(p(θ), J(θ) ω) come from the compiled program itself; their derivatives are central
-differences at a state of the hand, memory and phase held. A differenced law takes the place of a symbolic one in
-`LinearLoop`. It can refute stability; it does not prove it, as it sees the states that it is given and no others.
+differences at a state of the hand, with memory and phase fixed. They replace the symbolic derivatives in `LinearLoop`.
+This can refute stability but not prove it, since only the given states are examined.
 """
 
 from collections.abc import Sequence
@@ -19,26 +19,26 @@ from controllers.fields.law import Program
 from controllers.fields.program import evaluate
 from controllers.state import Array, HandState
 
-STEP = 1e-6  # of the differences [rad], [rad/s]
-SWINGS = 1e-2  # rad a period: what turns less does not shake but drifts
-DIRECTIONS = 4  # across the curve, in which states are taken off it
+STEP = 1e-6  # [rad], [rad/s] of the differences
+SWINGS = 1e-2  # [rad per period] an eigenvalue of smaller angle is a drift, not an oscillation
+DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
 
 class Seen(NamedTuple):
-    """The worst state that was looked at.
+    """The worst of the examined states.
 
     Attributes
     ----------
     radius : float
-        Spectral radius of a period there, of what swings.
+        Spectral radius of a period there, over the oscillating modes.
     phase : float
-        Of the curve [s].
+        Phase of the curve [s].
     p, v : Array
-        Of the hand [m], [m/s].
+        Position [m] and velocity [m/s] of the hand.
     hand : HandImpedance
-        On the stylus.
+        Hand on the stylus.
     states : int
-        That were looked at.
+        Number of examined states.
     strongest : float
         Largest force of the program at any of them [N].
     """
@@ -53,7 +53,7 @@ class Seen(NamedTuple):
 
 
 def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> Array:
-    """F_H [N] of a program at a hand, with a copy of its memory."""
+    """F_H [N] of a program at a hand p [m], v [m/s] at time t [s], evaluated with a copy of the memory."""
     hand, wrench, own = HandState.at(p, v, t), np.empty(6), memory.copy()
     program.feed(own, hand)
     evaluate(*program.compiled(), own, hand.vector(), wrench)
@@ -61,16 +61,16 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
 
 
 def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v: Array) -> LinearLoop:
-    """The linear loop of `river` with the program's derivatives at hands (n, 3), (n, 3), at a gain of 1.
+    """The linear loop of `river` with the program's derivatives at hands p, v (n, 3); use it with k_r = 1, b_d = 0.
 
-    `linear` is that of the plant at the same phases; p and v need not be on the curve.
+    `linear` has the plant at the same phases; p and v need not be on the curve.
     """
     by_theta, by_omega = np.zeros((2, *linear.weight_theta.shape)), np.zeros((2, *linear.weight_theta.shape))
     numbers = river.device.numbers
     for i, (place, velocity, phase) in enumerate(zip(p, v, linear.phases, strict=True)):
         theta = np.array(river.device.angles(place))
         memory = program.fresh_memory()
-        # Evaluated once, the memory knows the phase.
+        # One evaluation, so that the memory contains the phase.
         hand, wrench = HandState.at(place, velocity, float(phase)), np.empty(6)
         program.feed(memory, hand)
         evaluate(*program.compiled(), memory, hand.vector(), wrench)
@@ -89,7 +89,7 @@ def differenced(linear: LinearLoop, program: Program, river: River, p: Array, v:
 def looked_at(
     program: Program, river: River, reach: float, hands: Sequence[HandImpedance], pace: float = 1.0, n: int = 16
 ) -> Seen:
-    """The worst of states on the curve, at rest and at a pace in units of its own, and off it by `reach` [m]."""
+    """The worst of states on the curve at rest and at `pace` times its own, and of states off it by `reach` [m]."""
     phases = river.phases(n)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     tangent = velocity / np.linalg.norm(velocity, axis=1, keepdims=True)

@@ -1,13 +1,13 @@
-r"""Stability of a law along a curve together with a governor: a damper along the curve that acts now and then.
+r"""Absolute stability of a law along a curve with a governor: a sector-bounded damper along the curve.
 
 A governor's force is −β(s) along the tangent, s the measured speed along it, with slopes between 0 (within the
 admissible speeds) and b (beyond them). The rest of the loop is linear, with transfer function G(z) from a force along
 the tangent to s. By the circle criterion (Zames 1966; in discrete time Tsypkin 1962) the loop is stable for every such
-β, however it changes with time, if it is stable without it and
+β, even time-varying, if it is stable without the governor and
 
 .. math:: \mathrm{Re}\,\bigl(1 + b\,G(e^{i\omega})\bigr) > 0 \qquad \text{for all } \omega .
 
-It is refuted where the loop with the whole b is unstable; between the two nothing is known.
+Stability is refuted where the loop with the full b is unstable; between the two conditions nothing is known.
 """
 
 from collections.abc import Sequence
@@ -25,15 +25,15 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import piece_velocity
 from controllers.state import Array
 
-FREQUENCIES = 400  # of G, from a ten-thousandth of Nyquist's to Nyquist's
+FREQUENCIES = 400  # number of frequencies of G, from 1e-4 of the Nyquist frequency up to it
 
 
 def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
-    """A law with a damper −drag t (t·v) along the curve added, which goes with the gains that the law has."""
+    """A law plus a damper −drag t (t·v) along the curve, which is scaled with the law's gains k_r (or b_d)."""
 
     def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b: Symbol, width: Symbol) -> Symbol:
         along = vector(piece_velocity.py_func(piece, 0, nearest_phase(p, piece, u)))
-        # In this order no square of a velocity underflows where the curve is made to stand still.
+        # In this order no square of a velocity underflows on a curve that is slowed down to rest.
         tangent = along / casadi.norm_2(along)
         share = k / k_r if k_r > 0.0 else b / b_d
         return base.force(p, v, piece, u, k, b, width) - share * drag * tangent * casadi.dot(tangent, v)
@@ -47,7 +47,7 @@ def response_along(loop: SampledLoop, k_r: float, b_d: float) -> Array:
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     force = projection @ loop.fresh @ (linear.jacobian.transpose(0, 2, 1) @ tangent[:, :, None])
     speed = tangent[:, None, :] @ loop.measured_velocity @ basis
-    # Diagonal form: one eigenvalue problem a phase, and any number of frequencies.
+    # Diagonal form: one eigenvalue problem per phase serves all frequencies.
     values, vectors = np.linalg.eig(loop.frozen(k_r, b_d))
     reached = (speed @ vectors)[:, 0, :] * np.linalg.solve(vectors, force.astype(complex))[:, :, 0]
     z = np.exp(1j * np.geomspace(1e-4 * np.pi, np.pi, FREQUENCIES))
@@ -55,7 +55,7 @@ def response_along(loop: SampledLoop, k_r: float, b_d: float) -> Array:
 
 
 def most_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
-    """Largest b [N s/m] for which the circle criterion holds at every phase; 0 if the loop is unstable without it."""
+    """Largest b [N s/m] for which the circle criterion holds at every phase; 0 if the loop is unstable at b = 0."""
     if loop.radius(k_r, b_d).max() >= 1.0:
         return 0.0
     least = float(response_along(loop, k_r, b_d).real.min())
@@ -63,10 +63,10 @@ def most_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
 
 
 def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]) -> Verdict:
-    """Verdict on a river's stability with a governor of some drag [N s/m], for every one of some hands.
+    """Verdict on a river's stability with a governor of a given drag [N s/m], for each of several hands.
 
-    Certified where the river is and the circle criterion holds, refuted where the loop is unstable while the governor
-    acts; the margin is the lesser of the river's and (largest certain drag)/drag − 1.
+    Certified if the river alone is and the circle criterion holds; refuted if the loop is unstable while the governor
+    acts. The margin is the smaller of the river's and (largest drag by the circle criterion)/drag − 1.
     """
     alone = stability(river, hands)
     if drag == 0.0 or alone.verdict == "refuted":

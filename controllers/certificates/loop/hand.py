@@ -1,4 +1,4 @@
-"""The hand that certificates allow for: an impedance on the stylus, and intervals of it."""
+"""Hand model of the certificates: a mechanical impedance on the stylus, and intervals of impedances."""
 
 import itertools
 import math
@@ -12,7 +12,7 @@ from controllers.state import Array
 
 @dataclass(frozen=True)
 class HandImpedance:
-    """Hand on the stylus tip: F = −m v̇ − b (v − v_d) − k (p − p_d), about a motion (p_d, v_d) of its own.
+    """Hand on the stylus tip: F = −m v̇ − b (v − v_d) − k (p − p_d), about its own intended motion (p_d, v_d).
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class HandImpedance:
                 raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
 
     def __str__(self) -> str:
-        """In words, with units."""
+        """Description with units."""
         if self == NO_HAND:
             return "no hand"
         return f"a hand of {self.mass:g} kg, {self.damping:g} N s/m, {self.stiffness:g} N/m"

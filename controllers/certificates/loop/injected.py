@@ -1,18 +1,20 @@
-r"""Power that the executed law injects into a hand that shakes the stylus: sampled, filtered, late and rounded.
+r"""Power that the executed law injects into a vibrating hand, due to sampling, filter, delay and quantisation.
 
-The ideal law injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4, whatever the hand does. Of a hand that vibrates with frequency f the
-servo sees samples, their filtered differences and, held for a period, answers late: a complex stiffness
+The ideal law injects b_d (φ̇ − v)·v ≤ b_d |φ̇|²/4 for any motion of the hand. The servo uses samples and their filtered
+differences, and its output is held for a period and delayed. For a hand that vibrates at the frequency ω its response
+is a complex stiffness
 
 .. math:: G(\omega) = \frac{1 - e^{-i\omega T}}{i\omega T}\, e^{-i\omega\tau}
           \left(k_r + b_d \frac{(1 - s)(1 - e^{-i\omega T})}{T\,(1 - s e^{-i\omega T})}\right), \qquad
           E(\omega) = -\frac{\mathrm{Im}\,G(\omega)}{\omega}
 
 with which a vibration of RMS speed V gains E(ω) V² watts on average. E is −b_d for ω → 0 and positive above a
-frequency f_0. Frequencies do not mix on average, so of a hand whose vibration has frequencies up to f (below Nyquist's)
+frequency f_0. Different frequencies do not interact on average, so for a vibration with frequencies up to f (below the
+Nyquist frequency)
 
 .. math:: \bar P \le \tfrac14 b_d |\dot\varphi|^2 + V^2 \max_{\omega \le 2\pi f} E(\omega)^+ + \nu V
 
-where ν bounds the force that rounded encoders make: a reading that is wrong by δ gives k_r δ + 2 b_d (1 − s) δ/T.
+where ν bounds the force due to encoder quantisation: a reading error δ gives k_r δ + 2 b_d (1 − s) δ/T.
 """
 
 from typing import NamedTuple
@@ -24,16 +26,16 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.state import Array
 
-BANDS = (30.0, 100.0, 300.0)  # [Hz] what a hand does and trembles with; a tool against a table; what skin still feels
+BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; vibration felt by the skin
 
 
 class Injection(NamedTuple):
-    """What the executed law adds to the ideal bound of its power.
+    """Excess of the executed law's power over the ideal bound.
 
     Attributes
     ----------
     passive_below : float
-        f_0 [Hz]: a slower vibration gains nothing.
+        f_0 [Hz]: a slower vibration gains no energy.
     activity : tuple of float
         max E⁺ [N s/m] up to each of `BANDS`.
     rounding : float
@@ -50,7 +52,7 @@ class Injection(NamedTuple):
 
 
 def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
-    """E(ω) [N s/m] at frequencies [Hz] above 0 and up to Nyquist's."""
+    """E(ω) [N s/m] at frequencies [Hz] above 0 and up to the Nyquist frequency."""
     period, keep, omega = sampling.period, sampling.keep, 2.0 * np.pi * frequency
     late = np.exp(-1j * omega * period)
     hold = (1.0 - late) / (1j * omega * period) * np.exp(-1j * omega * sampling.delay)
@@ -59,7 +61,7 @@ def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
 
 
 def injection(river: River, linear: LinearLoop) -> Injection:
-    """What sampling, filter, delay and rounding add, of springs across the curve and dampers in any direction."""
+    """Effect of sampling, filter, delay and quantisation, for springs across the curve and dampers in any direction."""
     nyquist = 0.5 / river.sampling.period
     frequency = np.geomspace(0.1, nyquist, 2000)
     # Along the curve there is no spring.

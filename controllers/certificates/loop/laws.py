@@ -1,4 +1,4 @@
-"""Laws of force on CasADi symbols, from the kernels that run."""
+"""Laws of force on CasADi symbols, built from the same kernels that the servo executes."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -19,12 +19,13 @@ class Law(NamedTuple):
     Attributes
     ----------
     force : callable
-        ``force(p, v, piece, u, k_r, b_d, width)`` in H: the curve's piece as 28 coefficients, the phase u in it, and
-        1/ε² or 1/δ². Linear in k_r and b_d.
+        ``force(p, v, piece, u, k_r, b_d, width)`` in H: the curve's piece as 28 coefficients, the phase u in it [s],
+        and `width` = 1/ε² or 1/δ² [1/m²]. Linear in k_r and b_d.
     slides : bool
-        Whether there are shifts that the law does not answer: of a law that carries, the shift along the curve.
+        Whether there are neutral displacements, to which the law gives no restoring force: for a law that carries, the
+        displacement along the curve.
     carries : bool
-        Whether the hand is driven along the curve, or comes to rest on it.
+        Whether the hand is driven along the curve; otherwise it comes to rest.
     """
 
     force: Callable[..., Symbol]
@@ -33,7 +34,7 @@ class Law(NamedTuple):
 
 
 def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
-    """t* as a function of p: one Newton step from the nearest phase u has its value and its derivative."""
+    """t* as a function of p: one Newton step from the nearest phase u, which is exact in value and first derivative."""
     slope = casadi.dot(vector(piece_point.py_func(piece, 0, u)) - p, vector(piece_velocity.py_func(piece, 0, u)))
     return u - slope / casadi.jacobian(slope, u)
 
@@ -60,7 +61,7 @@ def _seek(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_f: Symbol, b: Symbol
 
 
 def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol, width: Symbol) -> Symbol:
-    """Stretchy tubes that are held: attracted by the point that was taken hold of, wherever the curve goes."""
+    """Stretchy tubes while held: attracted by the grasped point, independently of the curve."""
     target = piece_point.py_func(piece, 0, u)
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
 
@@ -75,7 +76,7 @@ LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD
 def torque_function(device: Device, law: Law) -> Any:
     """CasADi function (θ, ω, piece, u, k_r, b_d, width) → torques τ = J(θ)ᵀ F + N(θ), and their derivatives by θ, ω.
 
-    ω are the rates as filtered, apart from θ: the force is F(p(θ), J(θ) ω).
+    ω are the filtered rates, independent of θ: the force is F(p(θ), J(θ) ω).
     """
     theta, omega, piece = casadi.SX.sym("theta", 3), casadi.SX.sym("omega", 3), casadi.SX.sym("piece", PIECE)
     u, k_r, b_d, width = (casadi.SX.sym(name) for name in ("u", "k_r", "b_d", "width"))

@@ -1,12 +1,13 @@
-r"""LEADING on CasADi symbols, from the kernels that run: its regimes, and the walker as state.
+r"""LEADING on CasADi symbols, built from the executed kernels: its regimes, and the walker as part of the state.
 
-The force is a spring outside dead bands, so near a place where it sets in it is linear on either side. Each regime is
-that side, at the edge where the force is nothing: a hand that holds on with a constant force adds no derivative to it.
+The force is a spring outside dead bands, so it is piecewise linear. Each regime is one linear piece, linearised at the
+edge of the dead bands, where the force is zero; a constant force of the hand would not change the derivatives.
 
 .. math:: F = -k_l\,(\alpha\,t t^T + \beta\,n (n - c\,t)^T)\,\delta p - k_z\,\delta z\,e_z - b\,v
 
-α is 1 where the stylus is farther along than the figure follows, β is 1 beside what it can reach, and c = κ_max × the
-way beyond the path's front: the room to the sides grows with that way. k_z is scaled with k_l.
+α is 1 where the stylus is farther along the path than the figure follows; β is 1 where it is farther to the side than
+the path can reach; c is κ_max times the distance beyond the path's front, with which the room to the sides grows. k_z
+is scaled with k_l.
 """
 
 from typing import NamedTuple
@@ -22,23 +23,23 @@ from controllers.fields.leading import leading_force
 from controllers.state import Array
 from controllers.walking.walker import walker_acceleration
 
-_INSIDE = 1e-9  # [m] of floor on the side of an edge where the spring acts
-_WIDE = 10.0  # [m] a dead band in which nothing is felt
+_INSIDE = 1e-9  # [m] on the floor: distance from the edge to the side where the spring acts
+_WIDE = 10.0  # [m] width of a dead band for a spring that does not act
 
 
 class Regime(NamedTuple):
-    """A side of the dead bands of LEADING, and how the path lies.
+    """A linear regime of LEADING's dead bands, and the direction of the path.
 
     Attributes
     ----------
     ahead, aside : bool
         Whether the springs along and across the path act: α and β.
     beyond : bool
-        Whether the stylus is beyond the path's front, or on the path.
+        Whether the stylus is beyond the path's front; otherwise it is on the path.
     turn : float
-        c, signed by the side: 1 m of way beyond the front and 1/m of bend make 1.
+        c, with the sign of the side: 1 m beyond the front and κ_max = 1/m give 1.
     heading : float
-        Of the path, from the direction of the curve along which the loop is linearised [rad].
+        Heading of the path relative to the curve along which the loop is linearised [rad].
     """
 
     ahead: bool
@@ -61,7 +62,7 @@ class Regime(NamedTuple):
             here = piece_point.py_func(piece, 0, u)
             c, s = self.tangent(piece_velocity.py_func(piece, 0, u))
             advance = scale * (c * (p[0] - here[0]) + s * (p[1] - here[1]))
-            # On the path the place next to the stylus goes along with it, and there is no room to the sides.
+            # On the path the nearest point moves along with the stylus, and there is no room to the sides.
             gone = 0.0 if self.beyond else advance
             room = self.turn * advance - _INSIDE if self.aside else _WIDE
             pull = leading_force.py_func(
@@ -74,21 +75,21 @@ class Regime(NamedTuple):
 
 
 def walking(loop: SampledLoop, regime: Regime, scale: float, rate: float, k_l: float, b: float) -> Array:
-    """Maps of a period with the walker as state, without the shifts that are neutral, shape (n, r, r).
+    """State matrices of a period with the walker as state, without the neutral displacements, shape (n, r, r).
 
-    The walker, (s, ṡ), steps before the force is taken, as in the servo: ṡ⁺ = ṡ + T s̈, s⁺ = s + T ṡ⁺, and s⁺ takes
-    k_l s⁺/S from the spring along the path. Nothing changes if stylus and walker are shifted together along it.
+    The walker (s, ṡ) steps before the force is evaluated, as in the servo: ṡ⁺ = ṡ + T s̈, s⁺ = s + T ṡ⁺, and s⁺ changes
+    the spring force along the path by k_l s⁺/S. A joint displacement of stylus and walker along the path is neutral.
 
     Parameters
     ----------
     loop : SampledLoop
-        Linearised in a regime in which the spring along the path acts and c is 0.
+        Loop linearised in a regime in which the spring along the path acts and c is 0.
     regime : Regime
-        That one.
+        That regime.
     scale, rate : float
         S and ω [1/s].
     k_l, b : float
-        [N/m], [N s/m].
+        Stiffness [N/m] and damping [N s/m].
     """
     linear, period, size = loop.linear, loop.sampling.period, loop.size
     n = len(linear.phases)

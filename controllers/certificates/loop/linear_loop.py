@@ -1,7 +1,7 @@
-"""A river's device, hand and law, differentiated exactly along the curve.
+"""Linearisation of device, hand and law along a river's curve, with exact derivatives.
 
-Kinematics, dynamics and law are the kernels that run, evaluated on CasADi symbols, and CasADi differentiates them.
-What a servo makes of the derivatives is `sampled_loop`.
+Kinematics, dynamics and law are the kernels that the servo executes, evaluated on CasADi symbols and differentiated by
+CasADi. `sampled_loop` builds the sampled-data loop from the derivatives.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from controllers.state import Array
 
-_NOTHING = 1e-6  # of the largest stiffness of a law, which is none
+_NOTHING = 1e-6  # share of a law's largest stiffness below which a stiffness counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +43,9 @@ class LinearLoop:
     velocity : Array, shape (n, 3)
         φ̇ in H.
     neutral : Array, shape (n, 3, m)
-        Displacements of the tip that the loop does not answer: along the curve, along a led figure's path, or none.
+        Neutral displacements of the tip, without restoring force: along the curve, along a led figure's path, or none.
     shift : Array, shape (n, 12, m)
-        Derivatives of the state, (θ, θ̇, θ_{k−1}, ω_{k−1}), by these, for T → 0.
+        Derivatives of the state (θ, θ̇, θ_{k−1}, ω_{k−1}) by these displacements, for T → 0.
     held : bool
         Whether the hand has a stiffness, so that no displacement is neutral.
     """
@@ -66,7 +66,7 @@ class LinearLoop:
     held: bool
 
     def lap(self, curve: Trajectory, n: int) -> "LinearLoop":
-        """The loop at n equal phases of a closed curve, by periodic splines through these: everything is smooth."""
+        """The loop at n equal phases of a closed curve, by periodic splines through all derivatives."""
         phases = curve.start + curve.duration * np.arange(n) / n
         knots = np.append(self.phases, self.phases[0] + curve.duration)
 
@@ -93,7 +93,7 @@ def linearise(
     device, law, curve, hand
         The parts.
     phases : Array, shape (n,)
-        Where [s]; at an open curve's ends t* is held, so they have to lie inside.
+        Phases [s]; they must lie inside an open curve, since t* is clamped at its ends.
     width : float
         ε or δ of the law [m].
 
@@ -122,7 +122,7 @@ def linearise(
     piece = np.clip(np.searchsorted(breaks, phases, side="right") - 1, 0, len(breaks) - 2)
     pieces, within = curve.coefficients[piece].reshape(len(phases), -1), phases - breaks[piece]
     torques = torque_function(device, law).map(len(phases))
-    # τ is affine in the gains: the derivatives of a unit of each, less those of none.
+    # τ is affine in the gains: derivatives for unit gains minus those for zero gains.
     none, *units = (
         [_blocks(block) for block in torques(theta.T, rate.T, pieces.T, within[None], k_r, b_d, width**-2)[1:]]
         for k_r, b_d in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
@@ -143,7 +143,7 @@ def linearise(
 
 
 def _unanswered(jacobian: Array, by_theta: Array) -> Array:
-    """Orthonormal displacements of the tip that a law at rest does not answer, (n, 3, m); m is the same everywhere."""
+    """Orthonormal tip displacements without restoring force of a law at rest, (n, 3, m); m is equal at all phases."""
     stiffness = np.linalg.solve(jacobian.transpose(0, 2, 1), by_theta) @ np.linalg.inv(jacobian)
     _, sizes, rows = np.linalg.svd(stiffness)
     answered = int(np.sum(sizes[0] > _NOTHING * sizes[0, 0]))
@@ -151,7 +151,7 @@ def _unanswered(jacobian: Array, by_theta: Array) -> Array:
 
 
 def joint_motion(jacobian: Array, tip: Array) -> Array:
-    """J⁻¹ x: the motion of the joints that moves the tip by x, for each of n, shape (n, 3)."""
+    """J⁻¹ x: the joint motion that moves the tip by x, for n Jacobians and vectors, shape (n, 3)."""
     return np.asarray(np.linalg.solve(jacobian, tip[..., None])[..., 0], dtype=np.float64)
 
 

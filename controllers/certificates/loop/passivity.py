@@ -1,13 +1,13 @@
-r"""Passivity of the sampled river as its hand meets it, beside stability: it asks more, and knows nothing of the hand.
+r"""Passivity of the sampled river: a stronger property than stability, independent of the (passive) hand.
 
 A virtual wall of stiffness K and damping B on a device of damping b is passive if b > K T/2 + |B| (Colgate & Schenkel
-1997). Their general form, for a discrete impedance H(z) and all ω up to Nyquist's,
+1997). Their general form, for a discrete impedance H(z) and all ω up to the Nyquist frequency,
 
 .. math:: b > \frac{T}{2}\,\frac{1}{1 - \cos\omega T}\,\mathrm{Re}\bigl((1 - e^{-i\omega T})\,H(e^{i\omega T})\bigr)
 
-holds delay and velocity filter as they are. A wall that is quantised by Δ, on a device with Coulomb friction f_c, is
-passive for K ≤ min(2b/T, 2f_c/Δ) (Abbott & Okamura 2005). Along the curve b, f_c and Δ are the device's own, mapped to
-the tip in the directions across the curve; both conditions are for one axis, taken for the worst one.
+includes delay and velocity filter exactly. A wall with position quantisation Δ, on a device with Coulomb friction f_c,
+is passive for K ≤ min(2b/T, 2f_c/Δ) (Abbott & Okamura 2005). b, f_c and Δ are those of the device, mapped to the tip in
+the directions across the curve; both conditions are for one axis and are applied to the worst direction.
 """
 
 import numpy as np
@@ -20,16 +20,16 @@ from controllers.certificates.loop.stability import River, unstable_start
 from controllers.certificates.report import Verdict
 from controllers.state import Array
 
-DIRECTIONS = 24  # across the curve, over half a turn
-FREQUENCIES = 4000
-STIFFEST = 1e6  # [N/m] of the springs that are tried against the river
+DIRECTIONS = 24  # number of directions across the curve, over half a turn
+FREQUENCIES = 4000  # number of frequencies up to the Nyquist frequency
+STIFFEST = 1e6  # [N/m] largest of the springs that are tried as counterexamples
 
 
 def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]:
-    """The device's b [N s/m], f_c [N] and Δ [m] at the tip, across the curve, each shape (n, DIRECTIONS).
+    """The device's b [N s/m], f_c [N] and Δ [m] at the tip, in directions across the curve, each (n, DIRECTIONS).
 
     For a motion n of the tip the joints move by J⁻¹ n: b(n) = Σ D_i (J⁻¹n)_i², f_c(n) = Σ f_i |(J⁻¹n)_i|. A count
-    of one encoder moves the reading by nᵀJ_i Δ_i: Δ(n) is the largest.
+    of encoder i moves the reading by nᵀJ_i Δ_i: Δ(n) is the largest.
     """
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
@@ -43,7 +43,7 @@ def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]
 
 
 def damping_needed(k: float, b: float, sampling: Sampling) -> tuple[float, float]:
-    """Device damping [N s/m] with which stiffness k and damping b are passive, and the frequency that needs it [rad/s].
+    """Device damping [N s/m] needed for passivity of stiffness k and damping b, and the critical frequency [rad/s].
 
     The impedance is the servo's: backward difference, first-order low-pass, delay rounded up to whole periods.
     """
@@ -61,8 +61,8 @@ def passivity(river: River) -> Verdict:
     """Verdict on passivity across the curve, for any passive hand.
 
     Certified by Colgate & Schenkel's general condition at every phase, in the worst direction; refuted by a spring on
-    the stylus, which is passive, that makes the loop unstable; unknown where neither is found. The margin is the least
-    damping of the device less what is needed [N s/m].
+    the stylus, a passive hand, that makes the loop unstable; unknown otherwise. The margin is the least damping of the
+    device minus the needed one [N s/m].
     """
     linear = river.still()
     damping, coulomb, resolution = tip_friction(river, linear)

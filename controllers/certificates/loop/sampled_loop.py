@@ -1,8 +1,8 @@
-r"""One servo period of a river as a linear map, exact in time, at phases of the curve or from phase to phase of a lap.
+r"""Sampled-data loop: one servo period of a river as an exact discrete-time linear map, at phases of the curve.
 
 Encoder angles θ_k; rates ω_k = s ω_{k−1} + (1 − s)(θ_k − θ_{k−1})/T; a force F(p(θ_k), J(θ_k) ω_k) by the law;
-torques τ_k = J(θ_k)ᵀ F + N(θ_k), held for a period and late by the delay. Between the samples the linkage moves by its
-own dynamics; the zero-order hold is exact (matrix exponential, with the plant of the period's first phase).
+torques τ_k = J(θ_k)ᵀ F + N(θ_k), held for a period and delayed. Between the samples the linkage moves by its own
+dynamics; the zero-order hold is exact (matrix exponential, with the plant at the period's first phase).
 
 The state is ξ = (δθ_k, δθ̇_k, δθ_{k−1}, δω_{k−1}, δτ_{k−1}, …, δτ_{k−m}), m the delay in periods, rounded up.
 """
@@ -17,7 +17,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.state import Array
 
 _ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
-PLANT, KEPT = 6, 12  # numbers of (θ, θ̇), and of the state without delayed torques
+PLANT, KEPT = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques
 
 
 def exponentials(matrices: Array) -> Array:
@@ -42,12 +42,12 @@ def exponentials(matrices: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SampledLoop:
-    """A linearised loop under a clock, for any gains.
+    """A linearised loop with sampling, for any gains.
 
     Parameters
     ----------
     linear : LinearLoop
-        At n phases.
+        Derivatives at n phases.
     sampling : Sampling
         Period, delay and velocity filter.
     """
@@ -57,7 +57,7 @@ class SampledLoop:
 
     @property
     def size(self) -> int:
-        """Numbers of the state."""
+        """Size of the state ξ."""
         return KEPT + 3 * (self.sampling.whole_delay + (self.sampling.rest_delay > 0.0))
 
     @cached_property
@@ -65,7 +65,7 @@ class SampledLoop:
         return {}
 
     def plant(self, duration: float) -> tuple[Array, Array]:
-        """Exact response over some time: Φ (n, 6, 6) of (δθ, δθ̇), Γ (n, 6, 3) of constant joint torques."""
+        """Exact response over a duration [s]: Φ (n, 6, 6) to (δθ, δθ̇), Γ (n, 6, 3) to constant joint torques."""
         if duration not in self._responses:
             self._responses[duration] = self._response(duration)
         return self._responses[duration]
@@ -82,14 +82,14 @@ class SampledLoop:
 
     @cached_property
     def push(self) -> Array:
-        """Response of the state to a force on the tip [N] that lasts a period, shape (n, size, 3)."""
+        """Response of the state to a force on the tip [N] of one period's duration, shape (n, size, 3)."""
         response = np.zeros((len(self.linear.phases), self.size, 3))
         response[:, :PLANT] = self.plant(self.sampling.period)[1] @ self.linear.jacobian.transpose(0, 2, 1)
         return response
 
     @cached_property
     def _omega(self) -> Array:
-        """Filtered rates of this tick, by the state, shape (3, size)."""
+        """Filtered rates ω_k as a linear function of the state, shape (3, size)."""
         keep, share = self.sampling.keep, (1.0 - self.sampling.keep) / self.sampling.period
         row = np.zeros((3, self.size))
         row[:, 0:3], row[:, 6:9], row[:, 9:12] = share * np.eye(3), -share * np.eye(3), keep * np.eye(3)
@@ -97,11 +97,11 @@ class SampledLoop:
 
     @property
     def measured_velocity(self) -> Array:
-        """Velocity of the tip as filtered [m/s], by the state, shape (n, 3, size)."""
+        """Filtered velocity of the tip [m/s] as a linear function of the state, shape (n, 3, size)."""
         return self.linear.jacobian @ self._omega
 
     def force(self, k_r: float, b_d: float) -> Array:
-        """Force at the tip [N] that the law asks for, by the state, shape (n, 3, size)."""
+        """Force of the law at the tip [N] as a linear function of the state, shape (n, 3, size)."""
         linear = self.linear
         torque = (k_r * linear.unit_omega[0] + b_d * linear.unit_omega[1]) @ self._omega
         torque[:, :, :3] += k_r * linear.unit_theta[0] + b_d * linear.unit_theta[1]
@@ -109,7 +109,7 @@ class SampledLoop:
 
     @cached_property
     def _affine(self) -> tuple[Array, Array, Array]:
-        """State matrices without gains, and what a unit of k_r and of b_d adds."""
+        """State matrices at zero gains, and their derivatives by k_r and by b_d."""
         linear = self.linear
         none = np.zeros_like(linear.weight_theta)
         return (
@@ -119,7 +119,7 @@ class SampledLoop:
         )
 
     def _closed(self, by_theta: Array, by_omega: Array, own: bool) -> Array:
-        """State matrices for torques that change by `by_theta` and `by_omega`; without what is the loop's own."""
+        """State matrices for torques with the derivatives `by_theta` and `by_omega`; with `own`, plus the open loop."""
         period, size = self.sampling.period, self.size
         whole, rest = self.sampling.whole_delay, self.sampling.rest_delay
         torque = by_omega @ self._omega
@@ -127,7 +127,7 @@ class SampledLoop:
         late = np.eye(size)[KEPT:] if own else np.zeros((size - KEPT, size))
 
         def aged(age: int) -> Array:
-            """Torque of `age` ticks ago, by the state."""
+            """Torque of `age` ticks ago as a linear function of the state."""
             return torque if age == 0 else np.broadcast_to(late[3 * age - 3 : 3 * age], torque.shape)
 
         free, driven = self.plant(period - rest)
@@ -147,7 +147,7 @@ class SampledLoop:
 
     @cached_property
     def fresh(self) -> Array:
-        """Response of the state to the torques [N m] that a tick asks for, shape (n, size, 3)."""
+        """Response of the state to the torques [N m] computed at a tick, shape (n, size, 3)."""
         unit = np.broadcast_to(np.eye(3), self.linear.weight_theta.shape)
         return self._closed(unit, np.zeros(unit.shape), False)[:, :, :3]
 
@@ -155,16 +155,16 @@ class SampledLoop:
     def shifts(self) -> Array:
         """Derivatives of the whole state by the neutral displacements, shape (n, size, m)."""
         linear = self.linear
-        # The delayed torques are the weight's there, but for the inertia of the lap.
+        # The delayed torques change by those of gravity compensation, neglecting the inertia of the lap.
         weight = linear.weight_theta @ linear.shift[:, :3]
         return np.concatenate([linear.shift, np.tile(weight, (1, (self.size - KEPT) // 3, 1))], axis=1)
 
     @cached_property
     def across(self) -> tuple[Array, Array]:
-        """Directions across what is neutral, (n, size, r), and the projection onto them along it, (n, r, size).
+        """Basis transverse to the neutral displacements, (n, size, r), and the projection onto it, (n, r, size).
 
         With X the `shifts` and C the gradients of the neutral coordinates by the state, CᵀX = 1, r is ``size − m`` and
-        the projection is I − X Cᵀ, in an orthonormal basis of the kernel of Cᵀ. Of a river C is ∂t*/∂ξ.
+        the projection is I − X Cᵀ, in an orthonormal basis of the kernel of Cᵀ. For a river, C is ∂t*/∂ξ.
         """
         linear, size = self.linear, self.size
         n, m = len(linear.phases), linear.neutral.shape[2]
@@ -189,7 +189,7 @@ class SampledLoop:
         return own, stiffness, damping
 
     def frozen(self, k_r: float | Array, b_d: float | Array) -> Array:
-        """Maps across the curve with the phase held, shape (n, r, r); gains may be given for each phase, (n,)."""
+        """Transverse state matrices with the phase frozen, shape (n, r, r); gains may be given per phase, (n,)."""
         own, stiffness, damping = self._frozen
         return own + np.reshape(k_r, (-1, 1, 1)) * stiffness + np.reshape(b_d, (-1, 1, 1)) * damping
 
@@ -198,11 +198,11 @@ class SampledLoop:
         return np.abs(np.linalg.eigvals(self.frozen(k_r, b_d))).max(axis=1)
 
     def multipliers(self, k_r: float, b_d: float, periods: int) -> Array:
-        """Floquet multipliers of a lap across the curve, complex, shape (r,), the largest first.
+        """Floquet multipliers of a lap transverse to the curve, complex, shape (r,), the largest first.
 
-        For a closed curve whose phases are `periods` periods apart; between them the maps are those of the earlier
-        phase. Products of a thousand maps underflow, so they are scaled on the way, and multipliers below 1e-14 of the
-        largest are noise.
+        For a closed curve with phases `periods` periods apart; between them the maps are those of the earlier phase.
+        Products of a thousand maps underflow, so they are rescaled on the way; multipliers below 1e-14 of the largest
+        are noise.
         """
         basis, projection = self.across
         steps = np.roll(projection, -1, axis=0) @ np.linalg.matrix_power(self.matrices(k_r, b_d), periods) @ basis

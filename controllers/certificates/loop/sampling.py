@@ -1,4 +1,4 @@
-"""The clock of a servo."""
+"""Sampling of a servo: period, delay and velocity filter."""
 
 import math
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from controllers.errors import ParameterError
 
 @dataclass(frozen=True)
 class Sampling:
-    """Clock of the servo: how often it samples, how late its torques come, and how it filters velocities.
+    """Sampling period, delay and velocity filter of the servo.
 
     Parameters
     ----------
     period : float
         T [s].
     delay : float
-        From a sample to its torque [s]; need not be a multiple of T.
+        Time from a sample to its torque [s]; need not be a multiple of T.
     cutoff : float
         Corner frequency of the velocity filter [Hz].
 
@@ -48,6 +48,6 @@ class Sampling:
 
     @property
     def rest_delay(self) -> float:
-        """What is left of the delay [s]; nothing if it is a whole number of periods."""
+        """Delay beyond whole periods [s], in [0, T)."""
         rest = self.delay - self.whole_delay * self.period
         return rest if rest > 1e-9 * self.period else 0.0

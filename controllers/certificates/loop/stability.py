@@ -1,4 +1,4 @@
-"""Stability of a river under its clock: critical gains and delay, Floquet multipliers, and the verdict."""
+"""Stability of a river in the sampled-data loop: critical gains, delay margin, Floquet multipliers, and the verdict."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,16 +17,16 @@ from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
-MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] no device gives more, so the searches end here
-GRID = 40  # gains tried before bisection
-PHASES = 48
-LAP_PHASES = 400  # for the multipliers of a lap
-CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # shares to which the limiter may cut a force
+MOST_STIFFNESS, MOST_DAMPING = 1e6, 1e4  # [N/m], [N s/m] upper ends of the searches, beyond any device
+GRID = 40  # gains on the grid before bisection
+PHASES = 48  # phases of the curve at which the loop is examined
+LAP_PHASES = 400  # phases for the Floquet multipliers of a lap
+CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may reduce a force
 LATEST = 16  # periods of delay at which the search for the delay margin ends
 
 
 class River(NamedTuple):
-    """What is certified: law and gains, curve, device and clock."""
+    """System to be certified: law, gains and width (ε or δ [m]), curve, device and sampling."""
 
     law: Law
     k_r: float
@@ -43,15 +43,15 @@ class River(NamedTuple):
         return self.curve.start + self.curve.duration * (np.arange(n) + 0.5) / n
 
     def moving(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
-        """The loop linearised at `phases`, moving along the curve at its pace."""
+        """The loop linearised at `phases`, about motion along the curve at its own pace."""
         return linearise(self.device, self.law, self.curve, self.phases(), hand, self.width)
 
     def still(self, hand: HandImpedance = NO_HAND) -> LinearLoop:
-        """The loop linearised at `phases` of a curve as slow as if it stood still."""
+        """The loop linearised at `phases`, about (practically) rest on the curve: its motion slowed down 10⁶ times."""
         return self.still_at(self.phases(), hand)
 
     def still_at(self, phases: Array, hand: HandImpedance = NO_HAND) -> LinearLoop:
-        """Likewise at other phases [s]."""
+        """As `still`, at other phases [s]."""
         slow, curve = 1e6, self.curve
         times, places = slow * np.asarray(curve.times, dtype=np.float64), slow * phases
         standing = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
@@ -59,22 +59,22 @@ class River(NamedTuple):
 
 
 def _onset(stable: npt.NDArray[np.bool_], grid: Array) -> tuple[Array, Array]:
-    """Neighbours of the grid between which each column of `stable`, (grid, n), is lost first; inf if it never is."""
+    """Neighbours of the grid between which each column of `stable`, (grid, n), first becomes false; inf if never."""
     first = np.where(np.all(stable, axis=0), len(grid), np.argmin(stable, axis=0))
     ends = np.append(grid, np.inf)
     return ends[np.maximum(first - 1, 0)], ends[first]
 
 
 def neighbours(values: Array, periodic: bool) -> tuple[Array, Array]:
-    """Values at phases, along the last axis, and at the next phase; of a closed curve the first follows the last."""
+    """Values at phases, along the last axis, and those at the next phase (cyclic for a closed curve)."""
     after = np.roll(values, -1, axis=-1)
     return (values, after) if periodic else (values[..., :-1], after[..., :-1])
 
 
 def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
-    """Smallest k_r [N/m] from `least` on at which the loop is unstable with the phase held, at every phase, shape (n,).
+    """Smallest unstable k_r ≥ `least` [N/m] at every phase, with the phase frozen, shape (n,).
 
-    Infinite where it is stable up to `MOST_STIFFNESS`; `least` where it is unstable there already.
+    Infinite where the loop is stable up to `MOST_STIFFNESS`; `least` where it is unstable there already.
     """
     grid = np.geomspace(least, MOST_STIFFNESS, GRID)
     low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for k_r in grid]), grid)
@@ -86,7 +86,7 @@ def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Arr
 
 
 def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
-    """Smallest b_d [N s/m] from `least` on at which the loop is unstable with the phase held, shape (n,)."""
+    """Smallest unstable b_d ≥ `least` [N s/m] at every phase, with the phase frozen, shape (n,)."""
     grid = np.geomspace(least, MOST_DAMPING, GRID)
     low, high = _onset(np.array([loop.radius(k_r, b_d) < 1.0 for b_d in grid]), grid)
     for _ in range(24):
@@ -97,7 +97,7 @@ def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
 
 
 def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
-    """Delay [s] beyond the loop's own at which it is first unstable at some phase; inf beyond `LATEST` periods."""
+    """Additional delay [s] at which the loop first becomes unstable at some phase; inf beyond `LATEST` periods."""
     period, delay = loop.sampling.period, loop.sampling.delay
 
     def stable(extra: float) -> bool:
@@ -116,25 +116,25 @@ def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
 
 
 def lap_multipliers(river: River, linear: LinearLoop) -> Array:
-    """Floquet multipliers of a lap across the curve, complex, the largest first; of a loop that moves along it."""
+    """Floquet multipliers of a lap transverse to the curve, complex, the largest first; `linear` moves along it."""
     periods = max(1, round(river.curve.duration / river.sampling.period / LAP_PHASES))
     n = max(1, round(river.curve.duration / river.sampling.period / periods))
     return SampledLoop(linear.lap(river.curve, n), river.sampling).multipliers(river.k_r, river.b_d, periods)
 
 
 class _WithHands(NamedTuple):
-    """The loop with every one of some hands.
+    """Results for the loop with each of several hands.
 
     Attributes
     ----------
     critical : Array
         Critical k_r at every phase [N/m], shape (hands, phases).
     bound : float
-        Largest spectral radius at a phase, with its change to the next one.
+        Largest spectral radius at a phase plus its change to the next phase.
     cut : float
-        Largest spectral radius where the limiter cuts the force to one of `CUTS`.
+        Largest spectral radius with the gains reduced to one of `CUTS`.
     multiplier : float or None
-        Largest Floquet multiplier of a lap; None where the hand is not carried round a closed curve.
+        Largest modulus of a Floquet multiplier of a lap; None where the hand is not carried round a closed curve.
     """
 
     critical: Array
@@ -143,7 +143,7 @@ class _WithHands(NamedTuple):
     multiplier: float | None
 
     def worst(self, hands: Sequence[HandImpedance]) -> tuple[float, HandImpedance, int]:
-        """Least critical k_r [N/m], with which hand, and at which phase."""
+        """Least critical k_r [N/m], its hand, and the index of its phase."""
         who, at = divmod(int(self.critical.argmin()), self.critical.shape[1])
         least = float(self.critical[who, at])
         return least, hands[who] if np.isfinite(least) else NO_HAND, at
@@ -155,7 +155,7 @@ class _WithHands(NamedTuple):
 
 
 def _with_hands(river: River, hands: Sequence[HandImpedance]) -> _WithHands:
-    """Look at the loop with every hand."""
+    """Evaluate the loop with every hand."""
     critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
@@ -169,12 +169,13 @@ def _with_hands(river: River, hands: Sequence[HandImpedance]) -> _WithHands:
 
 
 def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
-    """Verdict on the river's linear stability along its curve, for every one of some hands.
+    """Verdict on the river's linear stability along its curve, for each of several hands.
 
-    Certified: at every phase on a grid and with every hand, k_r stays below what is critical there by more than the
-    critical value changes to the neighbouring phase, or, where that jumps, the spectral radius below 1 by more than it
-    changes; and where the hand is carried round a closed curve, the Floquet multipliers of the lap lie inside the unit
-    circle; and with all gains lowered alike, as by the limiter, it is stable too. The margin is (critical k_r)/k_r − 1.
+    Certified if, with every hand, three conditions hold. At every phase of a grid, k_r is below the critical value by
+    more than the change of that value to the neighbouring phase; or, where the critical value jumps, the spectral
+    radius is below 1 by more than its own change. Where the hand is carried round a closed curve, the Floquet
+    multipliers of the lap lie inside the unit circle. With all gains reduced alike, as by the limiter, the loop is
+    stable too. The margin is (critical k_r)/k_r − 1.
     """
     found = _with_hands(river, hands)
     least, hand, at = found.worst(hands)
@@ -199,7 +200,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
 
 
 def _doubt(river: River, found: _WithHands, least: float) -> str | None:
-    """Why a river whose k_r is below the least critical one is not certified, if it is not."""
+    """Reason why a river with k_r below the least critical value is not certified; None if it is."""
     if found.multiplier is not None and found.multiplier >= 1.0:
         return f"stable with the phase held, but a multiplier of the lap is {found.multiplier:.4g}"
     if found.cut >= 1.0:
@@ -211,7 +212,7 @@ def _doubt(river: River, found: _WithHands, least: float) -> str | None:
 
 
 def _figures(river: River, found: _WithHands) -> dict[str, object]:
-    """What is kept beside the verdict; what no hand is named with is of a stylus without one."""
+    """Figures of the verdict; radius, decay rate, critical damping and delay margin are for a stylus without a hand."""
     bare = SampledLoop(river.still(), river.sampling)
     radius = bare.radius(river.k_r, river.b_d)
     return {
@@ -228,16 +229,15 @@ def _figures(river: River, found: _WithHands) -> dict[str, object]:
 
 
 def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
-    """Where, with which hand and from which state ξ a river that is unstable at one of its phases grows, and how fast.
+    """Counterexample of a river that is unstable at one of its phases: phase, place, hand, state ξ and growth rate.
 
     Parameters
     ----------
     river : River
-        Of the law.
     hand : HandImpedance
-        On the stylus.
+        Hand on the stylus.
     at : int
-        Which phase.
+        Index of the phase.
     """
     state, growth = growing_mode(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d, at)
     phase = float(river.phases()[at])
@@ -247,14 +247,14 @@ def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, obje
 def slowest_mode(
     loop: SampledLoop, k_r: float, b_d: float, at: int, swings: bool = False
 ) -> tuple[complex, npt.NDArray[np.complex128]]:
-    """Multiplier and complex state ξ of the slowest (or growing) mode at one phase, of those that swing if so asked.
+    """Eigenvalue and complex state ξ of the slowest (or growing) mode at one phase; `swings`: of oscillating modes.
 
-    Its tip swings by 1 m.
+    The mode is scaled to an amplitude of 1 m at the tip.
     """
     values, vectors = np.linalg.eig(loop.frozen(k_r, b_d)[at])
     largest = int(np.argmax(np.where(swings & (np.abs(np.angle(values)) < 1e-3), 0.0, np.abs(values))))
     mode = loop.across[0][at] @ vectors[:, largest]
-    # Turned to where its tip is farthest off, so that the real part is that moment.
+    # Its complex phase is chosen such that the real part is the moment of the largest displacement of the tip.
     away = loop.linear.jacobian[at] @ mode[:3]
     turns = np.exp(1j * np.linspace(0.0, np.pi, 64, endpoint=False))
     reaches = np.linalg.norm((away * turns[:, None]).real, axis=1)
@@ -263,12 +263,12 @@ def slowest_mode(
 
 
 def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Array, float]:
-    """State ξ in the slowest (or growing) mode at one phase, its tip 1 mm off, and its growth rate [1/s]."""
+    """State ξ in the slowest (or growing) mode at one phase, with the tip 1 mm off, and the growth rate [1/s]."""
     value, mode = slowest_mode(loop, k_r, b_d, at)
     return 1e-3 * mode.real, float(np.log(np.abs(value))) / loop.sampling.period
 
 
 def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
-    """Critical k_r [N/m] for each of some b_d, the least over the phases, shape as `damping`."""
+    """Stability boundary: critical k_r [N/m], the least over the phases, for each b_d in `damping` [N s/m]."""
     loop = SampledLoop(river.still(hand), river.sampling)
     return np.array([critical_stiffness(loop, float(b_d)).min() for b_d in damping])

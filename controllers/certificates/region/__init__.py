@@ -1,1 +1,1 @@
-"""Certificates of a region about a curve: Lyapunov functions checked by interval bounds."""
+"""Certificates of a region of attraction about a curve: Lyapunov functions checked by interval bounds."""

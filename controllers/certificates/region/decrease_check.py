@@ -1,4 +1,4 @@
-"""Whether a Lyapunov function of `lyapunov` decreases everywhere in a cell of masses and hands, by interval bounds."""
+"""Check by interval bounds that a Lyapunov function of `lyapunov` decreases in a whole cell of masses and hands."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,17 @@ from controllers.state import Array
 
 
 class Checked(NamedTuple):
-    """Cells on which the decrease was checked, and by how much a corner's matrix may differ from one inside [1/s]."""
+    """Result of a check.
+
+    Attributes
+    ----------
+    cells : int
+        Number of parts that the cell was divided into.
+    slack : float
+        Largest bound of the interpolation error of a matrix within a part [1/s].
+    least : float
+        Least eigenvalue at corners minus slack [1/s]; the decrease is proved if it is positive.
+    """
 
     cells: int
     slack: float
@@ -19,11 +29,11 @@ class Checked(NamedTuple):
 
 
 def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, int]) -> Checked:
-    """Whether a form decreases everywhere in a cell: `least` is positive, the least eigenvalue on corners less `slack`.
+    """Check that a form decreases in a whole cell, divided into `counts` parts along each parameter.
 
-    On each of the cells' parts a matrix differs from what is interpolated between its corners, entry by entry, by at
-    most Σ h_i²/8 sup|∂²/∂z_i²|; the suprema are interval bounds of CasADi's second derivatives over the whole part.
-    What is interpolated between positive definite matrices is positive definite.
+    On each part the matrix differs from the multilinear interpolation between its corners, entry by entry, by at most
+    Σ h_i²/8 sup|∂²/∂z_i²|; the suprema are interval bounds of CasADi's second derivatives over the whole part. The
+    interpolation between positive definite matrices is positive definite.
     """
     z = ca.SX.sym("z", PARAMETERS + 1)
     a, p = axis.matrix(z), form.matrix(z)
@@ -35,7 +45,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
     parts = np.stack(np.meshgrid(*(np.arange(len(edge) - 1) for edge in edges), indexing="ij"), axis=-1)
     parts = parts.reshape(-1, PARAMETERS)
     low, high = (np.stack([edges[i][parts[:, i] + k] for i in range(PARAMETERS)], axis=1) for k in (0, 1))
-    # A larger lever only makes the columns of the forces longer: over a part it is taken at its largest.
+    # A larger lever only makes the columns of the forces longer, so each part uses its largest lever.
     levers = cell.lever(high[:, :1])
     low, high = np.hstack([low, levers]), np.hstack([high, levers])
     checked = [
@@ -46,7 +56,7 @@ def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, 
 
 
 def _check_parts(rows: list[list[Any]], z: Any, low: Array, high: Array) -> tuple[float, float]:
-    """Largest slack on some parts, and least eigenvalue on corners less slack."""
+    """Largest slack over the parts, and least value of (least eigenvalue at corners − slack)."""
     matrix = ca.vertcat(*(ca.horzcat(*row) for row in rows))
     curvature = np.zeros((len(low), len(rows), len(rows)))
     for i in range(PARAMETERS):

@@ -11,14 +11,14 @@ from controllers.state import Array
 
 
 class Interval(NamedTuple):
-    """[low, high], one for each of n boxes, shapes (n,)."""
+    """Intervals [low, high], one for each of n boxes, shapes (n,)."""
 
     low: Array
     high: Array
 
 
 def _outwards(low: Array, high: Array) -> Interval:
-    """Two units in the last place are more than any operation here is rounded by."""
+    """Interval widened by two units in the last place, more than the rounding error of any operation here."""
     return Interval(low - 4e-16 * np.abs(low) - 1e-300, high + 4e-16 * np.abs(high) + 1e-300)
 
 
@@ -54,7 +54,7 @@ def _root(a: Interval) -> Interval:
 
 
 def _cosine(a: Interval) -> Interval:
-    """Ends, and ±1 where an interval holds a multiple of π."""
+    """Values at the ends, and ±1 where an interval contains a multiple of π."""
     first, second = np.cos(a.low), np.cos(a.high)
     low, high = np.minimum(first, second), np.maximum(first, second)
     turns = np.ceil(a.low / np.pi - 1e-12)
@@ -84,25 +84,25 @@ _BINARY: dict[int, Callable[[Interval, Interval], Interval]] = {
 
 
 def bounds(function: Any, low: Array, high: Array) -> tuple[Array, Array]:
-    """Bounds of all values that a function takes on boxes.
+    """Bounds of the values of a function on boxes.
 
     Parameters
     ----------
     function : casadi.Function
-        Of one vector of m numbers; one dense result of r rows and c columns.
+        Function of one vector of m numbers, with one dense result of r rows and c columns.
     low, high : Array, shape (n, m)
         Corners of the boxes.
 
     Returns
     -------
     low, high : Array, shape (n, r, c)
-        No value lies outside; how far inside they lie depends on how the expression is written.
+        No value lies outside these; how tight they are depends on how the expression is written.
 
     Raises
     ------
     CertificateError
-        If the function uses an operation other than + − × ÷, squares, roots, sine and cosine, or is divided by an
-        interval that holds zero.
+        If the function uses an operation other than + − × ÷, squares, roots, sine and cosine, divides by an interval
+        that contains zero, or takes the root of one that contains negative numbers.
     """
     work: dict[int, Interval] = {}
     n, shape = len(low), function.size_out(0)
@@ -126,12 +126,12 @@ def bounds(function: Any, low: Array, high: Array) -> tuple[Array, Array]:
             work[kept[0]] = _divide(Interval(one, one), work[given[0]])
         else:
             raise CertificateError(f"no interval arithmetic for operation {operation} of CasADi")
-    # CasADi counts down the columns.
+    # CasADi stores matrices column by column.
     least, most = (part.reshape(n, shape[1], shape[0]).transpose(0, 2, 1) for part in result)
     return least, most
 
 
 def spectral_bound(low: Array, high: Array) -> Array:
-    """Largest singular value that a matrix between two bounds can have, shape (n, r, c) → (n,)."""
+    """Upper bound on the largest singular value of a matrix between two entrywise bounds, shape (n, r, c) → (n,)."""
     middle, radius = 0.5 * (low + high), 0.5 * (high - low)
     return np.linalg.norm(middle, ord=2, axis=(1, 2)) + np.linalg.norm(radius, axis=(1, 2))

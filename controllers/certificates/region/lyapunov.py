@@ -1,29 +1,31 @@
 r"""A Lyapunov function of the sampled loop about its curve, found by IPOPT; `decrease_check` checks it on cells.
 
-State at a tick: x = (e, ν, y, f_1 … f_m). e = p − φ(t*); ν and y are the velocity and the filtered velocity less
-λφ̇, the pace that the hand comes to; f are the forces of the last m ticks that are still on their way. With Λ(θ) the
-mass of linkage and hand at the tip,
+State at a tick: x = (e, ν, y, f_1 … f_m). e = p − φ(t*); ν and y are the velocity and the filtered velocity minus λφ̇,
+the steady velocity of the hand; f are the delayed forces of the last m ticks. With Λ(θ) the mass of linkage and hand
+at the tip,
 
 .. math:: V(x) = \sum_{ab} x_a^T (\alpha_{ab} I + \beta_{ab} \Lambda(\theta))\, x_b
 
-In the eigenvectors of Λ the loop falls apart into single axes of a mass μ, an eigenvalue, with x⁺ = A(μ) x and
-P(μ) = α + βμ. Only e's share along the curve, which the nearest point takes away, τ = φ̇·e⁺/|φ̇|, couples them. With
-p_e(μ) = P(μ)ε_e, a_e the row of A that gives e⁺ less ε_e, q ≥ p_ee, and any σ > 0 and γ, taking it away costs at most
+In the eigenvectors of Λ the loop decouples into single axes of mass μ, an eigenvalue, with x⁺ = A(μ) x and
+P(μ) = α + βμ. They are coupled only by the component of e along the curve, τ = φ̇·e⁺/|φ̇|, which the update of the
+nearest point removes. With p_e(μ) = P(μ)ε_e, a_e the row of A that gives e⁺ minus ε_e, q ≥ p_ee, and any σ > 0 and γ,
+this removal changes V by at most
 
 .. math:: V(x^+) - V(\tilde x^+) \le \tfrac{1}{4\sigma} \textstyle\sum_i (h(\mu_i)^T x_i)^2, \qquad
           h = (\sigma + q)\,a_e - 2A^T p_e + \gamma\,\varepsilon_e
 
-(−ab ≤ (σa − b)²/4σ, Cauchy's inequality over the axes, and Σ φ̇_i e_i = 0, which γ makes use of). So V falls to ρ²V if
+(−ab ≤ (σa − b)²/4σ, Cauchy's inequality over the axes, and Σ φ̇_i e_i = 0, which γ exploits). So V decreases to ρ²V if
 
 .. math:: \begin{pmatrix} \rho^2 P - A^T P A & h \\ h^T & 4\sigma \end{pmatrix} \succeq 0
           \quad\text{for every } \mu,\ \text{and } (b_h, k_h, w)
 
-of damping and stiffness of the hand and the window's share: a matrix of four numbers' cells, whatever the curve.
+of damping and stiffness of the hand and the window's value w: a matrix inequality over cells of four parameters
+(μ, b_h, k_h, w), independent of the curve.
 
-Forces w that the axes leave out, in newtons and in the metric of the device's own mass Λ, are more columns of A: of B,
-what a force of 1 N does in a period. With T s_c in their part of the matrix V falls to ρ²V + T Σ s_c |w_c|². A force
-that changes in a period does what the mean of kicks at all its moments would, and V is convex: so kicks at its
-beginning and at its end stand for all.
+Forces w_c that the decoupled axes neglect, in newtons and in the metric of the device's own mass Λ, enter as
+additional columns B, the response to a force of 1 N over a period. With T s_c in their part of the matrix, V falls to
+ρ²V + T Σ s_c |w_c|². A force that varies within a period acts like the mean of impulses at all its moments, and V is
+convex, so it suffices to consider impulses at the beginning and at the end.
 """
 
 from collections.abc import Sequence
@@ -34,19 +36,19 @@ import numpy as np
 
 from controllers.state import Array
 
-SERIES = 12  # terms of the exponential of a period: what is left out is below 1e-9 while b_h T/μ < 1
-LENGTH = 0.01  # [m] that forms are scaled by, to be well conditioned
-MASSES = 3  # at which the program asks for decrease; the cells ask for it everywhere
-_HEAVY, _VISCOUS, _STIFF = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] that the unknowns are scaled by
-FILTER_WEIGHT = 10.0  # how much what the filter holds counts: it passes in a period or two
-SPEED_WEIGHT = 0.25  # how much size in velocity counts against size in place
-PUSH_WEIGHT = 10.0  # how much the level that the forces left out hold up counts against size
+SERIES = 12  # terms of the exponential of a period: the remainder is below 1e-9 while b_h T/μ < 1
+LENGTH = 0.01  # [m] scale of the forms, for conditioning
+MASSES = 3  # masses at which the optimisation imposes the decrease; the check imposes it everywhere
+_HEAVY, _VISCOUS, _STIFF = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
+FILTER_WEIGHT = 10.0  # weight of the size in the filter's state, which decays in a period or two
+SPEED_WEIGHT = 0.25  # weight of the size in velocity relative to that in position
+PUSH_WEIGHT = 10.0  # weight of the level sustained by the neglected forces relative to size
 PARAMETERS = 4  # of an axis: μ, b_h, k_h, w
-CHANNELS = 2  # of forces that are left out: in newtons, and in the metric
+CHANNELS = 2  # of neglected forces: in newtons, and in the metric
 
 
 class Axis(NamedTuple):
-    """One axis of the loop: gains k [N/m], b [N s/m], period T [s], the filter's s, and periods of delay."""
+    """One axis of the loop: gains k [N/m], b [N s/m], period T [s], the filter's s, delay in periods, `Law.slides`."""
 
     stiffness: float
     damping: float
@@ -57,7 +59,7 @@ class Axis(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Numbers of the state of an axis."""
+        """Size of the state of an axis."""
         return 3 + self.delay
 
     @property
@@ -95,9 +97,9 @@ class Axis(NamedTuple):
         return np.array(self.matrix(z), dtype=np.float64)
 
     def pushes(self, a: Any, mass: Any, lever: Any, units: Sequence[float], early: bool) -> list[list[Any]]:
-        """B as rows, for A(μ), in units of `scale` and of the forces' `units`: kicks at a period's beginning or end.
+        """B as rows, for A(μ), in units of `scale` and of the forces' `units`: impulses at the period's begin or end.
 
-        A kick at the beginning is a change of ν. `lever` is √(the device's own share of μ) [√kg].
+        An impulse at the beginning is a change of ν. `lever` is √(the device's own share of μ) [√kg].
         """
         kick = [a[i][1] if early else float(i == 1) for i in range(self.size)]
         size = [self.period * unit / (mass * self.scale[1]) for unit in units]
@@ -105,7 +107,7 @@ class Axis(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Intervals of μ [kg], b_h [N s/m], k_h [N/m] and w in which one form has to do, and the device's largest mass."""
+    """Intervals of μ [kg], b_h [N s/m], k_h [N/m] and w for one form, and the device's largest and least mass [kg]."""
 
     low: Array
     high: Array
@@ -117,16 +119,16 @@ class Cell(NamedTuple):
         return np.sqrt(np.minimum(self.own, mass - (self.low[0] - self.lightest)))
 
     def corners(self, masses: int = MASSES) -> Array:
-        """Some masses, with every corner of the rest, shape (n, 4)."""
+        """A number of masses, combined with every corner of the other parameters, shape (n, 4)."""
         grid = np.geomspace(self.low[0], self.high[0], masses)
         ends = [np.unique([self.low[i], self.high[i]]) for i in range(1, PARAMETERS)]
         return np.stack(np.meshgrid(grid, *ends, indexing="ij"), axis=-1).reshape(-1, PARAMETERS)
 
 
 class Form(NamedTuple):
-    """V: α, β, what the hand adds to e's part, in units of `Axis.scale`; ρ = e^{−rate T}, σ, q, γ, s of its decrease.
+    """V: α, β and the hand's terms for e, in units of `Axis.scale`; ρ = e^{−rate T}, σ, q, γ and s_c of its decrease.
 
-    `units` are those of the forces that s belongs to, in newtons and in the metric [N/√kg].
+    `units` are the units of the neglected forces of s_c, [N] and in the metric [N/√kg].
     """
 
     alpha: Array
@@ -140,7 +142,7 @@ class Form(NamedTuple):
     units: Sequence[float]
 
     def matrix(self, z: Any) -> list[list[Any]]:
-        """P(μ, b_h, k_h), symbols or numbers: α + βμ, and e's part of the hand's damping and stiffness."""
+        """P(μ, b_h, k_h), symbols or numbers: α + βμ, plus terms of the hand's damping and stiffness for e."""
         n = len(self.alpha)
         added = self.hand[0] * z[1] + self.hand[1] * z[2]
         return [
@@ -154,9 +156,9 @@ class Form(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What {V ≤ 1} has to stay within: the law's force [N], the distance from the curve [m] and the speed [m/s].
+    """Limits of {V ≤ 1}: the law's force [N], the distance from the curve [m] and the speed [m/s].
 
-    `pushes` are forces that the axes leave out, about as large as they will be [N], [N/√kg]: V is chosen for them.
+    `pushes` are estimates of the neglected forces [N], [N/√kg], for which V is optimised.
     """
 
     force: float
@@ -177,9 +179,9 @@ def _congruent(a: Any, p: Any) -> list[list[Any]]:
 
 
 def decrease(axis: Axis, a: Any, pushes: Any, p: Any, form: Form) -> list[list[Any]]:
-    """The matrix of the module over T, of A, B and P as lists of lists; the last row is scaled to be of its size.
+    """The matrix of the module, divided by T, from A, B and P as lists of lists; its last row is scaled.
 
-    An axis that does not slide has no h.
+    For an axis that does not slide there is no row h.
     """
     n, t = axis.size, axis.period
     whole = [[*a[i], *pushes[i]] for i in range(n)]
@@ -207,10 +209,10 @@ def decrease(axis: Axis, a: Any, pushes: Any, p: Any, form: Form) -> list[list[A
 
 
 def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | None:
-    """The form of a large level set that decreases at a rate [1/s] on the corners of a cell; None if none is found.
+    """A form with a large level set that decreases at a rate [1/s] on the corners of a cell; None if none is found.
 
-    What has to be positive definite is linear in the unknowns: IPOPT minimises s, then the size's inverse, with a
-    barrier −Σ log det(M + s I); it begins inside, with s large.
+    The matrices M that must be positive definite are linear in the unknowns. IPOPT first minimises s, then the inverse
+    of the level set's size, with a barrier −Σ log det(M + s I); it starts from an interior point, with s large.
     """
     n, scale, entries = axis.size, axis.scale, axis.size * (axis.size + 1) // 2
     x, s = ca.SX.sym("x", 2 * entries + 6 + CHANNELS), ca.SX.sym("s")
@@ -266,7 +268,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
 
 
 def _pivots(matrix: Any, shift: Any) -> list[Any]:
-    """Logarithms of the pivots of M + s I: log det, and not finite unless it is positive definite."""
+    """Logarithms of the pivots of M + s I, which sum to log det; not finite unless it is positive definite."""
     rows = [[matrix[i][j] + (shift if i == j else 0.0) for j in range(len(matrix))] for i in range(len(matrix))]
     logs: list[Any] = []
     for k in range(len(rows)):

@@ -1,13 +1,13 @@
-r"""A region about the curve from which the loop that runs comes near to it: its Lyapunov certificate.
+r"""Certified region of attraction about the curve, for the executed loop, by a Lyapunov function.
 
-`lyapunov` finds V and checks its decrease, `tube_bounds` says what the device can do in a tube, `remainder` what the
-frozen axes leave out. With these, on {√V ≤ ℓ},
+`lyapunov` finds V, `decrease_check` checks its decrease, `tube_bounds` bounds the device's kinematics and dynamics in a
+tube, `remainder` bounds what the decoupled axes with frozen inertia neglect. With these, on {√V ≤ ℓ},
 
 .. math:: \|x^+\| \le f_\ell(\|x\|), \qquad
           f_\ell(v) = \sqrt{e^{-2rT} v^2 + T \textstyle\sum_c s_c w_c^2(\ell)} + T\,(r_0(\ell)\,v + \delta(\ell)),
 
-so the set is never left if f_ℓ(ℓ) < ℓ. From it √V falls to a level ℓ' if between neighbours ℓ_i < ℓ_{i+1} of a grid
-f(v) < v at v = ℓ_i, with all that is left out as at ℓ_{i+1}: v − f(v) grows with v.
+so the set is invariant if f_ℓ(ℓ) < ℓ. From it √V falls to a level ℓ' if, for all neighbours ℓ_i < ℓ_{i+1} of a grid
+down to ℓ', f(v) < v at v = ℓ_i with the remainder of ℓ_{i+1}, since v − f(v) increases with v.
 """
 
 from itertools import product
@@ -26,17 +26,17 @@ from controllers.certificates.report import CertificateError, Verdict
 from controllers.fields.window import window
 from controllers.state import Array
 
-RADIUS, SPEED = 0.006, 0.25  # [m], [m/s] that a region stays within: beyond, bounds of what is left out grow faster
-SHARES = (0.82, 0.6)  # of the slowest axis' own rate that a form is asked for
+RADIUS, SPEED = 0.006, 0.25  # [m], [m/s] limits of a region: beyond, the bounds of the remainder grow too fast
+SHARES = (0.82, 0.6)  # required rates of a form, as shares of the slowest axis' own rate
 FIRM = 0.2  # share of the hands' intervals that is the firm part: the most mass and damping, the least stiffness
-LEVELS = 40  # of √V between 0 and 1
-HALF = 0.5  # level at which is told what is too much
-PARTS = (160, 8, 4, 1)  # of a cell of hands along μ, b_h, k_h, w
-BACKED_OFF = (0.97, 0.93, 0.85)  # of the rate that was asked for, as the check of the cells needs room
+LEVELS = 40  # grid of √V between 0 and 1
+HALF = 0.5  # level at which the remainder is reported if there is no region
+PARTS = (160, 8, 4, 1)  # parts of a cell of hands along μ, b_h, k_h, w
+BACKED_OFF = (0.97, 0.93, 0.85)  # shares of the required rate that are tried, since the check needs some margin
 
 
 class Found(NamedTuple):
-    """A form that was checked, its level ℓ, the level of the ball that is reached, and the remainder at ℓ."""
+    """A checked form, its level ℓ, the level of the ball that is reached, and the remainder at ℓ."""
 
     form: Form
     checked: Checked
@@ -47,11 +47,11 @@ class Found(NamedTuple):
 
     @property
     def held_up(self) -> float:
-        """Level at which the forces that are left out would hold √V up by themselves."""
+        """Level at which the neglected forces alone would sustain √V."""
         return float(np.sqrt(_lifted(self.form, self.rest) / (2.0 * self.form.rate)))
 
     def offsets(self, axis: Axis) -> tuple[float, float]:
-        """Largest offset at the curve's pace [m] and largest wrong speed on the curve [m/s] that are surely inside."""
+        """Largest offset at the curve's pace [m] and largest speed error on the curve [m/s] surely in the region."""
         blocks = np.array([np.diag(self.form.numbers(z)) for z in self.cell.corners(2)]).max(axis=0)
         inside = max(0.0, self.level - self.rest.shift)
         both = np.array([self.form.numbers(z)[1:3, 1:3].sum() for z in self.cell.corners(2)]).max()
@@ -67,7 +67,7 @@ def _lifted(form: Form, rest: Remainder) -> float:
 def _levels(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, limits: Limits
 ) -> tuple[float, float]:
-    """Largest ℓ that is not left, and the level of the ball; zeros if there is none."""
+    """Largest invariant level ℓ, and the level of the ball that is reached; zeros if there is none."""
     grid = np.arange(LEVELS + 1) / LEVELS
     held, falls = [False], [False]
     for i in range(1, LEVELS + 1):
@@ -91,7 +91,7 @@ def _levels(
 
 
 def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
-    """The form with the largest of a few rates, and the least of its gains, at which every part of the cell passes."""
+    """The form with the largest of a few reduced rates (and raised gains s_c) at which all parts of the cell pass."""
     for share in BACKED_OFF:
         gains = tuple(gain / share for gain in form.gains)
         slower = form._replace(rate=share * form.rate, gains=gains)
@@ -102,25 +102,25 @@ def _checked(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
 
 
 class Search(NamedTuple):
-    """What came of it: a form whose set is not left, and one whose frozen axes decrease; None where there is none."""
+    """Result: a form with an invariant set, and one that decreases for frozen inertia; None where there is none."""
 
     found: Found | None
     frozen: Found | None
 
 
 def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
-    """A form for all hands of some intervals at once.
+    """Search for one form for all hands of given intervals.
 
     Parameters
     ----------
     river, axis
         The loop.
     tube : TubeBounds
-        What the device can do within `RADIUS`.
+        Bounds of the device within `RADIUS`.
     hands : HandRange
-        Their masses come on top of the device's own.
+        Intervals of the hands; their masses add to the device's own.
     ceiling : float
-        The limiter's [N].
+        Ceiling of the limiter [N].
     """
     frozen: Found | None = None
     carries = river.law.carries
@@ -153,7 +153,7 @@ def _radius(axis: Axis, z: Array) -> float:
 
 
 def _expected(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple[float, float]:
-    """Forces about as large as those that the axes leave out near the curve [N], [N/√kg]."""
+    """Estimates of the neglected forces near the curve [N], [N/√kg]."""
     shift = axis.damping / cell.low[0] * tube.rounding
     friction = tube.coulomb + (axis.damping + cell.high[1]) * shift + axis.stiffness * tube.rounding
     pace = axis.damping / (axis.damping + cell.low[1]) * course.pace
@@ -162,7 +162,7 @@ def _expected(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -> tuple
 
 
 def _loosest(axis: Axis, tube: TubeBounds, hands: HandRange) -> HandRange:
-    """Of the corners of some intervals the one hand that comes back the slowest."""
+    """The corner of the intervals whose hand returns to the curve the slowest."""
 
     def radius(hand: tuple[float, float, float]) -> float:
         masses = (hand[0] + tube.mass_low, hand[0] + tube.mass_high)
@@ -173,7 +173,7 @@ def _loosest(axis: Axis, tube: TubeBounds, hands: HandRange) -> HandRange:
 
 
 def _firm(hands: HandRange) -> HandRange:
-    """The part of some intervals with the most mass and damping and the least stiffness."""
+    """The part of the intervals with the most mass and damping and the least stiffness."""
 
     def upper(low: float, high: float) -> tuple[float, float]:
         return high - FIRM * (high - low), high
@@ -183,22 +183,22 @@ def _firm(hands: HandRange) -> HandRange:
 
 
 def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
-    """Verdict on a region about the curve that is attracted to a ball about it, for every hand of some intervals.
+    """Verdict on a region about the curve that is attracted to a smaller ball about it, for every hand of intervals.
 
-    Certified: V decreases on all of it in spite of the remainder; the margin is the offset [m] from which a hand that
-    moves at the curve's own pace surely comes near. Refuted where the loop is not even stable along the curve. Where
-    it is unknown because of the loosest hand, the intervals' firm part is tried, and what is certain of it is told.
+    Certified: V decreases on the whole region in spite of the remainder; the margin is the offset [m] from which a hand
+    that moves at the curve's own pace surely converges to the ball. Refuted if the loop is not even stable along the
+    curve. If it is unknown because of the loosest hand, the intervals' firm part is tried and its result is reported.
 
     Parameters
     ----------
     river : River
-        What is certified.
+        System to be certified.
     hands : HandRange
         Intervals of mass, damping, and stiffness about the nearest point.
     ceiling : float
-        The limiter's [N].
+        Ceiling of the limiter [N].
     linear : Verdict
-        On its stability.
+        Verdict on its linear stability.
     """
     if linear.verdict == "refuted":
         reason = "no region: the loop is unstable on the curve itself"
@@ -240,7 +240,7 @@ def _told(axis: Axis, found: Found) -> str:
 
 
 def _named(hands: HandRange) -> str:
-    """Intervals as text; one number where they are points."""
+    """Text for intervals; one number where an interval is a point."""
     intervals = ((hands.mass, "kg"), (hands.damping, "N s/m"), (hands.stiffness, "N/m"))
     return "hands of " + ", ".join(
         f"{low:.3g}{f' to {high:.3g}' if high > low else ''} {unit}" for (low, high), unit in intervals
@@ -248,7 +248,7 @@ def _named(hands: HandRange) -> str:
 
 
 def _why(frozen: Found | None, loosest: HandRange) -> str:
-    """Why one hand alone has no certain region."""
+    """Reason why the loosest hand alone has no certified region."""
     if frozen is None:
         return f"no Lyapunov function was found for {_named(loosest)} alone"
     return (

@@ -1,13 +1,12 @@
-r"""What the frozen axes of `lyapunov` leave out, as rates and forces: an input-to-state estimate of the whole loop.
+r"""Remainder: bounds of what the decoupled axes of `lyapunov` with frozen inertia neglect, as rates and forces.
 
-With ‖x‖ = √V ≤ ℓ, the loop that runs obeys
+It gives an input-to-state estimate of the whole loop. With ‖x‖ = √V ≤ ℓ, the executed loop obeys
 
 .. math:: \|x^+\| \le \sqrt{e^{-2rT} \|x\|^2 + T \textstyle\sum_c s_c w_c^2} + T\,(r_0 \|x\| + \delta)
 
-r is the form's rate and s_c what it allows for forces w_c; r_0 is what the nonlinearity takes of the rate, δ what does
-not vanish on the curve and is no force. All of them grow with ℓ.
-Every term is the largest it can be in the tube, with the form's worst mass and hand. Terms of second order in T are
-made good by `SAFE`.
+r is the form's rate and s_c its gains for the forces w_c; r_0 is the loss of rate by the nonlinearity, δ the terms that
+neither vanish on the curve nor are forces. All of them grow with ℓ. Every term is an upper bound in the tube, for the
+form's worst mass and hand. Terms of second order in T are covered by the factor `SAFE`.
 """
 
 from typing import NamedTuple
@@ -19,14 +18,14 @@ from controllers.certificates.region.tube_bounds import TubeBounds
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 
-SAFE = 1.05
-DENSE = 120  # masses at which what is not convex in the mass is evaluated
+SAFE = 1.05  # factor for terms of second order in T
+DENSE = 120  # masses at which terms that are not convex in the mass are evaluated
 
 
 class Course(NamedTuple):
-    """The curve as the loop knows it: pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
+    """Curve data: largest and least pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
 
-    A law that does not carry the hand has no pace.
+    For a law that does not carry the hand, largest pace and |φ̈| are zero.
     """
 
     pace: float
@@ -37,7 +36,7 @@ class Course(NamedTuple):
 
     @staticmethod
     def of(curve: Trajectory, carries: bool, n: int = 4000) -> "Course":
-        """On a grid so fine that a spline does not hide anything between its points."""
+        """Evaluate a curve on a grid that is fine compared with the pieces of its spline."""
         phases = np.linspace(curve.start, curve.end, n)
         velocity, acceleration = curve.velocity(phases), curve.acceleration(phases)
         speed, size = np.linalg.norm(velocity, axis=1), np.linalg.norm(acceleration, axis=1)
@@ -51,16 +50,16 @@ class Course(NamedTuple):
 
 
 class Remainder(NamedTuple):
-    """Bounds on a level set, and what √V = 1 is worth.
+    """Bounds of the remainder on a level set, and the extent of √V = 1.
 
     Attributes
     ----------
     rate, drift : float
         r_0 and δ [1/s].
     newtons, metric : float
-        Forces w: [N], and [N/√kg] in the metric of the device's own mass.
+        Forces w_c: [N], and [N/√kg] in the metric of the device's own mass.
     shift : float
-        How far the encoders' rounding shifts a state, in √V.
+        Largest shift of a state by encoder quantisation, in √V.
     distance, speed, force : float
         Largest |e| [m], |ν| [m/s] and force of the law [N] on √V = 1.
     """
@@ -85,11 +84,11 @@ def remainder(
     axis, form, cell
         The loop, its form and the hands.
     tube : TubeBounds
-        Of the device, in a tube that holds the level set.
+        Bounds of the device, in a tube that contains the level set.
     course : Course
-        Of the curve.
+        Data of the curve.
     share : float
-        Least w of the window in the tube.
+        Least value w of the window in the tube.
     level : float
         ℓ, at most 1.
     """
@@ -98,7 +97,7 @@ def remainder(
     inverses: Array = np.asarray(np.linalg.inv(forms), dtype=np.float64)
 
     def reach(row: Array) -> float:
-        """Largest value of a row on ‖x‖ ≤ 1; P⁻¹ is convex in z, so a corner has it."""
+        """Largest value of a row vector on ‖x‖ ≤ 1; P⁻¹ is convex in z, so the maximum is at a corner."""
         return float(np.sqrt(np.einsum("i,nij,j->n", row, inverses, row).max()))
 
     def rows(*numbers: float) -> Array:
@@ -117,7 +116,7 @@ def remainder(
         return Remainder(np.inf, np.inf, np.inf, np.inf, np.inf, e, v, force)
     bend = course.curvature / (1.0 - near)
 
-    # What is not convex in μ, on a dense grid of masses with the corners of the rest.
+    # Terms that are not convex in μ, on a dense grid of masses with the corners of the other parameters.
     z = cell.corners(DENSE)
     dense = np.array([form.numbers(row) for row in z])
     back = np.linalg.inv(dense)
@@ -169,7 +168,7 @@ def remainder(
 
 
 def _least(forms: Array, i: int, scale: Array) -> float:
-    """1/√p_ii at its largest, in SI."""
+    """1/√p_ii for the largest p_ii of the forms, in SI units."""
     return float(scale[i] / np.sqrt(forms[:, i, i].max()))
 
 

@@ -1,8 +1,8 @@
-r"""What the device can do anywhere in a tube about a curve: bounds by interval arithmetic on boxes that cover it.
+r"""Bounds of the device's kinematics and dynamics in a tube about a curve, by interval arithmetic on covering boxes.
 
-M = L Lᵀ is the linkage's mass matrix, J its Jacobian, Λ = J⁻ᵀ M J⁻¹ its mass at the tip. How fast a quantity changes is
-told per metre of the tip's motion; in the metric of Λ (matrices X as Λ^{-1/2} X Λ^{-1/2}, forces as Λ^{-1/2} f) where
-that is said, since there heavy and light directions count alike.
+M = L Lᵀ is the linkage's mass matrix, J its Jacobian, Λ = J⁻ᵀ M J⁻¹ its mass at the tip. Rates of change are per metre
+of the tip's motion. Where stated, they are in the metric of Λ (matrices X as Λ^{-1/2} X Λ^{-1/2}, forces as
+Λ^{-1/2} f), in which heavy and light directions count equally.
 """
 
 import itertools
@@ -29,17 +29,18 @@ class TubeBounds(NamedTuple):
     mass_low, mass_high : float
         Eigenvalues of Λ [kg].
     mass_slope, jacobian_slope, coriolis : float
-        [1/m]: of Λ in its metric; of J, as ∂J J⁻¹; and of Coriolis' force in the metric, by |Λ^{1/2} v| |v|.
+        Rates of change [1/m] of Λ in its metric, and of J as ∂J J⁻¹; Coriolis force in the metric over
+        |Λ^{1/2} v| |v| [1/m].
     weight_slope : float
-        Of the weight at the tip [N/m].
+        Rate of change of the weight at the tip [N/m].
     drag : float
         Viscous friction in the metric [1/s].
     coulomb : float
         Coulomb friction at the tip [N].
     rounding : float
-        How far the encoders' rounding moves the tip [m].
+        Largest error of the tip's position by encoder quantisation [m].
     motor_force : float
-        Force that the motors give in any direction, the weight carried [N].
+        Force that the motors can give in every direction while they carry the weight [N].
     """
 
     mass_low: float
@@ -55,12 +56,12 @@ class TubeBounds(NamedTuple):
 
 
 def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
-    """Bounds within some radius [m] of a curve.
+    """Bounds within a radius [m] of a curve.
 
     Raises
     ------
     CertificateError
-        If the tube comes so near to a singular configuration that its boxes hold one.
+        If the tube is so near to a singular configuration that its boxes contain one.
     """
     theta = ca.SX.sym("theta", 3)
     jacobian, mass = matrix(device.jacobian(theta)), matrix(device.mass(theta))
@@ -76,7 +77,7 @@ def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
         return np.maximum(np.abs(ends[0]), np.abs(ends[1]))
 
     def slope(parts: list[Any]) -> float:
-        """Of Σ X_i θ̇_i per metre: the Frobenius norm bounds the spectral one."""
+        """Bound of Σ X_i θ̇_i per metre of tip motion; the Frobenius norm bounds the spectral norm."""
         return sup(ca.horzcat(*(ca.vec(part) for part in parts)) @ back)
 
     turns = [ca.reshape(ca.jacobian(ca.vec(jacobian), theta[i]), 3, 3) for i in range(3)]
@@ -121,10 +122,10 @@ def _cholesky(m: Any) -> Any:
 
 
 def _boxes(device: Device, curve: Trajectory, radius: float, back: Any) -> tuple[Array, Array]:
-    """Boxes of θ that hold the tube, shape (n, 3) each: about each segment's middle, then cut in parts.
+    """Boxes of θ that cover the tube, low and high (n, 3): one about each segment's middle, divided into parts.
 
-    A straight way from the middle stays in the box while the joints' rates on it, at most the rows of J⁻¹ over the
-    box, do: that is checked.
+    A straight path of the tip from the middle stays in the box if the joint motion along it, bounded by the rows of J⁻¹
+    over the box, does; this is checked.
     """
     phases = curve.start + curve.duration * (np.arange(SEGMENTS) + 0.5) / SEGMENTS
     fine = curve.velocity(np.linspace(curve.start, curve.end, 16 * SEGMENTS))

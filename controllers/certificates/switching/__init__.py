@@ -1,1 +1,1 @@
-"""Certificates of crossing rivers: which one keeps the hand, and how often that can change."""
+"""Certificates of switching between crossing rivers: whether the active river keeps the hand, and dwell times."""

@@ -1,10 +1,10 @@
-r"""Common quadratic Lyapunov function of several linear maps: a certificate of every switching between them.
+r"""Common quadratic Lyapunov function of several linear maps: certifies stability under arbitrary switching.
 
 If P > 0 and A_iᵀ P A_i ≤ ρ² P for every i, then |A x|_P ≤ ρ |x|_P for every A in the convex hull of the maps, since
-A ↦ Aᵀ P A is convex: however fast one switches or blends, the state decays as ρ^k (Liberzon, *Switching in Systems and
-Control*, 2003, section 2.1). The one with the largest least decrease is a semidefinite program (Boyd et al., *Linear
-Matrix Inequalities in System and Control Theory*, 1994, section 5.1), solved by Clarabel. What it finds is a proposal;
-`contraction` judges it by itself.
+A ↦ Aᵀ P A is convex: for arbitrarily fast switching or blending the state decays as ρ^k (Liberzon, *Switching in
+Systems and Control*, 2003, section 2.1). Maximising the least decrease is a semidefinite program (Boyd et al., *Linear
+Matrix Inequalities in System and Control Theory*, 1994, section 5.1), solved by Clarabel. Its solution is a candidate,
+which `contraction` verifies independently.
 """
 
 import warnings
@@ -17,7 +17,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from controllers.state import Array
 
-_ROUNDING = 10.0  # times the terms summed and the machine's precision: of a product of three matrices and its spectrum
+_ROUNDING = 10.0  # safety factor of the rounding bound of a product of three matrices and its spectrum
 
 
 class Common(NamedTuple):
@@ -28,7 +28,7 @@ class Common(NamedTuple):
     p : Array
         P, shape (n, n), positive definite.
     rate : float
-        ρ, with the bound of the rounding added.
+        ρ, including the bound of rounding errors.
     """
 
     p: Array
@@ -39,7 +39,7 @@ def contraction(p: Array, maps: Sequence[Array]) -> float:
     r"""Upper bound on the largest ρ_i with A_iᵀ P A_i ≤ ρ_i² P; infinite if P is not positive definite.
 
     With P = L Lᵀ it is the largest singular value of Lᵀ A_i L⁻ᵀ. A bound of the rounding errors, 10 n² ε κ(L) times
-    the value, is added, so that ρ < 1 is meant in exact arithmetic.
+    the value, is added, so that ρ < 1 also holds in exact arithmetic.
     """
     if not np.all(np.isfinite(p)) or not np.allclose(p, p.T, rtol=1e-12, atol=0.0):
         return float("inf")
@@ -55,7 +55,7 @@ def contraction(p: Array, maps: Sequence[Array]) -> float:
 def common_lyapunov(maps: Sequence[Array]) -> Common | None:
     """Common quadratic Lyapunov function of stable maps, or None if none was found.
 
-    Tried first is the mean of the maps' own functions; where that does not decrease along all, a semidefinite
+    First the mean of the maps' own Lyapunov functions is tried; if it does not decrease along all maps, a semidefinite
     program is solved in its coordinates.
 
     Parameters
@@ -65,13 +65,13 @@ def common_lyapunov(maps: Sequence[Array]) -> Common | None:
     """
     if max(float(np.abs(np.linalg.eigvals(a)).max()) for a in maps) >= 1.0:
         return None
-    # In units in which the modes are alike, or rates would drown angles.
+    # State units in which all components are of similar size; otherwise rates would dominate angles.
     scale = np.sqrt(np.diag(solve_discrete_lyapunov(maps[-1], np.eye(len(maps[-1])))))
     scaled = [a * scale / scale[:, None] for a in maps]
     own = [solve_discrete_lyapunov(a.T, np.eye(len(a))) for a in scaled]
     mean = np.sum([p / np.linalg.norm(p, 2) for p in own], axis=0)
     start = np.linalg.cholesky(0.5 * (mean + mean.T))
-    # In the mean's own coordinates it is the unit matrix.
+    # In these coordinates the mean is the identity matrix.
     turned = [np.linalg.solve(start, (start.T @ a).T).T for a in scaled]
     found = np.eye(len(mean))
     if contraction(found, turned) >= 1.0:
@@ -83,8 +83,8 @@ def common_lyapunov(maps: Sequence[Array]) -> Common | None:
 
 
 def _improved(maps: Sequence[Array]) -> Array:
-    """P of trace n with the largest least decrease t, P − A_iᵀ P A_i ≥ t; the unit matrix if none is found."""
-    import cvxpy  # takes a second, which a certificate without it need not wait
+    """P of trace n with the largest least decrease t, P − A_iᵀ P A_i ≥ t I; the identity matrix if none is found."""
+    import cvxpy  # here, since the import takes a second and most certificates do not need it
 
     n = len(maps[0])
     p, least = cvxpy.Variable((n, n), PSD=True), cvxpy.Variable()

@@ -1,22 +1,23 @@
-r"""Switching of crossing rivers: when a river keeps the hand that it has, and how fast rivers can change at all.
+r"""Switching of crossing rivers: conditions under which the active river keeps the hand, and bounds of the dwell time.
 
-On river i, with its loop linear across the curve, the hand is off by at most D and its measured velocity by at most E,
+On river i, with a loop that is linear transverse to the curve, the hand's distance is at most D and the error of its
+measured velocity at most E,
 
 .. math:: D = G_d U, \qquad E = G_e U + \nu, \qquad
           U = U_{max} + U_0 + U_q + (k D + b E)(1 - w(D/\varepsilon))
 
-with G the peak gains of the sampled loop, one multiple Lyapunov function a river in the norm of what matters; U_max the
-hand's force, U_0 inertia and friction, U_q what the rounding of the encoders makes of the law, and ν what it makes of
-the measured velocity. So the mismatch of `HigherOrder` obeys s_i² ≤ S² = E² + g_i(D) with g = −2σ² ln w, as long as the
-river has the hand. A rival's forgiveness takes at most what e has across its tangent, so
+with G the peak gains of the sampled loop; U_max the hand's force, U_0 that of inertia and friction (`own_force`), U_q
+and ν the effects of encoder quantisation on the law's force and on the measured velocity. So the mismatch of
+`HigherOrder` obeys s_i² ≤ S² = E² + g_i(D) with g = −2σ² ln w, as long as the river is active. The discount of a rival
+river's mismatch (see `mismatch`) removes at most the part of e across its tangent, so with u_j its unit tangent
 
 .. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E)^2 + g_j(d_j - D)
 
-The discrete field keeps the hand if S < r + h and S < h + s_j: it never changes, and the dwell time is infinite.
+The discrete field keeps the hand if S < r + h and S < h + s_j: the river never changes; the dwell time is infinite.
 
-Dwell time: between two opposite changes of rivers s_j − s_i moves by 2 h, and from admission to release s_i by h. m is
-the distance of (e, 0) from the line along (Y, |φ̇|), so |Δm| ≤ |Δe| + |e| |ΔY|/|φ̇|; and √g is Lipschitz in d. With
-`hysteresis_dwell` that bounds the dwell time from below wherever the hand is near the curves.
+Dwell time: between two opposite changes of river s_j − s_i changes by 2 h, and between admission and release s_i by h.
+m is the distance of (e, 0) from the line along (Y, |φ̇|), so |Δm| ≤ |Δe| + |e| |ΔY|/|φ̇|; and √g is Lipschitz in d. From
+this, `hysteresis_dwell` bounds the dwell time from below wherever the hand is near the curves.
 """
 
 import math
@@ -37,20 +38,20 @@ from controllers.curves.closest_point import closest_phases
 from controllers.fields.window import window
 from controllers.state import Array
 
-CORE = 0.1  # of a tube's radius, within which the hysteresis bounds the dwell time
+CORE = 0.1  # share of a tube's radius within which the hysteresis bounds the dwell time
 _RISE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))  # steepest ε/σ · d√g/dd in the core
 
 
 @dataclass(frozen=True)
 class Sharing:
-    """How rivers share the hand: the numbers of `HigherOrder`.
+    """Parameters of `HigherOrder` that decide how rivers share the hand.
 
     Parameters
     ----------
     admission, sigma, hysteresis : float
         r, σ, h [m/s].
     form : {"smooth", "discrete"}
-        As there.
+        See `HigherOrder`.
     """
 
     admission: float
@@ -59,23 +60,23 @@ class Sharing:
     form: Literal["smooth", "discrete"]
 
     def cost(self, distance: float, width: float) -> float:
-        """What a place costs, g(d) = −2σ² ln w(d/ε) [m²/s²]; infinite outside the tube."""
+        """Penalty of a distance from the curve, g(d) = −2σ² ln w(d/ε) [m²/s²]; infinite outside the tube."""
         w = float(window((distance / width) ** 2))
         return -2.0 * self.sigma**2 * math.log(w) if w > 0.0 else math.inf
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A river seen from another one, at phases of that where it is near.
+    """A rival river j relative to a river i, at the n phases of i.
 
     Attributes
     ----------
     distance : Array, shape (n,)
-        Of the curves [m].
+        Distance of the curves [m].
     least : Array, shape (n,)
-        |φ̇_i · u_j − |φ̇_j||, the mismatch with all that forgiveness takes [m/s].
+        |φ̇_i · u_j − |φ̇_j||, the mismatch after the largest possible discount [m/s].
     angle : Array, shape (n,)
-        Between the curves [rad].
+        Angle between the curves [rad].
     width : float
         ε_j [m].
     """
@@ -87,7 +88,7 @@ class Rival:
 
 
 def rival(held: River, other: River) -> Rival:
-    """How another river looks along one, at its phases."""
+    """Another river relative to `held`, at the phases of `held`."""
     points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
     phases, distance = closest_phases(other.curve.packed(), points)
     theirs = other.curve.velocity(phases)
@@ -101,7 +102,7 @@ def rival(held: River, other: River) -> Rival:
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far a force brings the hand from the state in which its river carries it.
+    """Bounds of the hand's deviation from the state in which its river carries it, under a bounded force.
 
     Attributes
     ----------
@@ -110,7 +111,7 @@ class Bounds:
     score : float
         S [m/s].
     room : float
-        Least of r + h − S and h + s_j − S [m/s].
+        Smaller of r + h − S and h + s_j − S [m/s]; the river keeps the hand if it is positive.
     """
 
     distance: float
@@ -121,7 +122,7 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class Keeping:
-    """One river of a bundle, the others as rivals, and what a force does to the hand that it has."""
+    """One river of a bundle with the others as rivals: bounds under which it keeps its hand."""
 
     held: River
     others: tuple[River, ...]
@@ -129,7 +130,7 @@ class Keeping:
 
     @cached_property
     def rivals(self) -> tuple[Rival, ...]:
-        """The others along this one."""
+        """The other rivers relative to this one."""
         return tuple(rival(self.held, other) for other in self.others)
 
     @cached_property
@@ -138,13 +139,13 @@ class Keeping:
 
     @cached_property
     def reading(self) -> float:
-        """Largest error of the tip's place by rounding [m]."""
+        """Largest error of the tip's position by encoder quantisation [m]."""
         half = 0.5 * np.array(self.held.device.encoder_step)
         return float(np.linalg.norm(np.abs(self._still.jacobian) @ half, axis=1).max())
 
     @property
     def noise(self) -> float:
-        """ν [m/s]: the filter's response to rounding by half a step and back, its sum of |impulse response|."""
+        """ν [m/s]: largest response of the velocity filter to quantisation errors, by its sum of |impulse response|."""
         sampling = self.held.sampling
         return 2.0 * (1.0 - sampling.keep) / sampling.period * self.reading
 
@@ -157,7 +158,7 @@ class Keeping:
         return peak_gain(loop, river.k_r, river.b_d).distance, _speed_gain(loop, river), own
 
     def bounds(self, push: float) -> Bounds:
-        """D, E and S for |U| ≤ push [N], the least solution, reached from the curve."""
+        """D, E and S for |U| ≤ push [N]: the least solution, by iteration from zero."""
         river, sharing = self.held, self.sharing
         by_force, by_speed, own = self._gains
         lost = Bounds(math.inf, math.inf, math.inf, -math.inf)
@@ -178,7 +179,7 @@ class Keeping:
         return Bounds(distance, speed, score, self._room(distance, speed, score))
 
     def _room(self, distance: float, speed: float, score: float) -> float:
-        """How far S is from what lets the hand go [m/s]."""
+        """Distance of S from the values at which the river would lose the hand [m/s]."""
         least = self.sharing.admission + self.sharing.hysteresis - score
         for other in self.rivals:
             inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
@@ -189,7 +190,7 @@ class Keeping:
         return least
 
     def allowed(self, ceiling: float) -> float:
-        """Largest force [N] up to a ceiling with which the river keeps the hand; negative if it may lose it anyway."""
+        """Largest force [N] up to a ceiling at which the river keeps the hand; negative if it may lose it at any."""
         if self.bounds(0.0).room <= 0.0:
             return -1.0
         low, high = 0.0, ceiling
@@ -223,10 +224,10 @@ def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
               c = \frac{|e|}{\tau |\dot\varphi|} + \kappa\frac{\sigma}{\varepsilon}, \qquad
               |e| \le (r + h)\sqrt{1 + (d/\tau|\dot\varphi|)^2}
 
-    with a the largest acceleration, (U + f_c + k d + b |e|) over the least inertia felt at the tip, |e| also the
-    greatest speed across, κ the steepest rise of √g in the core, ν and δ what rounding makes of velocity and place.
-    A wider h admits faster hands, so that the bound does not grow without end. It is never below a period,
-    since the field is told once a period; where h ≤ 2ν that is all that can be said.
+    with a the largest acceleration, (U + f_c + k d + b |e|) over the least inertia felt at the tip; |e| also the
+    largest transverse speed; κ the steepest slope of √g in the core; ν and δ the quantisation errors of velocity and
+    position. A larger h admits faster hands, so that the bound does not grow without limit. It is at least one period,
+    since the field is evaluated once per period; for h ≤ 2(ν + c δ) it is no more than that.
     """
     longest, period = math.inf, keepings[0].held.sampling.period
     for keeping in keepings:
@@ -251,19 +252,19 @@ def switching(
 ) -> Verdict:
     """Verdict on the switching of a bundle's rivers, for hands that push with at most `push` newtons.
 
-    Certified: every river keeps the hand that it has, so that the field never changes. Refuted: with what a search has
-    found. The margin is how much more the hand might push [N].
+    Certified: every river keeps its hand, so that the active river never changes. Refuted: by the counterexample of a
+    search. The margin is the additional push that would be allowed [N].
 
     Parameters
     ----------
     keepings : sequence of Keeping
-        A river each.
+        One for each river.
     push, ceiling : float
-        U_max, and the largest force that is looked at [N].
+        U_max, and the largest force that is examined [N].
     found : mapping
         Counterexample; empty if there is none.
     common : Common, optional
-        Common Lyapunov function of the rivers and of none, for a hand that holds the stylus where rivers meet.
+        Common Lyapunov function of the rivers and of no river, for a hand that holds the stylus where rivers meet.
     """
     sharing = keepings[0].sharing
     allowed = min((keeping.allowed(ceiling) for keeping in keepings), default=-1.0)

@@ -1,8 +1,8 @@
-"""Search for a hand that a field of crossing rivers loses or lets chatter: the executed law on the linearised device.
+"""Search for counterexamples of switching: hands that crossing rivers lose or that chatter, on the linearised device.
 
-The device stands at one place: kinematics, inertia and weight are those there, the hold is exact, the encoders round
-and the velocity is filtered as in the servo; Coulomb friction is the torque that would stop a joint within the period,
-at most f_c. The law is the kernel that runs.
+The device is linearised about one place: kinematics, inertia and weight are those there; the zero-order hold is exact;
+encoder quantisation and velocity filter are those of the servo. Coulomb friction is the torque that would stop a joint
+within the period, at most f_c. The law is the executed kernel.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,9 +19,9 @@ from controllers.fields.instructions import TRACE_RIVER
 from controllers.fields.program import evaluate
 from controllers.state import Array, HandState
 
-LOST = 0.02  # [s] without a river from which on a hand counts as thrown out
-EARLIER, SECONDS = 0.6, 1.3  # [s] before the meeting a hand begins, and how long it is watched
-CHANGES = 3  # of river within `LOST` that count as chattering
+LOST = 0.02  # [s] without an active river after which a hand counts as thrown out
+EARLIER, SECONDS = 0.6, 1.3  # [s] start of a hand before the rivers meet, and duration of its simulation
+CHANGES = 3  # changes of river within `LOST` that count as chattering
 
 
 class Push(NamedTuple):
@@ -30,9 +30,9 @@ class Push(NamedTuple):
     Attributes
     ----------
     force : tuple of float
-        In H [N].
+        Force in H [N].
     start, duration : float
-        [s].
+        Begin and duration [s].
     """
 
     force: tuple[float, float, float]
@@ -41,14 +41,14 @@ class Push(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Where a hand went, tick by tick.
+    """Simulated course of a hand, tick by tick.
 
     Attributes
     ----------
     p : Array, shape (n, 3)
-        In H [m].
+        Position in H [m].
     river : Array, shape (n,)
-        Which one had it, −1 for none.
+        Number of the active river, −1 for none.
     """
 
     p: Array
@@ -56,14 +56,14 @@ class Course(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """What became of a hand.
+    """Failure of a field to keep a hand.
 
     Attributes
     ----------
     kind : str
         ``"chatters"``, ``"thrown out"`` or ``"taken over"``.
     time : float
-        When [s].
+        Time of the failure [s].
     """
 
     kind: str
@@ -72,22 +72,22 @@ class Failure(NamedTuple):
 
 def course(field: HigherOrder, loop: SampledLoop, place: Array, start: Array, velocity: Array, seconds: float,
            device: Device, push: Push | None = None) -> Course:  # fmt: skip
-    """Let a hand go in the field, on a device that is linear about a place.
+    """Simulate a hand in the field, on a device linearised about a place.
 
     Parameters
     ----------
     field : HigherOrder
         The rivers.
     loop : SampledLoop
-        Of the device at `place`, its only phase; without delay.
+        Loop of the device at `place`, its only phase; without delay.
     place, start, velocity : Array, shape (3,)
-        p of the linearisation, and p and v at the beginning [m], [m/s].
+        Place of the linearisation, initial position [m] and initial velocity [m/s].
     seconds : float
-        How long [s].
+        Duration [s].
     device : Device
-        Its friction and its encoders.
+        Device with its friction and encoders.
     push : Push, optional
-        Of the hand.
+        Push of the hand.
     """
     linear, sampling = loop.linear, loop.sampling
     free, driven = (response[0] for response in loop.plant(sampling.period))
@@ -120,20 +120,20 @@ def _rounded(x: Array, theta: Array, step: Array) -> Array:
 
 
 def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = False) -> Failure | None:
-    """What went wrong with the hand of river `own`, if anything did; one that it never had is not taken over.
+    """First failure of river `own` to keep its hand, or None; a hand that it never had cannot be taken over.
 
     Parameters
     ----------
     river : Array, shape (n,)
-        Which one had it at each tick, −1 for none.
+        Active river at each tick, −1 for none.
     period : float
-        Of a tick [s].
+        Servo period [s].
     own : int
-        Whose hand it is.
+        Number of the river that should keep the hand.
     pushed : bool
-        Whether somebody pushes: then it may go over to another river, once.
+        Whether the hand pushes: then it may be taken over by another river.
     smooth : bool
-        Of the smooth form, whose force does not jump: only where the hand is in the end counts, and being lost.
+        Whether the form is smooth, with a force that does not jump: then only the final river and being lost count.
     """
     window = max(CHANGES + 1, round(LOST / period))
     had = np.logical_or.accumulate(river == own)
@@ -151,7 +151,7 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
 
 
 Simulation = Callable[[Array, Array, float, Push], Course]
-"""A hand let go on a fuller model of the device, from p [m] and v [m/s], for some time [s], with a push."""
+"""Simulation of a hand on a more complete model of the device: from p [m] and v [m/s], for a time [s], with a push."""
 
 
 def counterexample(
@@ -163,11 +163,11 @@ def counterexample(
     pushes: Iterable[float],
     simulate: Simulation,
 ) -> dict[str, object]:
-    """First hand found that the field loses, and loses alike in a simulation: initial state, force and times.
+    """First hand that the field fails to keep, in the same way also in a simulation: initial state, force and times.
 
-    Tried are hands that begin on the river 0.6 s before a phase, at rest, or at its pace where a hand at rest is
-    another river's, and are pushed towards the other river, away from it, along and against, for 0.2 s shortly before;
-    and one that begins at the phase with the rivers' mean velocity.
+    The hands tried start on the river 0.6 s before the phase, at rest, or at the river's pace if a hand at rest would
+    belong to another river. They are pushed towards the other river, away from it, along the river and against it, for
+    0.2 s shortly before the phase. One more hand starts at the phase with the rivers' mean velocity.
 
     Parameters
     ----------
@@ -176,20 +176,20 @@ def counterexample(
     own : int
         Number of the river among them.
     river : River
-        The same one as it is certified.
+        The same river in the form that is certified.
     phase : float
-        Where another one meets it [s].
+        Phase at which another river meets it [s].
     towards : Array, shape (3,)
-        φ̇_j of the other one there [m/s].
+        φ̇_j of the other river there [m/s].
     pushes : iterable of float
         Forces [N], tried in this order.
     simulate : callable
-        The judge: what the linear device loses and this one keeps, or loses in another way, is no counterexample.
+        Simulation that confirms a failure; one that it does not show in the same way is no counterexample.
 
     Returns
     -------
     dict
-        Empty if there is none.
+        The counterexample; empty if there is none.
     """
     place, along = river.curve.point(phase), river.curve.velocity(phase)
     before = max(phase - EARLIER, river.curve.start + 1e-3) if not river.curve.periodic else phase - EARLIER
@@ -229,7 +229,7 @@ def counterexample(
 
 
 def _at(loop: SampledLoop, at: int) -> SampledLoop:
-    """The loop at one of its phases alone."""
+    """The loop restricted to one of its phases."""
     linear, one = loop.linear, slice(at, at + 1)
     cut = {
         name: getattr(linear, name)[one]

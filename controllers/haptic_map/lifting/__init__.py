@@ -1,1 +1,1 @@
-"""Lifting: from clips alone to curves in the device's workspace and one map."""
+"""Lifting: curves in the device's workspace and one haptic map, made from clips alone."""

@@ -1,16 +1,16 @@
-r"""Arrangement of curves round the z axis: sites (r_i(θ), z_i(θ)) in a rectangle, optimised all together.
+r"""Arrangement of curves round the z axis: sites (r_i(θ), z_i(θ)) in a rectangle, optimised jointly.
 
 .. math:: E = \sum_{i<j} \Bigl\langle w\, \frac{(D_{ij} - T_{ij})^2}{\bar T^2}
           + \Bigl(1 - \frac{D_{ij}}{S_{ij}}\Bigr)_+^2 + v\, |q_i' - q_j'|^2 \Bigr\rangle
           + \sum_i \langle (1 + \dot\theta_i^4/\omega^4)\, |q_i''|^2 + limits \rangle
 
-D is the distance of two sites at an angle, T = κ d the distance of the two poses there brought to the size of the
-rectangle (multidimensional scaling, but at every angle and smooth in it): moving the hand by a
-millimetre then changes the figure as much in one place as in another, which is what a well-conditioned h_* asks. At a
-transition T falls to the approach, and v makes the curves parallel; elsewhere S keeps them apart. A hand that comes
-nearer to the axis and goes away again is late and early by what springs and filters hold back of 2 θ̇² r', and with its
-angle so is the clip: the faster a curve is gone round, the less its radius may bend. Limits are those of speed and
-acceleration. Sites are periodic cubic B-splines whose control points lie in the rectangle, hence so do they.
+D is the distance of two sites at an angle, T = κ d the distance of the two poses there scaled to the size of the
+rectangle (multidimensional scaling, at every angle and smooth in it): a millimetre of hand motion then changes the
+figure equally everywhere, so h_* is well conditioned. At a transition T falls to the approach, and v makes the curves
+parallel; elsewhere S keeps them apart. The bending term grows with θ̇: where the radius changes, springs and filters
+track the tangential acceleration 2 θ̇² r' with an error, which shifts the hand's angle and with it the clip's phase.
+`limits` penalises excess of speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the
+rectangle, hence so do the sites.
 """
 
 from dataclasses import dataclass
@@ -27,19 +27,19 @@ from controllers.state import Array
 
 ROWS = 64  # control points round the lap
 _PER_ROW = 3
-SAMPLES = ROWS * _PER_ROW  # angles at which the energy is taken
+SAMPLES = ROWS * _PER_ROW  # angles at which the energy is evaluated
 WINDOW = 0.9  # [rad] from a transition within which two curves may be nearer than the separation
-_FILL = 0.8  # of the rectangle's diagonal, that the most different motions are apart
-_STEEP = 0.2  # of the distance that their poses ask for, that curves approach to at a transition
+_FILL = 0.8  # target distance of the most different motions, as a share of the rectangle's diagonal
+_STEEP = 0.2  # least distance at a transition, as a share of the target distance κ d of the poses
 _SEPARATION, _APPROACH, _TANGENT, _BEND, _LIMIT = 40.0, 250.0, 0.7, 0.015, 40.0  # weights
 _SLOW = 2.0  # [rad/s], ω: with 3 a captured walk, which lacks 1.7 % of weight, lacks 11 % on its curve, with 2 4.7 %
-_LENGTH = 0.02  # [m] in which slopes and bends are counted
-_MARGIN = 1.1  # on the separation and the limits, for what lies between the samples
+_LENGTH = 0.02  # [m] unit of length of slopes and bends in the energy
+_MARGIN = 1.1  # safety factor on the separation and the limits, for angles between the samples
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is to be arranged.
+    """Data of an arrangement problem.
 
     Attributes
     ----------
@@ -47,9 +47,9 @@ class Task:
     separation : float
         Least distance of two curves away from their transitions [m].
     approach : float
-        What they approach to at a transition of equal poses [m].
+        Distance of two curves at a transition between equal poses [m].
     speed, acceleration : float
-        Of the hand along a curve, at most [m/s, m/s²].
+        Largest of the hand along a curve [m/s, m/s²].
     distance : Array, shape (SAMPLES, n, n)
         Between poses [m].
     transitions : list of Transition
@@ -69,7 +69,7 @@ class Task:
 
     @property
     def scale(self) -> float:
-        """κ: distance in the rectangle over distance of poses."""
+        """κ: ratio of distances in the rectangle to distances of poses."""
         size = float(np.linalg.norm(self.rectangle.high - self.rectangle.low))
         return _FILL * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
 
@@ -125,7 +125,7 @@ _UNIT = SAMPLES * _LENGTH**2
 
 
 def sites_of(controls: Array) -> Array:
-    """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), of control points of the same shape."""
+    """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), from control points of the same shape."""
     return on_lap(controls)[0][::_PER_ROW]
 
 
@@ -174,7 +174,7 @@ class Energy:
         return float(apart + slant + bend + fast + hard), gradient.ravel()
 
     def _apart(self, q: Array) -> tuple[float, Array]:
-        """Stress and separation, and their gradient by the sites (SAMPLES, n, 2)."""
+        """Stress and separation terms, and their gradient by the sites (SAMPLES, n, 2)."""
         i, j = self._pairs
         if not len(i):
             return 0.0, np.zeros_like(q)
@@ -209,18 +209,19 @@ def _excess(v: Array, most: float) -> tuple[float, Array]:
 
 
 def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Array, Array]:
-    """Control points (ROWS, n, 2) of the arrangement, and of the one that it began with.
+    """Control points (ROWS, n, 2) of the arrangement, and of the first initial guess.
 
-    The energy is minimised (L-BFGS-B) from places scaled after the motions' mean distances, from a lattice, and from
-    perturbations of the first; the least that keeps the curves apart is taken. If none does, it is the lattice.
+    The energy is minimised (L-BFGS-B) from positions that reproduce the motions' mean distances, from a lattice, and
+    from perturbations of the first; the result of least energy that keeps the curves apart is taken. If none does, the
+    lattice is taken.
 
     Parameters
     ----------
     task : Task
-        There must be room: as many places on `lattice` as clips.
+        The rectangle must have room: at least as many points on `lattice` as clips.
     rng : numpy.random.Generator
     starts : int
-        How often to begin.
+        Number of initial guesses, two or more.
     """
     n = task.distance.shape[1]
     rectangle = task.rectangle
@@ -232,7 +233,7 @@ def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Arra
     bounds = list(zip(np.tile(rectangle.low, ROWS * n), np.tile(rectangle.high, ROWS * n), strict=True))
     best, least = np.tile(kept, (ROWS, 1, 1)), np.inf
     for layout in layouts:
-        # Sites on top of each other have no direction in which to part.
+        # Without noise, coincident sites would have no gradient that separates them.
         noise = 1e-4 * rng.uniform(-1.0, 1.0, (n, 2))
         start = np.clip(layout + noise, rectangle.low, rectangle.high)
         found = minimize(
@@ -246,7 +247,7 @@ def arrange(task: Task, rng: np.random.Generator, starts: int = 3) -> tuple[Arra
 
 
 def is_apart(task: Task, controls: Array) -> bool:
-    """Whether sites keep the separation at every angle but near their transitions, and the approach there."""
+    """Whether sites keep the separation at every angle, and near their transitions half of the approach."""
     q, _, _ = on_lap(controls)
     n = q.shape[1]
     least = np.full((SAMPLES, n, n), task.separation)

@@ -1,8 +1,8 @@
-"""The common lap of clips: which frame of each clip is at which angle, so that like moments are at like angles.
+"""Time alignment of clips to a common lap: an angle for each frame, so that similar moments have the same angle.
 
-Each clip is shifted, and warped where it pays, to the clips most like it, by dynamic programming over the lead of its
-phase. What is compared are poses, velocities, and which feet bear load, so that contacts meet. A mismatch counts only
-up to a scale: a lap in which two motions nearly agree at one moment is better than one that is mediocre all round.
+Each clip is shifted, and warped if that is worth it, to match the most similar clips, by dynamic time warping over the
+lead of its phase. Poses, velocities and the feet that bear load are compared, so that contacts coincide. The mismatch
+saturates at a scale: laps in which two motions nearly agree at one moment are better than mediocre ones all round.
 """
 
 from typing import NamedTuple
@@ -13,23 +13,23 @@ from scipy.interpolate import CubicSpline
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
 from controllers.state import Array
 
-SAMPLES = 385  # of a motion's time, for features
-_STEPS = 96  # of the lap, in the dynamic programme
+SAMPLES = 385  # samples of a motion's features over its duration
+_STEPS = 96  # steps of the lap in the dynamic programme
 _FINE = 4  # leads per step: paces change by quarters of the clip's own
 _BAND = _STEPS * _FINE // 8  # the warp leads or lags by at most an eighth of the lap
-_CHANGES = np.arange(-2, 3)  # of the lead in a step: paces 0.5 to 1.5
-_STEEPEST = 0.4  # change of the pace that is left after smoothing
-_COST = 0.02  # of a change of pace by a quarter, squared, of the mean mismatch
-_WORTH = 0.95  # a warp that leaves more of the mismatch is not made
-_NEIGHBOURS = 6  # clips that another is aligned to
-_SHIFTS = 6  # places to begin that are tried with a warp
-_REACTION = 0.1  # [s] velocities count as far as they carry in this time
-_FOOT = 0.1  # [m] that a foot which bears is from one that does not
-_GAP = (0.1, 0.3)  # share of the lap in which an open clip returns: least, most
+_CHANGES = np.arange(-2, 3)  # changes of the lead in a step: paces 0.5 to 1.5
+_STEEPEST = 0.4  # largest change of the pace after smoothing
+_COST = 0.02  # cost of a change of pace by a quarter, as a share of the mean mismatch; grows with its square
+_WORTH = 0.95  # a warp is made only if it reduces the mismatch below this share
+_NEIGHBOURS = 6  # number of most similar clips to which a clip is aligned
+_SHIFTS = 6  # number of the best shifts that are tried with a warp
+_REACTION = 0.1  # [s] converts velocities to lengths: the distance covered in this time
+_FOOT = 0.1  # [m] distance that stands for the difference between a foot that bears load and one that does not
+_GAP = (0.1, 0.3)  # least and largest share of the lap in which an open clip returns
 
 
 class Phase(NamedTuple):
-    """Where a clip is in the lap: s = (θ/2π − start)/(1 − gap) + lead(θ), from 0 to 1 along the clip.
+    """Timing of a clip in the lap: s = (θ/2π − start)/(1 − gap) + lead(θ), from 0 to 1 along the clip.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Phase(NamedTuple):
     gap : float
         Share of the lap in which an open clip returns to its start; 0 for a closed one.
     lead : CubicSpline
-        Over laps since `start`, periodic.
+        As a function of the share of the lap since `start`, periodic.
     """
 
     start: float
@@ -57,7 +57,7 @@ class Phase(NamedTuple):
         for _ in range(60):
             missed = since / (1.0 - self.gap) + self.lead(since) - wanted
             since = since - missed / (1.0 / (1.0 - self.gap) + self.lead(since, 1))
-        # Its ends are where they are, to the last bit.
+        # The ends are set exactly.
         since[0], since[-1] = 0.0, 1.0 - self.gap
         return 2.0 * np.pi * (self.start + since)
 
@@ -68,7 +68,7 @@ def _unwarped(start: float, gap: float) -> Phase:
 
 
 def _return_gap(motion: Motion, own: Features) -> float:
-    """Share of the lap in which an open clip returns: as long as it takes at the motion's own mean speed."""
+    """Share of the lap in which an open clip returns: 1.5 times as long as at the motion's own mean speed, bounded."""
     if motion.closed:
         return 0.0
     speed = float(np.linalg.norm(own.velocity[:, 3:], axis=1).mean())
@@ -104,11 +104,11 @@ def _costs(own: Array, others: list[tuple[Array, Phase]], scale: float) -> _Cost
 
 
 def _warped(costs: _Costs, start: float, gap: float) -> Phase:
-    """The phase with the cheapest lead that is zero at start and end."""
+    """Phase with the lead of least cost that is zero at start and end, by dynamic programming."""
     lap = np.arange(_STEPS) / _STEPS
     leads = np.arange(-_BAND, _BAND + 1) / (_STEPS * _FINE)
     s = lap[:, None] / (1.0 - gap) + leads
-    # A closed clip goes on with its next lap, an open one stays within itself.
+    # A closed clip continues with its next lap; an open one is clamped to its ends.
     s = np.mod(s, 1.0) if gap == 0.0 else np.where(lap[:, None] < 1.0 - gap, np.clip(s, 0.0, 1.0), 2.0)
     table = costs.at((start + lap)[:, None] + 0.0 * leads, s)
     total = np.full(len(leads), np.inf)
@@ -137,7 +137,7 @@ def _smoothed(lead: Array, gap: float) -> CubicSpline:
     smooth = np.fft.irfft(np.fft.rfft(lead) * np.exp(-0.5 * (2.0 * np.pi * frequency * _STEPS / 24.0) ** 2), _STEPS)
     smooth = np.append(smooth, smooth[0])
     if gap > 0.0:
-        # Within the gap nothing is led, and at its edges pace and acceleration are the clip's own.
+        # Within the gap the lead is zero, and at its edges pace and acceleration are the clip's own.
         x = np.clip(np.minimum(knots, 1.0 - gap - knots) / 0.1, 0.0, 1.0)
         smooth = smooth * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
     smooth = smooth - smooth[0]
@@ -152,13 +152,13 @@ def _mismatch(costs: _Costs, phase: Phase) -> float:
 
 
 def _placed(costs: _Costs, gap: float) -> Phase:
-    """Best shift and, if it is worth it, warp of a clip."""
-    # The gap of every open clip holds the angle 0, where the lap ends.
+    """Phase with the best shift of a clip and, if it is worth it, the best warp."""
+    # The gap of every open clip contains the angle 0, where the lap ends.
     starts = np.arange(_STEPS) / _STEPS if gap == 0.0 else gap * np.linspace(0.1, 0.9, 9)
     straight = [_unwarped(float(start), gap) for start in starts]
     found = [_mismatch(costs, phase) for phase in straight]
     if max(found) - min(found) <= 1e-9 + 0.01 * float(np.mean(found)):
-        # A motion that does not tell one phase from another keeps its own, or lies in the middle of its room.
+        # A motion whose mismatch hardly depends on the shift keeps its own phase; an open one is centred.
         return straight[0] if gap == 0.0 else straight[len(straight) // 2]
     best, least = straight[int(np.argmin(found))], min(found)
     for k in np.argsort(found, kind="stable")[:_SHIFTS]:
@@ -170,16 +170,16 @@ def _placed(costs: _Costs, gap: float) -> Phase:
 
 
 def common_lap(motions: list[Motion], own: list[Features]) -> list[Phase]:
-    """Where each clip is in the lap.
+    """Timing of each clip in the lap.
 
-    The clip that is most like the others keeps its own phase (if it closes); the others are placed one after the
-    other, the nearest first, and then once more against all.
+    The clip most similar to all others keeps its own phase (if it is closed); the others are placed one after the
+    other, the nearest first, and then once more against their nearest of all.
 
     Parameters
     ----------
     motions : list of Motion
     own : list of Features
-        Theirs, at `SAMPLES` steps.
+        Features of the motions at `SAMPLES` steps.
     """
     points = [_points(each) for each in own]
     gaps = [_return_gap(motion, each) for motion, each in zip(motions, own, strict=True)]

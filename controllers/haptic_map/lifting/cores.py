@@ -1,14 +1,14 @@
-r"""Cores of curves: near a curve the map plays that curve's clip alone, so tremor across the curve does not matter.
+r"""Cores of curves: dead zones in which the map plays one curve's clip alone, so that tremor does not blend clips.
 
-Before places are weighed, one at q within the core b_i(θ) of a site q_i(θ) is drawn in towards it:
+Before the weights are computed, a point q within the core radius b_i(θ) of a site q_i(θ) is drawn towards the site:
 
 .. math:: q \mapsto q_i + S\!\left(\frac{|q - q_i|}{b_i}\right) (q - q_i), \qquad S(x) = 10 x^3 - 15 x^4 + 6 x^5 ,
 
-C², the identity from b_i on, at most 1.8 times as steep, and of the fourth order at the site: a hand that is a quarter
-of the core off is drawn to a fortieth of it. Cores do not overlap.
+This is C², the identity from b_i on, at most 1.8 times as steep, and of fourth order at the site: a hand that is a
+quarter of the core off is drawn to a fortieth of it. Cores do not overlap.
 
-Why: late in a lap, clips of curves that are millimetres apart differ by metres in how far they have travelled. A tenth
-of a millimetre sideways in a fiftieth of a second asks the body for more than the acceleration of gravity.
+The reason: late in a lap, clips of curves that are millimetres apart differ by metres in the distance travelled. A
+tenth of a millimetre sideways in a fiftieth of a second would demand more than the acceleration of gravity of the body.
 """
 
 import numpy as np
@@ -18,23 +18,23 @@ from controllers.curves.splines import round_lap
 from controllers.easing import smooth_step
 from controllers.state import Array
 
-_WIDEST = 8e-3  # [m]
+_WIDEST = 8e-3  # [m] largest core
 _SHARE = 0.45  # of the distance to the nearest other site: less than half, so that cores do not touch
 _FINE = 4  # samples of a distance between two rows
 
 
 @njit
 def draw_in(r: float, z: float, sites: Array, slopes: Array, place: Array, change: Array) -> bool:
-    """Draw a place in towards the site whose core it is in; returns whether there is one.
+    """Draw a point towards the site whose core contains it; returns whether there is such a site.
 
     Parameters
     ----------
     r, z : float
-        The place [m].
+        The point [m].
     sites, slopes : Array, shape (m, 4)
-        Of the clips that are near, from `near_clips`: r, z, reach, core, and their derivatives by θ.
+        Sites of the nearby clips, from `near_clips`: r, z, reach, core; and their derivatives by θ.
     place : Array, shape (2,)
-        Written: where it is drawn to [m].
+        Written: the point after drawing in [m].
     change : Array, shape (3, 2)
         Written: derivatives of that by θ, r and z.
     """
@@ -56,9 +56,10 @@ def draw_in(r: float, z: float, sites: Array, slopes: Array, place: Array, chang
 
 
 def core_points(sites: Array) -> Array:
-    """Control points of the cores b_i of sites (rows, m, 2) [m], shape (rows + 3, m), as `splines.basis` reads them.
+    """Control points (rows + 3, m) of the splines b_i(θ) [m] of sites (rows, m, 2), for `splines.basis`.
 
-    Each is a share of the least distance to another site wherever it counts, so no spline through them exceeds that.
+    Each is a share of the least distance to another site over the support of its basis function, which b_i(θ) therefore
+    never exceeds.
     """
     rows, m, _ = sites.shape
     places = round_lap(sites, np.arange(_FINE * rows) * 2.0 * np.pi / (_FINE * rows))
@@ -67,7 +68,7 @@ def core_points(sites: Array) -> Array:
         distance = np.linalg.norm(places - places[:, i : i + 1], axis=2)
         distance[:, i] = np.inf
         least[:, i] = distance.min(axis=1)
-    # Control point j counts from two rows before row j − 1 to two behind it.
+    # The basis function of control point j is non-zero from two rows before row j − 1 to two rows behind it.
     window = np.arange(-3 * _FINE, _FINE + 1)
     around = least[np.mod(_FINE * np.arange(rows + 3)[:, None] + window, len(least))].min(axis=1)
     return np.minimum(_SHARE * around, _WIDEST)

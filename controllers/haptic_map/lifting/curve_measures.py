@@ -1,4 +1,4 @@
-"""What authored curves are like: how far apart, how bent, how fast, and how well they mirror the motions."""
+"""Measures of authored curves: separation, curvature, speed, and how well they reproduce the motions' distances."""
 
 from typing import NamedTuple
 
@@ -11,14 +11,14 @@ from controllers.state import Array
 
 
 class CurveMeasure(NamedTuple):
-    """One curve, its clip at its own pace.
+    """Measures of one curve, with its clip at its own pace.
 
     Attributes
     ----------
     radius : float
         Least radius of curvature [m].
     speed, acceleration : float
-        Greatest of the hand on it [m/s, m/s²].
+        Largest of the hand on the curve [m/s, m/s²].
     """
 
     radius: float
@@ -27,17 +27,17 @@ class CurveMeasure(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """A transition and how the two curves pass each other there.
+    """A transition and the geometry of its two curves there.
 
     Attributes
     ----------
     transition : Transition
     distance : float
-        Of the curves at its angle [m].
+        Distance of the curves at its angle [m].
     slant : float
-        Angle between their tangents [rad].
+        Angle between the curves' tangents [rad].
     speeds : (float, float)
-        Of the hand on either [m/s].
+        Speeds of the hand on either curve [m/s].
     """
 
     transition: Transition
@@ -47,16 +47,17 @@ class Meeting(NamedTuple):
 
 
 class ArrangementMeasure(NamedTuple):
-    """All curves together.
+    """Measures of all curves together.
 
     Attributes
     ----------
     separation : float
-        Least distance of two curves at one angle, `WINDOW` or further from their transitions [m]; infinite for one.
+        Least distance of two curves at one angle, `WINDOW` or further from their transitions [m]; infinite for one
+        curve.
     nearest : float
-        The same in space: from any point of the one to any of the other, both so far from the transitions [m].
+        The same in space: between any two points of two curves, both `WINDOW` or further from their transitions [m].
     stress : float
-        How far distances of curves are from those of the poses, brought to one scale: √(Σ (D − κd)² / Σ D²).
+        Deviation of the curves' distances from those of the poses, at the best scale κ: √(Σ (D − κd)² / Σ D²).
     curves : tuple of CurveMeasure
     meetings : tuple of Meeting
     """

@@ -1,12 +1,12 @@
-r"""Clips over the angle of the hand: splines with a knot at every frame, so that no frame is altered.
+r"""Clips as functions of the hand's angle: splines with a knot at every frame, so that no frame is altered.
 
-Frame k of a clip is at the angle θ_k, which increases. Its channels are what `combination` reads: the remainder
-ρ = exp(−(θ_k/2π) ξ) X_root of the root, the joints, and the ends of limbs. Through them goes one periodic C² cubic
-spline of θ, kept as values and slopes at its knots (Hermite's form: at a knot the value is exactly what is stored).
+Frame k of a clip is at the angle θ_k, increasing in k. Its channels are those of `combination`: the remainder
+ρ = exp(−(θ_k/2π) ξ) X_root of the root, the joints, and the ends of limbs. One periodic C² cubic spline of θ goes
+through them, stored as values and slopes at its knots (Hermite form: the value at a knot is exactly the stored one).
 
-An open clip leaves a gap in the lap. Over it goes a return segment, from the last frame to the first of the next lap:
-it coasts out of the one and into the other, and eases between; rotations take the shorter way. Nothing but the gap
-is changed by it.
+An open clip leaves a gap in the lap, which a return segment fills, from the last frame to the first of the next lap:
+the motion coasts out of the one and into the other, with an eased blend between; rotations take the shorter way. Only
+the gap is affected.
 """
 
 from collections.abc import Callable
@@ -21,12 +21,12 @@ from controllers.errors import ParameterError
 from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
 from controllers.state import Array
 
-CLOSES = 1e-6  # [m], in quaternions half of [rad]: how nearly the frames of a closed clip must close
-LEAST_GAP = 0.05  # [rad] that an open clip leaves of the lap
-WIDEST_STEP = 0.5 * np.pi  # [rad] between two frames
+CLOSES = 1e-6  # [m], for quaternions half of [rad]: tolerance within which a closed clip must close
+LEAST_GAP = 0.05  # [rad] least gap that an open clip leaves in the lap
+WIDEST_STEP = 0.5 * np.pi  # [rad] largest angle between two frames
 
 _TURN = 2.0 * np.pi
-_COAST = 0.4  # [rad] of θ over which an open clip coasts out and in, at most the gap
+_COAST = 0.4  # [rad] of θ over which the motion of an open clip coasts out and in, at most the gap
 _KNOTS, _START, _FIRST_KNOT, _FIRST_ROW, _HEADER = range(5)
 
 
@@ -46,7 +46,7 @@ def interpolate_frames(clips: Array, clip: int, angle: float, value: Array, slop
     clips : Array
         `packed_frames`.
     clip : int
-        Which.
+        Number of the clip.
     angle : float
         θ in [0, 2π].
     value, slope : Array, shape (channels,)
@@ -90,7 +90,7 @@ def frames_at(spline: tuple[Array, Array, Array], angles: Array) -> Array:
 
 
 def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array:
-    """Angles of a clip's frames [rad], or what is wrong with them."""
+    """Validated angles of a clip's frames [rad]; raises `ParameterError`."""
     array = np.array(angles, dtype=np.float64)
     if array.shape != (frames,):
         raise ParameterError(f"{name} has {frames} frames, its angles have shape {array.shape}; expected ({frames},)")
@@ -118,7 +118,7 @@ def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array
 
 
 def closing_gap(poses: Array) -> float:
-    """How far the remainder of a clip (n, nq) is from closing: the largest difference in a position or quaternion."""
+    """Largest difference of the last from the first remainder of a clip (n, nq), in a position or quaternion."""
     ends = remainder(poses, np.linspace(0.0, 1.0, len(poses)), drift_of(poses))[[0, -1]]
     rotations = ends[:, 3:].reshape(2, -1, 4)
     signs = np.where((rotations[0] * rotations[1]).sum(axis=1) < 0.0, -1.0, 1.0)
@@ -128,12 +128,12 @@ def closing_gap(poses: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PlacedClip:
-    """A clip at the angles of the hand, moved over the ground such that its remainder is at the origin, facing +x.
+    """A clip at the angles of the hand, moved over the ground so that its remainder is at the origin, facing +x.
 
     Attributes
     ----------
     poses : Array, shape (n, nq)
-        Its frames where they were moved to.
+        The frames after this displacement.
     angles : Array, shape (n,)
         θ_k [rad].
     closed : bool
@@ -141,7 +141,7 @@ class PlacedClip:
     drift : Array, shape (3,)
         ξ of a lap.
     duration : float
-        [s].
+        Duration of the clip [s].
     """
 
     poses: Array
@@ -152,10 +152,10 @@ class PlacedClip:
 
     @staticmethod
     def of(poses: Array, fps: float, angles: Array, closed: bool) -> "PlacedClip":
-        """Clip of poses that passed `checked_clip` and angles that passed `checked_angles`."""
+        """Clip from poses that passed `checked_clip` and angles that passed `checked_angles`."""
         placed = placed_at_origin(poses, (angles - angles[0]) / _TURN)
         drift = drift_of(placed)
-        # At the angle θ₀ the drift has already gone its share of the lap.
+        # At the angle θ₀ the drift has already moved the figure by the share θ₀/2π of a lap.
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
         placed[:, :2] = turned(heading, placed[:, :2]) + shift
         placed[:, 3:7] = yawed(heading, placed[:, 3:7])
@@ -175,15 +175,15 @@ def lap_spline(angles: Array, channels: Array, rotations: int, closed: bool) -> 
     angles : Array, shape (n,)
         θ_k [rad].
     channels : Array, shape (n, channels)
-        Position, unit quaternions, then anything that repeats.
+        Position, unit quaternions, then any periodic channels.
     rotations : int
-        How many quaternions.
+        Number of quaternions.
     closed : bool
 
     Returns
     -------
     knots : Array, shape (k + 1,)
-        Angles of a lap, the first again at the end.
+        Angles of a lap, with the first one plus 2π at the end.
     values, slopes : Array, shape (k + 1, channels)
     """
     signs = np.ones(channels.shape[1])
@@ -196,7 +196,7 @@ def lap_spline(angles: Array, channels: Array, rotations: int, closed: bool) -> 
         between, back = _return_segment(angles, channels, rotations, signs)
         knots, values = np.concatenate([angles, between]), np.concatenate([channels, back])
     n = len(knots)
-    # A quaternion that comes back with the opposite sign is periodic over two laps.
+    # A quaternion that returns with the opposite sign is periodic over two laps.
     twice = np.concatenate([values, signs * values, values[:1]])
     spline = CubicSpline(np.concatenate([knots, knots + _TURN, [knots[0] + 2.0 * _TURN]]), twice, bc_type="periodic")
     slopes = spline(spline.x[: n + 1], 1)
@@ -209,7 +209,7 @@ def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array
     count = max(3, round(gap / 0.1))
     u = np.arange(1, count) / count
     coast = min(_COAST, gap)
-    # One-sided slopes, damped to nothing over the coast.
+    # One-sided slopes, damped to zero over the coast.
     out = (channels[-1] - channels[-2]) / (angles[-1] - angles[-2])
     back = signs * (channels[1] - channels[0]) / (angles[1] - angles[0])
     rest_out, rest_back = (np.maximum(1.0 - gap * s / coast, 0.0) ** 3 * gap * s for s in (u, 1.0 - u))
@@ -224,7 +224,7 @@ def _return_segment(angles: Array, channels: Array, rotations: int, signs: Array
 
 
 def packed_frames(splines: list[tuple[Array, Array, Array]]) -> Array:
-    """What `interpolate_frames` reads: knots, values and slopes of each clip (`lap_spline`)."""
+    """Knots, values and slopes of each clip (`lap_spline`), packed for `interpolate_frames`."""
     headers: list[float] = []
     blocks: list[Array] = []
     at = _HEADER * len(splines)

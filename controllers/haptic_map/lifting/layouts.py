@@ -1,4 +1,4 @@
-"""Places for curves in the half plane (r, z): how many fit into a rectangle, and where motions belong in it."""
+"""Initial layouts of curves in the half plane (r, z): lattices in a rectangle, and multidimensional scaling."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -8,7 +8,7 @@ from controllers.state import Array
 
 
 def lattice(rectangle: Rectangle, separation: float) -> Array:
-    """Places (k, 2) in a rectangle, each at least a separation from all others: a hexagonal lattice."""
+    """Hexagonal lattice of points (k, 2) in a rectangle, each at least the separation from all others [m]."""
     size = rectangle.high - rectangle.low
     best = np.empty((0, 2))
     for axis in (0, 1):
@@ -26,14 +26,15 @@ def lattice(rectangle: Rectangle, separation: float) -> Array:
 
 
 def scaled(wanted: Array, pace: Array, rectangle: Rectangle) -> Array:
-    """Places (n, 2) in a rectangle whose distances are nearly those wanted, by classical scaling (Torgerson 1952).
+    """Points (n, 2) in a rectangle with nearly the distances wanted, by classical scaling (Torgerson 1952).
 
     Parameters
     ----------
     wanted : Array, shape (n, n)
         Distances [m].
     pace : Array, shape (n,)
-        How fast each clip goes round: of all ways to turn the places, one is taken in which fast clips are inside.
+        Angular rate of each clip: among the rotations and reflections of the points, those that fit the rectangle and
+        put fast clips at small radii are preferred.
     rectangle : Rectangle
     """
     n = len(wanted)
@@ -57,10 +58,10 @@ def scaled(wanted: Array, pace: Array, rectangle: Rectangle) -> Array:
 
 
 def on_lattice(places: Array, rectangle: Rectangle, separation: float) -> Array:
-    """Places (n, 2) of a lattice that spreads over the rectangle, as near to the given ones as can be."""
+    """Points (n, 2) of the coarsest lattice with room for them, assigned as near as possible to the given ones."""
     n = len(places)
     pitch = float(np.linalg.norm(rectangle.high - rectangle.low))
-    # As coarse as fits: the arrangement is to use the room there is.
+    # The coarsest lattice that fits, so that the arrangement uses the whole rectangle.
     while len(lattice(rectangle, pitch)) < n and pitch > separation:
         pitch = max(0.95 * pitch, separation)
     points = lattice(rectangle, pitch)

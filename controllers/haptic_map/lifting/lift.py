@@ -1,9 +1,9 @@
-"""Lifting: from clips alone to curves in the device's workspace (Donald & Henle 2000, section 8.1, left open there).
+"""Lifting: curves in the device's workspace from clips alone (Donald & Henle 2000, section 8.1, left open there).
 
-Four steps, each a module: motions become points of a Euclidean space (`motion_features`); all are aligned to one lap
-(`common_lap`); moments at which two nearly agree are found (`transitions`); and the curves are arranged so that they
-mirror the distances of the motions, apart where these differ and near each other at transitions (`arrangement`). What
-comes out are the angles and sites of a `Lifted` map, which is exact on every clip whatever they are.
+Four steps, each a module: motions become points of a Euclidean space (`motion_features`); all are aligned in time to
+one lap (`common_lap`); moments at which two motions nearly agree are found (`transitions`); and the curves are arranged
+to reproduce the distances of the motions, far apart where motions differ and near at transitions (`arrangement`). The
+result are the angles and sites of a `Lifted` map, which is exact on every clip for any angles and sites.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import Comparison, Transition, compare, find_transitions, same_motions
 from controllers.state import Array
 
-_FEWEST = 4  # frames: a cubic spline through a curve
+_FEWEST = 4  # frames, for a cubic spline
 
 
 class Lifting(NamedTuple):
-    """Curves of clips, as `Lifted` takes them, and what they are like.
+    """Curves of clips, as arguments of `Lifted`, and their measures.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Lifting(NamedTuple):
     sites : Array, shape (rows, n, 2)
         (r, z) [m].
     transitions : tuple of Transition
-        The best first.
+        Transitions, the best first.
     same : tuple of (int, int)
-        Clips that hold the same motion: their curves are apart all the same.
+        Pairs of clips with the same motion; their curves are kept apart nevertheless.
     still : tuple of int
         Clips in which nothing moves.
     before, after : ArrangementMeasure
-        Of the places by mean distance alone, and of the arrangement.
+        Measures of the layout by mean distances alone, and of the arrangement.
     distance : float
         Mean over the lap and all pairs of the distance between poses [m].
     """
@@ -63,18 +63,18 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     Parameters
     ----------
     motions : sequence of Motion
-        Of any lengths and rates.
+        Clips of any lengths and frame rates.
     weights : Array, shape (1 + joints,)
-        By how much a radian of root and joints moves the body, RMS over its mass [m].
+        Displacement of the body per radian of root and joints, RMS over its mass [m].
     room : Room
     rng : numpy.random.Generator
-        Of the places from which the arrangement begins.
+        Draws the initial guesses of the arrangement.
 
     Raises
     ------
     ParameterError
-        If there is no clip, one has fewer than four frames, is said to close and does not, or is too fast for the
-        innermost radius; or if there is no room for so many.
+        If there is no clip, one has fewer than four frames, is given as closed but does not close, or is too fast for
+        the innermost radius; or if there is no room for all clips.
     """
     clips = list(motions)
     if not clips:
@@ -159,7 +159,7 @@ def _compared(own: list[Features], phases: list[Phase], laps: Array) -> Comparis
             moments.append(each.at(np.mod(s, 1.0)))
             inside.append(np.ones(SAMPLES, dtype=np.bool_))
             continue
-        # In the gap an open clip goes from its end to its start, which is no transition.
+        # In the gap an open clip returns from its end to its start; no transition may lie there.
         back = np.clip((s - 1.0) * (1.0 - phase.gap) / phase.gap, 0.0, 1.0)
         moments.append(each.at(np.where(s <= 1.0, np.clip(s, 0.0, 1.0), 1.0 - back)))
         inside.append(s <= 1.0)
@@ -176,7 +176,7 @@ def _rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:
         slope = 1.0 / (1.0 - phase.gap) + phase.lead(since, 1)
         rate = 2.0 * np.pi / (motion.duration * slope)
         rates.append(rate)
-        # dθ̇/dt = θ̇ dθ̇/dθ, and θ̇ goes with one over the slope of the share.
+        # dθ̇/dt = θ̇ dθ̇/dθ, and θ̇ is inversely proportional to the slope of the share.
         changes.append(-(rate**2) * phase.lead(since, 2) / (2.0 * np.pi * slope))
     return np.stack(rates, axis=1), np.stack(changes, axis=1)
 

@@ -1,11 +1,11 @@
-r"""Motions as points of a Euclidean space in which distance is metres of the body, whatever its place on the ground.
+r"""Motions as points of a Euclidean space: distances are metres of body motion, regardless of the place on the ground.
 
 .. math:: d^2 = (z - z')^2 + w_0^2 |R^\top e_z - R'^\top e_z|^2 + \sum_k w_k^2\, \bigl(2\sin\tfrac{\varphi_k}{2}\bigr)^2
 
 z is the root's height, R its orientation, of which only the tilt counts, and φ_k the angle between the two rotations
 of joint k: to second order the norm of the difference in tangent coordinates. With w_k the RMS distance by which one
-radian of a joint moves the body, d is in metres. Velocities are compared likewise: of the joints, and of the root as
-it feels them itself. In the spirit of motion graphs (Kovar, Gleicher & Pighin 2002).
+radian of a joint moves the body, d is in metres. Velocities are compared likewise: those of the joints, and that of the
+root in its own frame. The approach is that of motion graphs (Kovar, Gleicher & Pighin 2002).
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A clip as lifting sees it.
+    """A clip as input of lifting.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ class Motion:
         Frames per second [1/s].
     name : str
     closed : bool
-        Whether the last frame is the first again, moved over the ground.
+        Whether the last frame equals the first up to a displacement over the ground.
     supports : Mask, shape (n, k)
-        Which of k feet bear load in a frame.
+        Which of k feet bear load in each frame.
 
     Raises
     ------
     ParameterError
-        If poses are not those of a clip, or supports are not given for every frame.
+        If the poses are not those of a clip, or supports are not given for every frame.
     """
 
     poses: Array
@@ -59,7 +59,7 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """From the first frame to the last [s]."""
+        """Time from the first frame to the last [s]."""
         return (len(self.poses) - 1) / self.fps
 
 
@@ -69,11 +69,11 @@ class Features(NamedTuple):
     Attributes
     ----------
     pose : Array, shape (n, p)
-        [m]
+        Features of the pose [m].
     velocity : Array, shape (n, q)
-        [m/s]
+        Features of the velocity [m/s].
     support : Array, shape (n, k)
-        How much each foot bears, 0 to 1.
+        Whether each foot bears load, 0 to 1.
     """
 
     pose: Array
@@ -95,9 +95,9 @@ def features(motion: Motion, weights: Array, samples: int) -> Features:
     ----------
     motion : Motion
     weights : Array, shape (1 + joints,)
-        w_k: by how much a radian of root and joints moves the body, RMS over its mass [m].
+        w_k: displacement of the body per radian of root and joints, RMS over its mass [m].
     samples : int
-        At how many equal steps of time.
+        Number of equal steps of time, both ends included.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The room that authored curves have in the device's workspace."""
+"""Workspace limits of authored curves: region, distances, speed and acceleration."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from controllers.state import Array
 
 
 class Rectangle(NamedTuple):
-    """Where sites may be [m]: r from r_min to r_max, z from z_min to z_max."""
+    """Region of the sites [m]: r from r_min to r_max, z from z_min to z_max."""
 
     r_min: float
     r_max: float
@@ -32,7 +32,7 @@ class Rectangle(NamedTuple):
 
 @dataclass(frozen=True)
 class Room:
-    """Where curves may be, and how near to each other and how fast.
+    """Limits of authored curves: their region, their distances, and the hand's speed and acceleration on them.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ class Room:
     separation : float
         Least distance of two curves at one angle, away from their transitions [m].
     approach : float
-        How near they come at a transition where poses agree [m].
+        Distance of two curves at a transition where poses agree [m].
     alike : float
         Relative mismatch of poses, velocities and standing feet up to which two motions have a transition [1].
     speed : float
-        Greatest of a hand that follows a curve at its clip's pace [m/s].
+        Largest speed of a hand that follows a curve at its clip's pace [m/s].
     acceleration : float
-        Likewise [m/s²].
+        Its largest acceleration [m/s²].
 
     Raises
     ------
@@ -79,5 +79,5 @@ class Room:
 
     @property
     def rectangle(self) -> Rectangle:
-        """r_min, r_max, z_min, z_max."""
+        """The region as a `Rectangle`."""
         return Rectangle(*self.r_range, *self.z_range)

@@ -7,32 +7,32 @@ from controllers.errors import ParameterError
 from controllers.state import Array
 
 _LEAST_ROWS = 8
-_LEAST_RADIUS = 2e-3  # [m] that a stylus on the map keeps from the axis
-_LEAST_DISTANCE = 2e-4  # [m] between two curves
+_LEAST_RADIUS = 2e-3  # [m] least distance of the clamped stylus from the axis
+_LEAST_DISTANCE = 2e-4  # [m] least distance of two curves
 
 
 def box(sites: Array) -> tuple[Array, Array]:
-    """Least and largest (r, z) of what the control points of sites hold: no curve leaves it, between rows either."""
+    """Least and largest (r, z) of the sites' control points, a box that no curve leaves, also between rows."""
     control = control_points(sites, np.ones(sites.shape[1:]))
     return control.min(axis=(0, 1)), control.max(axis=(0, 1))
 
 
 def checked_sites(sites: Array, names: tuple[str, ...], margin: float) -> Array:
-    """Sites of clips with these names [m], or what is wrong with them.
+    """Validated sites of the named clips [m].
 
     Parameters
     ----------
     sites : Array, shape (rows, m, 2)
         (r, z) at equal steps of a lap.
     names : tuple of str
-        Of the m clips.
+        Names of the m clips.
     margin : float
-        How far the stylus may go beyond them [m].
+        Distance by which the clamped stylus may leave the box of the sites [m].
 
     Raises
     ------
     ParameterError
-        If shape or numbers are wrong, one comes to the axis, or two come together.
+        If shape or numbers are wrong, a curve is too near to the axis, or two curves are too near to each other.
     """
     array = np.array(sites, dtype=np.float64)
     if array.ndim != 3 or len(array) < _LEAST_ROWS or array.shape[1:] != (len(names), 2):

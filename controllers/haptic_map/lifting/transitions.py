@@ -1,9 +1,9 @@
 """Transitions: moments of the common lap at which two motions nearly agree in pose, velocity and standing feet.
 
-What counts as near is relative: the distance of the poses to that of two moments of these motions picked at random, the
-distance of the velocities to how fast the two motions are, and of the feet as many as bear load in one motion only. As
-in motion graphs (Kovar, Gleicher & Pighin 2002) what is compared are windows of frames, about as long as a hand takes
-to change over: a figure that walks breaks into a run where its feet are in step for a while, and falls where two poses
+Distances are relative: that of the poses to the distance of two moments of these motions picked at random, that of the
+velocities to the speeds of the two motions, and that of the feet is the share of feet that bear load in one motion
+only. As in motion graphs (Kovar, Gleicher & Pighin 2002) windows of frames are compared, about as long as a hand takes
+to change over: a walking figure can break into a run where its feet are in step for a while, and falls where two poses
 agree for a moment by chance.
 """
 
@@ -14,13 +14,13 @@ import numpy as np
 from controllers.haptic_map.lifting.motion_features import Features, Mask
 from controllers.state import Array, IntArray
 
-SAME = 0.02  # mismatch, on average over the lap, of two clips that are the same motion
-_APART = 1.2  # [rad] between two transitions of one clip
+SAME = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
+_APART = 1.2  # [rad] least distance between two transitions of one clip
 _WINDOW = 0.2  # [s] before and after a transition, over which motions are compared
 
 
 class Transition(NamedTuple):
-    """Where a hand may change over from one curve to another.
+    """A moment at which a hand may change over from one curve to another.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Transition(NamedTuple):
     pose, velocity, support : float
         Relative distances of poses, velocities and standing feet, RMS over the window.
     speeds : tuple of two floats
-        Of the two figures' roots, mean over the window [m/s].
+        Speeds of the root in the two motions, mean over the window [m/s].
     """
 
     first: int
@@ -44,7 +44,7 @@ class Transition(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Pairs of motions moment by moment of the lap, at m equal steps of θ.
+    """Comparison of all pairs of motions at m equal steps of θ.
 
     Attributes
     ----------
@@ -53,11 +53,11 @@ class Comparison(NamedTuple):
     pose, velocity, support : Array, shape (m, n, n)
         Relative distances; see the module.
     speed : Array, shape (m, n)
-        Of the root [m/s].
+        Speed of the root [m/s].
     inside : Mask, shape (m, n)
-        Whether each clip has a frame there, or is in the gap where an open one returns.
+        True where a clip has frames, False in the gap where an open one returns.
     laps : Array, shape (n,)
-        Time of a lap of each clip [s].
+        Duration of a lap of each clip [s].
     """
 
     distance: Array
@@ -69,7 +69,7 @@ class Comparison(NamedTuple):
     laps: Array
 
     def window(self, i: int, j: int) -> IntArray:
-        """Steps before and after a moment at which two clips are compared there."""
+        """Steps, relative to a moment, of the window in which two clips are compared."""
         reach = round(_WINDOW / float(self.laps[[i, j]].mean()) * len(self.pose))
         return np.arange(-reach, reach + 1)
 
@@ -87,7 +87,7 @@ def compare(moments: list[Features], inside: Mask, laps: Array) -> Comparison:
     Parameters
     ----------
     moments : list of Features
-        Of each clip, at the same m angles.
+        Features of each clip at the same m angles.
     inside, laps
         See `Comparison`.
     """
@@ -106,16 +106,16 @@ def compare(moments: list[Features], inside: Mask, laps: Array) -> Comparison:
 
 
 def same_motions(compared: Comparison) -> list[tuple[int, int]]:
-    """Pairs of clips that hold the same motion all round the lap."""
+    """Pairs of clips with the same motion all round the lap."""
     mean = np.hypot(compared.pose, compared.velocity).mean(axis=0) / np.sqrt(2.0)
     return [(i, j) for j in range(len(mean)) for i in range(j) if mean[i, j] < SAME]
 
 
 def find_transitions(compared: Comparison, most: float) -> list[Transition]:
-    """Transitions that can be had together, the best first.
+    """A compatible set of transitions, the best first.
 
-    Candidates are the least mismatches in time of all pairs of clips that are not the same motion. They are taken
-    best first, if no transition of either clip is nearer than 1.2 rad, one for each pair.
+    Candidates are the local minima of the mismatch over the lap, of all pairs of clips that are not the same motion.
+    They are taken greedily, best first, one for each pair, if no transition of either clip is nearer than 1.2 rad.
 
     Parameters
     ----------
