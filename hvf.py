@@ -1,6 +1,6 @@
 """Haptic vector fields: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
 
-The public face: parts of a simulation, what can be done with it, and nothing of its own.
+The public interface: it re-exports the parts of a simulation and what can be done with it, and implements nothing.
 
     import hvf
 

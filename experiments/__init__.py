@@ -1,1 +1,1 @@
-"""What people run: the ``hvf`` command. The only place where concrete parts are wired together."""
+"""The ``hvf`` command and what it runs. The only package in which concrete parts are put together."""

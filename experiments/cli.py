@@ -31,14 +31,14 @@ _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; bad input is one line on stderr and exit code 2, a reader that has gone is 141."""
+    """Run the command; bad input gives one line on stderr and exit code 2, a closed output pipe exit code 141."""
     try:
         try:
             return _run(arguments)
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
-        # As `head` leaves it: what is still to be written goes nowhere, also when the interpreter ends.
+        # The reader has closed the pipe, as `head` does: discard the rest, also what the interpreter flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
 
@@ -66,14 +66,14 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _by_the_system(error: OSError) -> str:
-    """What the system refused; a write to a full disk does not tell its file."""
+    """Message for an error of the operating system; an error of a full disk does not name its file."""
     if error.errno == errno.ENOSPC:
         return "the disk is full; expected room on it, or another --out"
     return f"{error.filename}: {error.strerror}; expected a path to read or write" if error.filename else str(error)
 
 
 def _kept(command: Any) -> str:
-    """What is left of a command that was stopped, and how to go on."""
+    """What an interrupted command leaves on disk, and how to go on, in words."""
     if isinstance(command, command_class("run") | command_class("demo")) and (command.out / RECORDING).exists():
         return next_step(str(command.out))
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
@@ -82,12 +82,12 @@ def _kept(command: Any) -> str:
 
 
 def command_class(name: str) -> Any:
-    """Class of a command by its name: ``hvf run`` is `experiments.commands.run`."""
+    """Class of a command, by name: that of ``hvf run`` is in `experiments.commands.run`."""
     return import_module(f"experiments.commands.{name}").Command
 
 
 def choice_of(names: Sequence[str]) -> Any:
-    """What tyro reads one of these commands as."""
+    """Union type from which tyro parses one of these commands."""
     return reduce(or_, (Annotated[command_class(name), tyro.conf.subcommand(name)] for name in names))
 
 
@@ -97,7 +97,7 @@ def parsed(words: Sequence[str]) -> Any:
     Raises
     ------
     ParameterError
-        If it was mistyped: what tyro says in a box, in one line.
+        If it was mistyped; tyro's boxed message is shortened to one line.
     """
     _refuse_empty(words)
     said = io.StringIO()
@@ -112,7 +112,7 @@ def parsed(words: Sequence[str]) -> Any:
     except SystemExit as ended:
         if ended.code in (0, None):
             raise
-        # A part that refuses a number says so itself.
+        # Where a configuration part refused a value, its own message is the better one.
         cause: BaseException | None = ended
         while cause is not None:
             if isinstance(cause, ParameterError):
@@ -122,7 +122,7 @@ def parsed(words: Sequence[str]) -> Any:
 
 
 def _refuse_empty(words: Sequence[str]) -> None:
-    """An empty word is a variable of a script that was not set, and would be taken for the current folder."""
+    """Refuse empty arguments: they come from unset variables of a script, and would mean the current folder."""
     for before, word in zip(["hvf", *words], words, strict=False):
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
@@ -130,7 +130,7 @@ def _refuse_empty(words: Sequence[str]) -> None:
 
 
 def _one_line(said: str, words: Sequence[str]) -> str:
-    """What is in tyro's first box: option, value, what would be right; and where more is to be read."""
+    """Text of tyro's first box in one line: option, value, what is expected; and where to read more."""
     lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in said.splitlines()][1:])  # without the title
     first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(said.split())
     first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ")
@@ -155,7 +155,7 @@ _MISTAKES = (
     (r"invalid literal for int\(\) with base 10: '(?P<value>[^']*)'", "a whole number"),
     (r"invalid choice '(?P<value>[^']*)'", ""),
 )
-"""What tyro says of a value, and what would be right; nothing for what it lists itself."""
+"""Tyro's messages on a wrong value, and what is expected; empty where tyro lists the choices itself."""
 
 
 if __name__ == "__main__":

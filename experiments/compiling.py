@@ -1,4 +1,4 @@
-"""What a run needs compiled, made before it in processes of its own, while a bar tells what is still to be done."""
+"""Compilation of the units that a run needs, before the run, in separate processes and with a progress bar."""
 
 from collections.abc import Sequence
 
@@ -10,9 +10,9 @@ from sim.compilation.units import Unit
 
 
 def compile_once(console: Console, units: Sequence[Unit]) -> None:
-    """Compile those of the units that are not kept, and say so.
+    """Compile those of the units that are not in the cache, and say so.
 
-    A compilation that fails leaves it to the run itself, which then says what is wrong.
+    A failed compilation is not reported here: the run compiles the unit again and raises the error.
     """
     waiting = list(missing_units(units))
     if not waiting:

@@ -1,4 +1,4 @@
-"""What a run that was stopped would have left beside its recording: summary, animations, figures, page."""
+"""Completes an interrupted run from its recording: summary, animations, figures, page."""
 
 from pathlib import Path
 
@@ -17,12 +17,14 @@ from sim.recording.recording import Recording
 
 
 def finish(folder: Path) -> list[str]:
-    """Draw figures and page of a run again, after what it lacks if it was stopped; what happened, in words.
+    """Draw figures and page of a run again; an interrupted run first gets its summary and animations.
+
+    Returns what happened in the run, in words.
 
     Raises
     ------
     SimError
-        If there is no recording, or its run is still going on.
+        If there is no recording, or the run is still in progress.
     """
     with Recording(folder / RECORDING) as recording:
         of_a_configuration = "mode" in recording.config and "live" not in recording.texts
@@ -36,7 +38,7 @@ def finish(folder: Path) -> list[str]:
 
 
 def _complete(folder: Path) -> None:
-    """Write summary and animations; what only the program knew is found by running the same again."""
+    """Write summary and animations; state that is not in the recording is found by simulating the run again."""
     with Recording(folder / RECORDING) as recording:
         config = config_of(recording)
         check_map(config, recording)

@@ -1,4 +1,4 @@
-"""What a run will take of time and disk, before it begins."""
+"""Estimates, before a run begins, of the time and disk space that it will take."""
 
 import shutil
 from collections.abc import Mapping
@@ -11,18 +11,18 @@ from experiments.working import expected_seconds
 from sim.recording.recorder import MARGIN, Group
 
 SIMULATING = "a simulated second"
-"""Under which the time that a simulated second takes is kept."""
-_LEAST = 400.0  # bytes of a tick of any run: what is measured, felt and asked of the motors
-_LONG, _LARGE = 60.0, 1e9  # [s] of real time and [bytes] from which on a run says what it will take
+"""Name under which the wall-clock time per simulated second is stored."""
+_LEAST = 400.0  # bytes per tick that every run records: measurements, forces, motor commands
+_LONG, _LARGE = 60.0, 1e9  # [s] of real time and [bytes] from which a run announces what it will take
 
 
 def check_length(out: Path, seconds: float, servo_period: float) -> None:
-    """Refuse a run that no kind of recording of which fits on the disk, before anything is made for it."""
+    """Refuse a run whose recording cannot fit on the disk, however little it records, before anything is made."""
     _check(out, seconds, _LEAST / servo_period)
 
 
 def foreseen(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | None:
-    """What a run will take, in words; None if that is little.
+    """Time and disk space that a run will take, in words; None if both are small.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def _check(out: Path, seconds: float, rate: float) -> None:
 
 
 def _free(out: Path) -> float:
-    """Bytes that are free where a folder is, or will be."""
+    """Free bytes on the file system where a folder is or will be."""
     there = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.exists())
     return float(shutil.disk_usage(there).free)
 

@@ -1,4 +1,4 @@
-"""Small makers of the public face: clips by name or from files, the default curve, the version."""
+"""Small factory functions of the public interface: clips by name or from files, the default curve, the version."""
 
 from importlib.metadata import version as installed
 from pathlib import Path
@@ -9,18 +9,18 @@ from models.mocap.library import embedded, embedded_names, load_clip
 
 
 def clips(*names: str) -> tuple[Clip, ...]:
-    """Embedded clips by name; all of them without any.
+    """Embedded clips by name; all of them if no name is given.
 
     Raises
     ------
     ModelError
-        If there is no clip of a name.
+        If there is no clip of that name.
     """
     return tuple(embedded(name) for name in names or embedded_names())
 
 
 def load(path: str | Path) -> Clip:
-    """The motion in a BVH, AMC or DeepMimic file, on the figure.
+    """The motion in a BVH, AMC or DeepMimic file, retargeted to the figure.
 
     Raises
     ------
@@ -31,10 +31,10 @@ def load(path: str | Path) -> Clip:
 
 
 def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:
-    """A circle about the vertical axis of the hand frame, of a radius [m] and run through in so long [s]."""
+    """A circle about the vertical axis of the hand frame H, with its radius [m] and the duration of a lap [s]."""
     return Trajectory.circle(radius, lap)
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Version of the installed package."""
     return installed("haptic-vector-fields")

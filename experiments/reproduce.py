@@ -1,4 +1,4 @@
-"""Whether a recorded run happens again, bit for bit, from its recorded configuration."""
+"""Runs the configuration of a recording again and compares the two bit for bit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from sim.recording.recording import Recording
 
 
 class _Comparison:
-    """Compares the blocks of a run with a recording as they come; keeps the first difference of each group."""
+    """Compares the blocks of a run with a recording while it runs; keeps the first difference of each group."""
 
     def __init__(self, recording: Recording, session: Session):
         self._recording, self._root = recording, session.world.pose_at
@@ -49,7 +49,7 @@ class _Comparison:
 
 
 def check_map(config: RunConfig, recording: Recording) -> None:
-    """Refuse a map whose file is not the one that was recorded with."""
+    """Refuse a map whose file has changed since the recording was made."""
     recorded = recording.texts.get("map_sha256")
     if recorded is None:
         return
@@ -64,18 +64,18 @@ def check_map(config: RunConfig, recording: Recording) -> None:
 
 @dataclass(frozen=True)
 class Reproduced:
-    """What came of running a recording again.
+    """Result of running a recording again.
 
     Attributes
     ----------
     same : bool
-        Whether every tick and frame is, bit for bit.
+        Whether every tick and frame is the same, bit for bit.
     ticks : int
-        How many were compared.
+        Number of ticks compared.
     differences : dict of str to str
-        The first one of each group of channels.
+        First difference of each group of channels, in words.
     remarks : tuple of str
-        What is other here than where it was recorded.
+        Packages and processor that differ from those of the recording.
     """
 
     same: bool
@@ -84,7 +84,7 @@ class Reproduced:
     remarks: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """In words."""
+        """Result in words."""
         found = f"the same, bit for bit, over {self.ticks} ticks and what the figure did"
         return [*self.remarks, found if self.same else f"not the same: {'; '.join(self.differences.values())}"]
 
@@ -95,7 +95,7 @@ def reproduce(folder: Path) -> Reproduced:
     Raises
     ------
     SimError
-        If it is no recording, the file of its map has changed, or a person's hand made it.
+        If the folder holds no recording, the file of its map has changed, or a person drove the run live.
     OSError
         If a file cannot be read.
     """
@@ -112,7 +112,7 @@ def reproduce(folder: Path) -> Reproduced:
 
 
 def _others(versions: Mapping[str, str]) -> tuple[str, ...]:
-    """Which packages, and whether the processor, are others than those of a recording, in words."""
+    """Packages and processor that differ from those of a recording, in words."""
     said: list[str] = []
     for package, recorded in versions.items():
         if package == "processor":

@@ -1,4 +1,4 @@
-"""A run from a configuration to a folder: recording, summary, animations, figures, page."""
+"""Runs a configuration and writes its folder: recording, summary, animations, figures, page."""
 
 import time
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ from sim.viewer.page import NullPage, Page
 from sim.viewer.shown import Shown
 
 BVH_FPS = 50.0
-VIEW_BLOCK_SECONDS = 0.032  # a new picture for every block
+VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
 
 
 def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: bool = False) -> RunSummary:
@@ -62,9 +62,9 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     config : RunConfig
         What to run.
     out : Path
-        Folder; made when it is missing.
+        Folder; created if it is missing.
     overwrite : bool
-        Whether a run that it holds may be replaced.
+        Whether a run that the folder holds may be replaced.
     started : float
         `time.perf_counter` when the program began.
     view : bool
@@ -73,7 +73,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     Raises
     ------
     ModelError, ControllerError, SimError
-        If something about the configuration or a file is wrong; the folder is then as it was.
+        If something about the configuration or a file is wrong; the folder is then left unchanged.
     """
     console = Console(stderr=True)
     check_folder(out, overwrite)
@@ -101,7 +101,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
 
 
 def write_summary(out: Path, summary: RunSummary) -> None:
-    """Write what happened beside its recording."""
+    """Write the summary of a run beside its recording."""
     (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
 
 
@@ -109,16 +109,16 @@ def record(
     session: Session, out: Path, config: Mapping[str, object], seconds: float, started: float, console: Console,
     view: bool = False,
 ) -> RunSummary:  # fmt: skip
-    """Run a session and record it into a folder that is there; returns what happened.
+    """Run a session, record it into an existing folder and return its summary.
 
     Parameters
     ----------
     session : Session
-        That has not begun.
+        Session that has not been run yet.
     out : Path
-        Folder.
+        Existing folder.
     config : Mapping
-        What it was made of, as the recording keeps it.
+        Configuration of the session, as the recording stores it.
     seconds : float
         Simulated time [s].
     started : float
@@ -187,7 +187,7 @@ def _live_page(session: Session) -> Page:
 
 
 def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
-    """What happened in a session that has been run, from its recording."""
+    """Summary of a session that has been run, computed from its recording."""
     parts = session.parts
 
     def keep_curve(curve: Trajectory) -> None:
@@ -200,10 +200,10 @@ def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
 
 
 def write_animations(out: Path, session: Session) -> None:
-    """The animation as the hand made it, and as the curve's nearest points have it, frame by frame in step."""
+    """Write two BVH files: the animation as the hand made it, and that of the curve's nearest points at each frame."""
     with Recording(out / RECORDING) as recording:
         if "reference" not in recording.groups["frames"]:
-            return  # without a figure there is none
+            return  # a run without a figure has no animation
         reference = recording.channel("frames", "reference")
         on_curve = [recording.channel("ticks", name) for name in ("nearest", "phase", "river")]
         stride = max(1, round(recording.rates["frames"] / BVH_FPS))

@@ -1,4 +1,4 @@
-"""A run of the robot arm, from a configuration to a folder."""
+"""Runs a configuration of the robot arm and writes its folder."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -39,7 +39,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If something about the configuration or the folder is wrong; the folder is then as it was.
+        If something about the configuration or the folder is wrong; the folder is then left unchanged.
     """
     console = Console(stderr=True)
     check_folder(out, overwrite)
@@ -65,7 +65,7 @@ def run_arm(config: ArmConfig, out: Path, overwrite: bool) -> ArmSummary:
 def _recorded(
     config: ArmConfig, servo: Servo, world: RobotWorld, curve: Trajectory, out: Path, console: Console
 ) -> ArmSummary:
-    """Run and record; what happened."""
+    """Run and record; returns the summary."""
     static: dict[str, npt.ArrayLike | str] = {
         "curve": curve.point(np.linspace(curve.start, curve.end, 241)), "tube_radius": 0.02, "p_WH": P_WH,
         "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),

@@ -1,4 +1,4 @@
-"""What a simulation leaves: numbers, channels, animation and page, in memory or in a folder."""
+"""The result of a simulation: summary, recorded channels, animation and page, in a temporary or a given folder."""
 
 import shutil
 import tempfile
@@ -46,14 +46,14 @@ class Channels(Mapping[str, Array]):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What happened in a simulation.
+    """Result of a simulation.
 
     Attributes
     ----------
     folder : Path
-        Where it lies; one of its own that goes when nobody holds the run any more, unless it was recorded.
+        Folder of the recording; unless ``record`` was given, a temporary one that is deleted with the `Run` object.
     summary : RunSummary
-        In numbers; `str` of a run says it in words.
+        Measures as numbers; `str` of a run gives them in words.
     """
 
     folder: Path
@@ -64,7 +64,7 @@ class Run:
     def of(
         session: Session, config: Mapping[str, object], seconds: float, record: str | Path | None, overwrite: bool
     ) -> "Run":
-        """Run a session and keep what happened; see `Simulation.run`."""
+        """Run a session and keep its recording; see `Simulation.run`."""
         started, console = time.perf_counter(), Console(stderr=True, quiet=True)
         if record is None:
             folder = Path(tempfile.mkdtemp(prefix="hvf-"))
@@ -85,12 +85,12 @@ class Run:
 
     @property
     def ticks(self) -> Channels:
-        """Channels at the servo's rate."""
+        """Channels at the rate of the servo."""
         return Channels(self.folder / RECORDING, "ticks")
 
     @property
     def frames(self) -> Channels:
-        """Channels at the figure's rate."""
+        """Channels at the rate of the figure's control."""
         return Channels(self.folder / RECORDING, "frames")
 
     def to_bvh(self, path: str | Path, overwrite: bool = False) -> Path:
@@ -118,7 +118,7 @@ class Run:
         return self.folder / REPORT
 
     def frame(self) -> Any:
-        """The ticks as a table of pandas, which has to be installed, a column a number."""
+        """The ticks as a pandas DataFrame (pandas must be installed), with one column per scalar."""
         pandas = import_module("pandas")
         columns: dict[str, Any] = {}
         for name, values in self.ticks.items():

@@ -1,4 +1,4 @@
-"""What a command prints: its result in words, or, with ``--json``, all of it for other programs."""
+"""Output of the commands: the result in words, or with ``--json`` as JSON for other programs."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any, Protocol, cast
@@ -12,10 +12,10 @@ Json = Annotated[bool, tyro.conf.arg(help="Print everything as JSON.")]
 
 
 class Result(Protocol):
-    """A result that says itself in words."""
+    """A result that can be told in words."""
 
     def lines(self) -> Iterable[str]:
-        """A sentence each."""
+        """The result in words, one sentence per line."""
         ...
 
 
@@ -25,11 +25,11 @@ def say(result: Result | Any, as_json: bool, lines: Iterable[str] | None = None)
     Parameters
     ----------
     result : Result, mapping or sequence
-        Dataclasses become objects of their fields, beside ``lines`` if it says itself in words.
+        As JSON, a dataclass becomes an object of its fields, with ``lines`` added if it has them.
     as_json : bool
-        Whether another program reads it.
+        Whether to print JSON instead of words.
     lines : iterable of str, optional
-        Its words, where it has none of its own.
+        The result in words, if it has no ``lines`` of its own.
     """
     if as_json:
         print(json_text(result), flush=True)

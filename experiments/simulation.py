@@ -1,4 +1,4 @@
-"""A run from Python: parts that are put together, run in memory or into a folder, and looked at."""
+"""Simulations from Python: put parts together, run them in memory or into a folder, step them tick by tick."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -36,11 +36,11 @@ from sim.users.participant import Participant
 from sim.users.person import Person
 from sim.world.world import World
 
-_SECONDS = 1e9  # [s] a hand that traces does so as long as anybody runs it
+_SECONDS = 1e9  # [s] duration of tracing: longer than any run
 
 
 class FigureMap(Protocol):
-    """A haptic map of the figure, to be made for the figure of a run; a `HapticMap` of one's own is one as it is."""
+    """Factory of a haptic map for the figure of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
@@ -49,18 +49,18 @@ class FigureMap(Protocol):
 
 @dataclass(frozen=True)
 class Cylindrical:
-    """Four clips at the corners of a cylinder: the angle is the frame, radius and height blend (the paper's Fig. 3).
+    """Cylindrical map: the angle sets the frame, radius and height blend four clips (the paper's Fig. 3).
 
     Parameters
     ----------
     clips : sequence of Clip
-        Inner low, outer low, inner high, outer high; fewer are repeated.
+        Inner low, outer low, inner high, outer high; if there are fewer, they are repeated.
     around : Trajectory
         Curve about the z axis of H, in the middle of the map's domain.
     reach : float
         Half width of the domain about the curve, in radius and in height [m].
     expressive : bool
-        Whether the figure looks where the stylus points, and leans as it leans.
+        Whether the figure's gaze and lean follow the orientation of the stylus.
     """
 
     clips: Sequence[Clip]
@@ -75,12 +75,12 @@ class Cylindrical:
 
 @dataclass(frozen=True)
 class Composite:
-    """The lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
+    """Composite map: the lower body of one clip, the upper body blended between two (the paper's Figs. 5 to 7).
 
     Parameters
     ----------
     clips : sequence of Clip
-        Lower body, upper body inside, upper body outside; fewer are repeated.
+        Lower body, upper body inside, upper body outside; if there are fewer, they are repeated.
     around, reach, expressive
         As in `Cylindrical`.
     """
@@ -103,18 +103,18 @@ def _place(part: Cylindrical | Composite) -> Place:
 
 @dataclass(frozen=True)
 class User:
-    """The simulated hand: relaxed, or tracing, and what it does besides.
+    """The simulated hand: relaxed or tracing a curve, with pushes, turns and grabs at given times.
 
     Parameters
     ----------
     pushes, turns, grabs : sequences of Push, Turn, Grab
-        What it does.
+        Actions of the hand.
     traces : Trajectory, optional
-        A curve that it means to trace, again and again.
+        Curve that the hand traces, again and again.
     person : Person, optional
-        Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
+        Model of the human operator; without it the hand is an arm's impedance, without delay and noise.
     intent : PersonIntent, optional
-        What the person means to do, one of `hvf.intents`; by default what the above say.
+        What the person intends, one of `hvf.intents`; by default it follows from the other parameters.
     """
 
     pushes: Sequence[Push] = ()
@@ -125,12 +125,12 @@ class User:
     intent: PersonIntent | None = None
 
     def hand(self, curve: Trajectory, seconds: float, seed: int) -> Arm | Participant:
-        """The hand for a run of so long [s] about a curve, with a seed.
+        """The hand for a run of `seconds` [s] about a curve, with a seed.
 
         Raises
         ------
         ParameterError
-            If an intent has no person, or a person is to turn the stylus.
+            If an intent is given without a person, or turns with one.
         """
         if self.intent is not None and self.person is None:
             raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
@@ -152,15 +152,15 @@ class Tick(NamedTuple):
     Attributes
     ----------
     hand : HandState
-        As measured.
+        Measured state of the hand.
     field : Wrench
-        Of the field.
+        Force and torque of the field.
     force : Array
-        That the device was asked for, after limiter and tank, in H [N], shape (3,).
+        Force commanded to the device, after limiter and energy tank, in H [N], shape (3,).
     pose : Array
-        The animation h(p), shape (75,).
+        The animation h(p), qpos, shape (75,).
     figure : Array
-        The figure as it is, qpos, shape (75,); empty without a figure.
+        Simulated pose of the figure, qpos, shape (75,); empty without a figure.
     """
 
     hand: HandState
@@ -172,14 +172,14 @@ class Tick(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """A hand, a field, a map and a figure, with the device and the clock: all that decides a run.
+    """A hand, a field, a haptic map and a figure, with the device and the clock: all that determines a run.
 
     Parameters
     ----------
     field : Law
-        Law of force, built in, composed or one's own.
+        Law of force: built-in, composed or user-defined.
     haptic_map : FigureMap or HapticMap
-        From the stylus to the figure; one of one's own lies along the curve of the field.
+        Map from the stylus to the figure; a user-defined `HapticMap` is taken to lie along the curve of the field.
     user : User
         The simulated hand.
     device : Phantom
@@ -189,14 +189,14 @@ class Simulation:
     clock : Clock
         The rates.
     seed : int
-        Of where exactly the hand lets go of the stylus at the start.
+        Seed of the start position of the stylus and of a person's noise.
     tank : EnergyTank, optional
-        What the field may inject; by default bounded by the device's force and the curve's pace.
+        Bound on the energy that the field may inject; by default from the device's force and the curve's speed.
 
     Raises
     ------
     ModelError, ControllerError, SimError
-        If the rates do not divide.
+        If the rates are not multiples of each other.
     """
 
     field: Law
@@ -213,12 +213,12 @@ class Simulation:
 
     @property
     def scene(self) -> SceneConfig:
-        """Of the world: the figure's size and the rates."""
+        """Configuration of the world: the figure's size and the rates."""
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
     def session(self, seconds: float = 60.0) -> Session:
-        """The simulation, wired up for at most so long [s]; compiles what it needs.
+        """The simulation put together for at most `seconds` [s]; compiles what it needs.
 
         Raises
         ------
@@ -231,7 +231,7 @@ class Simulation:
         return assemble(world, maps, lambda m: self._parts(m, seconds), lambda units: compile_once(console, units))
 
     def _curve(self) -> Trajectory:
-        """That of the one law of the field that has one, along which a map of one's own lies."""
+        """Curve of the first law of the field that has one: a user-defined map lies along it."""
         curves = (getattr(law, "curve", None) for law in self.field.program().laws)
         found = [curve for curve in curves if isinstance(curve, Trajectory)]
         if not found:
@@ -252,14 +252,14 @@ class Simulation:
         )  # fmt: skip
 
     def run(self, seconds: float, record: str | Path | None = None, overwrite: bool = False) -> Run:
-        """Run from the start, and keep what happened.
+        """Run from the start and return the result.
 
         Parameters
         ----------
         seconds : float
             Simulated time [s].
         record : path, optional
-            Folder to write recording, summary, animations, figures and page into; by default nothing is left behind.
+            Folder to write recording, summary, animations, figures and page into; by default a temporary one.
         overwrite : bool
             Replace a run that the folder holds.
 
@@ -274,7 +274,7 @@ class Simulation:
         return Run.of(self.session(seconds), self.description(), seconds, record, overwrite)
 
     def __iter__(self) -> Iterator[Tick]:
-        """Step tick by tick, for ever: ``for tick in sim``."""
+        """Step tick by tick, without end: ``for tick in sim``."""
         session = self.session()
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         while True:
@@ -287,7 +287,7 @@ class Simulation:
             )  # fmt: skip
 
     def description(self) -> dict[str, object]:
-        """What it is made of, in plain data, as its recordings keep it."""
+        """What the simulation is made of, in plain data, as its recordings store it."""
         clips = getattr(self.haptic_map, "clips", ())
         return {
             "simulation": "of Python objects; the script that made it makes it again",

@@ -1,4 +1,4 @@
-"""A simulation at many values of its numbers, in parallel threads over the compiled loop."""
+"""Parameter sweeps: a simulation run at many values of its parameters, in parallel threads."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,9 +20,9 @@ class Swept(NamedTuple):
     Attributes
     ----------
     values : dict
-        What was set, by path.
+        Values of the swept parameters, by path.
     run : Run
-        What happened.
+        Result of the run.
     """
 
     values: dict[str, Any]
@@ -32,25 +32,25 @@ class Swept(NamedTuple):
 def sweep(
     sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float = 10.0, threads: int = 1
 ) -> Iterator[Swept]:
-    """Run a simulation at every combination of values, and give the runs in their order.
+    """Run a simulation at every combination of values, and yield the runs in the order of the combinations.
 
     Parameters
     ----------
     sim : Simulation
-        As it is else.
+        Simulation with the values of all other parameters.
     values : mapping of str to sequence
-        By path of a number: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a composed field a
-        name stands for that of the one law that has it; ``field.Follow.k_r`` says which. A parameter of a law of
-        one's own is such a number, its function's name that of the law: ``field.floor.k``.
+        Values by path of the parameter: ``field.k_r``, ``user.pushes``, ``clock.physics_step``, ``seed``. In a
+        composed field a name must belong to one law only; ``field.Follow.k_r`` names the law too. The parameters of a
+        user-defined law are reached in the same way, under the name of its function: ``field.floor.k``.
     seconds : float
         Simulated time of each run [s].
     threads : int
-        How many run at a time; the loop holds no lock.
+        Number of simultaneous runs; the compiled loop releases the GIL.
 
     Raises
     ------
     ParameterError
-        If there is no such number, or several laws have it.
+        If there is no such parameter, or several laws have it.
     """
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
     simulations = [with_values(sim, chosen) for chosen in combinations]
@@ -59,21 +59,21 @@ def sweep(
         return simulation.run(seconds)
 
     if simulations and threads > 1:
-        simulations[0].session(seconds)  # what has to be compiled is, once, before the threads begin
+        simulations[0].session(seconds)  # compiles the units once, before the threads begin
     with ThreadPoolExecutor(max(1, threads)) as pool:
         for chosen, made in zip(combinations, pool.map(run, simulations), strict=True):
             yield Swept(chosen, made)
 
 
 def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:
-    """The same simulation with numbers set, by path as `sweep` has them."""
+    """The same simulation with parameters set, by path as in `sweep`."""
     for path, value in chosen.items():
         sim = cast(Simulation, _set(sim, path.split("."), value, path))
     return sim
 
 
 def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
-    """The same part with one number set, which may be deep in it."""
+    """The same part with one parameter set, which may be nested."""
     if isinstance(part, Program):
         law = _owner(part, names, path)
         rest = names if len(names) == 1 or _name(law) != names[0] else names[1:]
@@ -88,7 +88,7 @@ def _set(part: Any, names: Sequence[str], value: Any, path: str) -> Any:
 
 
 def _owner(program: Program, names: Sequence[str], path: str) -> Law:
-    """The one law of a composed field that a path means."""
+    """The one law of a composed field to which a path refers."""
     wanted = names[0]
     found = [
         law for law in program.laws
@@ -101,7 +101,7 @@ def _owner(program: Program, names: Sequence[str], path: str) -> Law:
 
 
 def _name(law: Law) -> str:
-    """A law of one's own is called by its function."""
+    """Name of a law: of a user-defined one that of its function, otherwise that of its class."""
     return law.name if isinstance(law, FunctionLaw) else type(law).__name__
 
 

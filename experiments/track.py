@@ -1,4 +1,4 @@
-"""The physical figure on its own, following clips: how well, and with how much help."""
+"""Tracking of clips by the physical figure alone: tracking errors, and the residual wrench that it takes."""
 
 import time
 
@@ -26,7 +26,7 @@ def track_clips(
     raw : bool
         Take motion files as captured, not prepared.
     bounds : (float, float)
-        Of the residual's force and moment (see `sim.body.figure_state.FigureGains`).
+        Bounds of the residual's force and moment (see `sim.body.figure_state.FigureGains`).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What ``hvf`` says when it is called without a word."""
+"""What ``hvf`` prints when it is called without arguments."""
 
 WELCOME = """hvf: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
 
@@ -14,7 +14,7 @@ hvf --help lists all commands, hvf COMMAND --help the options of one."""
 
 
 def next_step(folder: str) -> str:
-    """What can be done with what a run that was stopped has recorded."""
+    """What can be done with the recording of an interrupted run, in words."""
     return (
         f"what was recorded until then is in {folder}: hvf report {folder} writes its page, summary and animations, "
         f"hvf render {folder} films it, "

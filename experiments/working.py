@@ -1,4 +1,4 @@
-"""A line that tells how long something still takes, by how long it took the last time on this machine."""
+"""Progress line with an estimate of the remaining time, from how long the work took last time on this machine."""
 
 import json
 import time
@@ -13,11 +13,11 @@ from rich.text import Text
 
 from sim.compilation.unit_cache import cache_folder
 
-_WORTH_KEEPING = 2.0  # [s]
+_WORTH_KEEPING = 2.0  # [s]; shorter durations are not stored
 
 
 class _Left(ProgressColumn):
-    """Time so far, and what is left of the expected."""
+    """Column of the elapsed time and the expected remaining time."""
 
     def __init__(self, expected: float | None):
         super().__init__()
@@ -29,7 +29,7 @@ class _Left(ProgressColumn):
 
 
 def left(elapsed: float, expected: float | None) -> str:
-    """In words: how long it has taken and, if it was ever measured, takes still."""
+    """Elapsed time and, if the duration was measured before, remaining time, in words; both [s]."""
     if expected is None:
         return f"{elapsed:.0f} s"
     if elapsed > expected:
@@ -39,14 +39,14 @@ def left(elapsed: float, expected: float | None) -> str:
 
 @contextmanager
 def working(what: str, share: float = 1.0) -> Generator[None]:
-    """Tell on stderr, where a person looks, what is done and how long it still takes.
+    """Show on stderr, if it is a terminal, what is being done and how long it still takes.
 
     Parameters
     ----------
     what : str
-        Such as ``lifting``; the time is kept under it.
+        Name of the work, such as ``lifting``, under which its duration is stored.
     share : float
-        How much of it there is, in units of its own, such as clips: time is taken to grow with it.
+        Amount of work in its own units, such as clips; the duration is taken to be proportional to it.
     """
     console, began = Console(stderr=True), time.perf_counter()
     seconds = expected_seconds(what)
@@ -60,7 +60,7 @@ def working(what: str, share: float = 1.0) -> Generator[None]:
 
 
 def expected_seconds(what: str) -> float | None:
-    """How long something took the last time on this machine [s], a unit of it; None if that is not known."""
+    """Duration per unit of some work the last time on this machine [s]; None if it is not known."""
     return _kept().get(what)
 
 
@@ -69,7 +69,7 @@ def _file() -> Path:
 
 
 def _kept() -> dict[str, float]:
-    """Seconds by name; what is kept is a help, and never in the way."""
+    """Stored durations [s] by name; empty if the file is missing or unreadable, as they are only a help."""
     try:
         kept = json.loads(_file().read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -81,7 +81,7 @@ def _kept() -> dict[str, float]:
 
 
 def keep_seconds(what: str, seconds: float) -> None:
-    """Keep how long a unit of something took [s]."""
+    """Store the duration of one unit of some work [s]; a file that cannot be written is ignored."""
     try:
         _file().parent.mkdir(parents=True, exist_ok=True)
         _file().write_text(json.dumps(_kept() | {what: float(f"{seconds:.3g}")}), encoding="utf-8")

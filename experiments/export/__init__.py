@@ -1,1 +1,1 @@
-"""The figure's animation for other programs."""
+"""Export of the figure's animation for other programs."""

@@ -1,7 +1,7 @@
 """glTF of the figure's motion (glTF 2.0, binary): a skeleton of 18 joints, its animation, and a skin of its shapes.
 
-Axes are glTF's, Y up and facing +Z, in metres: the world's (x, y, z) is the file's (X, Y, Z) = (y, z, x), a turn, as in
-the BVH. So a quaternion's vector part changes places likewise, and glTF writes it x, y, z, w.
+Axes are those of glTF, Y up and facing +Z, in metres: (x, y, z) of the world W is (X, Y, Z) = (y, z, x) in the file, a
+rotation, as in the BVH. The vector part of a quaternion is permuted in the same way, and glTF writes it x, y, z, w.
 """
 
 from pathlib import Path
@@ -19,12 +19,12 @@ from sim.viewer.shapes import body_shapes, coarser
 
 _TO_FILE = [1, 2, 0]
 _FLOAT, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT = 5126, 5121, 5123, 5125
-_VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
-_CELL = 0.003  # [m] no detail of a body is finer: half the vertices, and no difference to be seen
+_VERTICES, _INDICES = 34962, 34963  # targets of buffer views
+_CELL = 0.003  # [m] size of the finest detail that is kept: half the vertices, without a visible difference
 
 
 class _Buffer:
-    """The binary part of a file, and where what stands in it."""
+    """The binary part of a file, with its buffer views and accessors."""
 
     def __init__(self, library: Any, document: Any):
         self._library, self._document, self._bytes = library, document, bytearray()
@@ -32,7 +32,7 @@ class _Buffer:
     def add(
         self, values: npt.ArrayLike, kind: str, component: int, target: int | None = None, shares: bool = False
     ) -> int:
-        """Append rows of numbers, or of shares as whole numbers of the largest one; the number of their accessor."""
+        """Append rows of numbers, with `shares` as normalised integers; returns the index of their accessor."""
         dtype = {_FLOAT: "<f4", _UNSIGNED_BYTE: "u1", _UNSIGNED_SHORT: "<u2", _UNSIGNED_INT: "<u4"}[component]
         rows = np.ascontiguousarray(values, dtype=dtype)
         raw = rows.tobytes()
@@ -53,7 +53,7 @@ class _Buffer:
         return len(self._document.accessors) - 1
 
     def close(self) -> None:
-        """Put the bytes into the document."""
+        """Store the bytes in the document."""
         self._document.buffers.append(self._library.Buffer(byteLength=len(self._bytes)))
         self._document.set_binary_blob(bytes(self._bytes))
 
@@ -64,7 +64,7 @@ def write_gltf(clip: Clip, path: Path) -> None:
     Raises
     ------
     ModelError
-        If the library for it is not installed.
+        If pygltflib is not installed.
     OSError
         If the file cannot be written.
     """
@@ -89,7 +89,7 @@ def write_gltf(clip: Clip, path: Path) -> None:
 
 
 def _add_skeleton(library: Any, document: Any, model: mujoco.MjModel, clip: Clip) -> Array:
-    """Nodes of the joints in the clip's first pose, and one of the skin; returns the joints' places at rest (18, 3)."""
+    """Add nodes of the joints in the clip's first pose, and of the skin; returns rest positions (18, 3) [m]."""
     places = np.zeros((len(SEGMENTS), 3))
     for index, segment in enumerate(SEGMENTS):
         offset = np.asarray(model.body(segment.body).pos) if index else rest_pose()[:3]
@@ -107,12 +107,12 @@ def _add_skeleton(library: Any, document: Any, model: mujoco.MjModel, clip: Clip
 
 
 def _rotations(poses: Array, index: int) -> Array:
-    """Local rotations of a joint as glTF has them, x, y, z, w, shape (n, 4)."""
+    """Local rotations of a joint in glTF's axes and order x, y, z, w, shape (n, 4)."""
     return poses[:, 3 + 4 * index : 7 + 4 * index][:, [2, 3, 1, 0]]
 
 
 def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjModel, rest: Array) -> None:
-    """A mesh of all that is seen of the figure at rest; each vertex goes with one joint."""
+    """Add a mesh of the visible shapes of the figure at rest; each vertex is bound to one joint."""
     bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
     by_color: dict[tuple[float, ...], list[tuple[int, Array, npt.NDArray[np.int64]]]] = {}
     for shape in coarser(body_shapes(model, ""), _CELL):

@@ -1,4 +1,4 @@
-"""Named arrays in a NumPy archive that says what they are, and in which version of the format."""
+"""Named arrays in a NumPy archive with the kind of its content and the version of the format."""
 
 import zipfile
 import zlib
@@ -22,12 +22,12 @@ def write_archive(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
     path : Path
         ``.npz`` file.
     kind : str
-        What they are.
+        Kind of content, such as the class name of a map.
     arrays : mapping of str to Array
-        By key.
+        Arrays by key.
     """
     with path.open("wb") as file:
-        # Keys are numbered, for a key may be no name of a file.
+        # Arrays are stored under numbers, as a key need not be a valid file name.
         numbered = {str(i): value for i, value in enumerate(arrays.values())}
         np.savez(
             file, allow_pickle=False, version=np.array(VERSION), kind=np.array(kind), keys=np.array(list(arrays)),
@@ -43,14 +43,14 @@ def read_archive(path: Path, kinds: Collection[str], what: str) -> tuple[str, di
     path : Path
         The file.
     kinds : collection of str
-        What it may hold.
+        Kinds of content that are accepted.
     what : str
-        The same in a word, for messages.
+        Their common name in messages.
 
     Raises
     ------
     SimError
-        If the file cannot be read, is none of these, or damaged.
+        If the file cannot be read, is damaged, or of another kind or version.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:

@@ -1,4 +1,4 @@
-"""Certificates in files: read, and checked against what they are of, without CasADi."""
+"""Reading certificates from files, and checking them against their inputs, without CasADi."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from sim.compilation.compiled import source_hash
 
 
 def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
-    """All that the verdicts on a clip depend on, by name, for `hash_of`."""
+    """All inputs of the verdicts on a clip, by name, for `hash_of`."""
     return {"clip": (clip.fps, clip.poses), "judging": judging, "code": code_inputs()}
 
 
@@ -30,12 +30,12 @@ def code_inputs() -> list[object]:
 
 
 def read_certificate(file: Path) -> Certificate:
-    """Certificate of a file.
+    """The certificate in a file.
 
     Raises
     ------
     CertificateError
-        If it holds none.
+        If the file holds no certificate.
     """
     try:
         return Certificate.from_json(json.loads(file.read_text(encoding="utf-8")))
@@ -46,11 +46,11 @@ def read_certificate(file: Path) -> Certificate:
 
 
 OPTIONS = "certified.json"
-"""Beside a certificate: the options that it was made with."""
+"""File beside a certificate with the options that it was made with."""
 
 
 def changed_options(file: Path, options: Mapping[str, object]) -> str:
-    """Which options the certificate of a file was made with otherwise, in words; empty if that is not known."""
+    """Options that differ from those of a file's certificate, in words; empty if these are not known."""
     try:
         certified = json.loads((file.parent / OPTIONS).read_text(encoding="utf-8"))
         here = json.loads(json_text(options))
@@ -61,12 +61,12 @@ def changed_options(file: Path, options: Mapping[str, object]) -> str:
 
 
 def verify_certificate(file: Path, inputs: Mapping[str, object]) -> Certificate:
-    """The certificate of a file, if it is of these inputs: `certificate_inputs` or `clip_inputs`.
+    """The certificate in a file, after checking that it is of these inputs: `certificate_inputs` or `clip_inputs`.
 
     Raises
     ------
     CertificateError
-        If the file holds none.
+        If the file holds no certificate.
     ChangedInputs
         If any input differs; the message says which.
     """

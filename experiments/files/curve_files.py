@@ -19,14 +19,14 @@ def save_curve(curve: Trajectory, path: Path) -> None:
 
 
 def load_curve(path: Path) -> Trajectory:
-    """Curve that `save_curve` wrote.
+    """Read a curve that `save_curve` wrote.
 
     Raises
     ------
     SimError
-        If the file is not one.
+        If it is not a file of a curve.
     CurveError
-        If its numbers make no curve.
+        If its samples do not define a curve.
     """
     keys = ("times", "positions", "quaternions", "periodic", "ends")
     try:

@@ -1,7 +1,8 @@
-"""Device files: what was found of a device, for simulation, certificates and hardware runs.
+"""Device files: calibration and identified parameters of a device, for simulation, certificates and hardware runs.
 
-`hvf hardware calibrate` writes where its encoders' zero is, and of which device; `hvf hardware identify` its friction,
-inertia, delay and weights. Each leaves to the file what the other found; what a file does not tell is as published.
+`hvf hardware calibrate` writes the zero of the encoders and the device to which it belongs; `hvf hardware identify`
+writes friction, inertia, delay and weights. Each keeps what the other wrote; parameters that a file lacks have their
+published values.
 """
 
 import json
@@ -19,16 +20,16 @@ from sim.world.linkage import Linkage, Triple
 _TRIPLES = ("coulomb", "viscous", "inertia")
 _FORMAT = "hvf-device-1"
 _MOST = 1e3
-"""More than any of the numbers can be: [N m], [N m s/rad], [kg m²], [s], [rad]."""
+"""Bound that no parameter can reach, in any of the units [N m], [N m s/rad], [kg m²], [s], [rad]."""
 
 
 class Calibration(NamedTuple):
-    """Whose encoders' zero a device file has.
+    """The device to which the encoder zero of a device file belongs.
 
     Attributes
     ----------
     name, serial : str
-        Of the device.
+        Name and serial number of the device.
     power_up : int
         See `sim.devices.driver.DeviceIdentity`.
     """
@@ -38,7 +39,7 @@ class Calibration(NamedTuple):
     power_up: int
 
     def why_not(self, identity: DeviceIdentity) -> str:
-        """Why it is not the zero of this device now; empty if it is."""
+        """Why the calibration is not valid for this device now; empty if it is."""
         if (self.name, self.serial) != (identity.name, identity.serial):
             return f"is calibrated for {self.name} {self.serial}".rstrip()
         if self.power_up != identity.power_up and not identity.calibrated:
@@ -47,16 +48,16 @@ class Calibration(NamedTuple):
 
 
 def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[str, object]) -> dict[str, object]:
-    """A device file's content with what was found: each quantity with its value and half of its interval, SI units.
+    """Content of a device file with identified parameters: value and half interval of each quantity, in SI units.
 
     Parameters
     ----------
     found : Identified
-        Its offsets are of readings from which those of `base` had been taken off.
+        Identified parameters; the offsets are relative to those of `base`, which the readings had already subtracted.
     recordings : sequence of str
-        What it was found in.
+        Recordings from which they were identified.
     base : mapping
-        Content of the file that the recorded runs were made with; empty where there was none.
+        Content of the device file with which the recorded runs were made; empty if there was none.
     """
     values, margins = (dict(zip(NAMES, numbers.tolist(), strict=True)) for numbers in (found.values, found.margins))
 
@@ -82,7 +83,7 @@ def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[
 def calibrated_json(
     offset: Sequence[float], margin: Sequence[float], identity: DeviceIdentity, base: Mapping[str, object]
 ) -> dict[str, object]:
-    """A device file's content with the zero of its encoders [rad], shape (3,) each; all else is the `base`'s."""
+    """Content of a device file with encoder offsets and their margins [rad], shape (3,) each; the rest is `base`."""
     return {
         **base,
         "format": _FORMAT,
@@ -97,12 +98,12 @@ def save_device(content: Mapping[str, object], path: Path) -> None:
 
 
 def read_device_file(path: Path) -> dict[str, Any]:
-    """A device file's content.
+    """Content of a device file.
 
     Raises
     ------
     SimError
-        If the file cannot be read, or is no device file.
+        If the file cannot be read, or is not a device file.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -120,18 +121,18 @@ def read_device_file(path: Path) -> dict[str, Any]:
 
 
 def linkage_from(content: Mapping[str, Any]) -> Linkage:
-    """What a content says the linkage is; a friction or delay that was found below zero is taken as zero.
+    """Linkage parameters from the content of a device file; a negative friction or delay is taken as zero.
 
     Raises
     ------
     SimError
-        If a number cannot be, or a rotor has less inertia than none.
+        If a parameter is impossible, such as a rotor of negative inertia.
     """
     published = Linkage()
 
     def numbers(name: str, least: float) -> list[float]:
         found = [float(x) for x in content[name]["value"]]
-        if not all(abs(x) < _MOST for x in found):  # which NaN is not
+        if not all(abs(x) < _MOST for x in found):  # also false for NaN
             raise SimError(f"{name} {found}")
         return [max(least, x) for x in found]
 
@@ -150,13 +151,13 @@ def linkage_from(content: Mapping[str, Any]) -> Linkage:
 
 
 def calibration_from(content: Mapping[str, Any]) -> Calibration | None:
-    """Whose zero a content has; None if it has none."""
+    """Calibration in the content of a device file; None if it has none."""
     told = content.get("calibration")
     return Calibration(str(told["name"]), str(told["serial"]), int(told["power_up"])) if told else None
 
 
 def content_of(device: Phantom) -> dict[str, Any]:
-    """Content of a run's device file; empty where it has none.
+    """Content of a run's device file; empty if the run has none.
 
     Raises
     ------
@@ -167,7 +168,7 @@ def content_of(device: Phantom) -> dict[str, Any]:
 
 
 def linkage_of(device: Phantom) -> Linkage:
-    """The linkage of a run's device: its file's, or the published one.
+    """Linkage of a run's device: that of its device file, or the published one.
 
     Raises
     ------

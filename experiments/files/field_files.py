@@ -17,7 +17,7 @@ def save_field(field: RiverBundle | Edited, path: Path) -> None:
     Parameters
     ----------
     field : RiverBundle or Edited
-        What to keep.
+        Field to write.
     path : Path
         ``.npz`` file.
     """
@@ -25,12 +25,12 @@ def save_field(field: RiverBundle | Edited, path: Path) -> None:
 
 
 def load_field(path: Path) -> RiverBundle | Edited:
-    """Field of a file that `save_field` wrote.
+    """Read a field that `save_field` wrote.
 
     Raises
     ------
     SimError
-        If the file cannot be read, is none of these, or what it holds makes no field.
+        If the file cannot be read, is of another kind, or its content does not define a field.
     """
     kind, arrays = read_archive(path, _KINDS, "field")
     try:

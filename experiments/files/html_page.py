@@ -1,4 +1,4 @@
-"""The frame of every page that is written: one HTML document that opens from disk, readable on a phone."""
+"""Common layout of all generated pages: one self-contained HTML document, readable on a phone."""
 
 import base64
 import html
@@ -16,7 +16,7 @@ th:first-child, td:first-child, .l { text-align: left; }
 td.says { white-space: normal; text-align: left; }
 tr.weak { color: #7b8698; }
 """
-"""Style of pages whose tables are of numbers."""
+"""Style of pages with tables of numbers."""
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222a38; margin: 0 auto; max-width: 1180px; padding: 1.5rem; }
 h1 { font-size: 1.5rem; margin: 0 0 .5rem; overflow-wrap: anywhere; }
@@ -36,17 +36,17 @@ pre { background: #f5f7fa; padding: 1rem; overflow-x: auto; font-size: .85rem; b
 
 
 def html_page(title: str, body: str, style: str = "") -> str:
-    """A whole page.
+    """HTML of a whole page.
 
     Parameters
     ----------
     title : str
-        Of the page, and its heading.
+        Title and heading of the page.
     body : str
-        HTML below the heading. A table or a picture that is wider than a phone stands in a ``div`` of class ``wide``,
-        which scrolls.
+        HTML below the heading. A table or a picture wider than a phone belongs in a ``div`` of class ``wide``, which
+        scrolls.
     style : str
-        CSS of this page alone.
+        Additional CSS of this page.
     """
     name = html.escape(title)
     return (
@@ -57,7 +57,7 @@ def html_page(title: str, body: str, style: str = "") -> str:
 
 
 def image(picture: Figure | Path, name: str) -> str:
-    """A plot, or a PNG file, as it lies within the page."""
+    """HTML of a plot or a PNG file, embedded in the page."""
     if isinstance(picture, Path):
         data = picture.read_bytes()
     else:
@@ -68,10 +68,10 @@ def image(picture: Figure | Path, name: str) -> str:
 
 
 def sentences(said: Sequence[str]) -> str:
-    """What a skimming reader should know, a paragraph each."""
+    """HTML of the main results, a paragraph each."""
     return f'<div class="found">{"".join(f"<p>{html.escape(one)}</p>" for one in said)}</div>\n'
 
 
 def short(value: float) -> str:
-    """A number of a table, to three digits; a dash where there is none."""
+    """Text of a number in a table, to three digits; a dash if it is not finite."""
     return f"{value:.3g}" if math.isfinite(value) else "–"

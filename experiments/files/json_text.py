@@ -11,9 +11,10 @@ import numpy as np
 
 
 def json_text(value: object) -> str:
-    """Indented JSON; null for a number that is not finite, since JSON has none.
+    """Indented JSON of a value; numbers that are not finite, which JSON lacks, become null.
 
-    A dataclass or named tuple is an object of its fields, and of its ``lines`` if it says itself in words.
+    A dataclass or named tuple becomes an object of its fields; the outermost one also gets its ``lines``, if it has a
+    method of that name.
     """
     plain, said = _plain(value), getattr(value, "lines", None)
     if callable(said) and isinstance(plain, dict):

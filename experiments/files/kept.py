@@ -1,4 +1,4 @@
-"""Arrays that take long to find, kept in a file under a hash of all that they were found from."""
+"""Disk cache of arrays that take long to compute, under a hash of everything on which they depend."""
 
 import hashlib
 import os
@@ -20,23 +20,23 @@ def kept_array(
     shape: tuple[int, ...],
     find: Callable[[], Array],
 ) -> Array:
-    """The array in the file of these ingredients, or found now and written there.
+    """The cached array of these inputs; if there is none, it is computed and stored.
 
-    A file that is cut short, changed or not such an array is not believed: it carries a hash of its own contents. One
-    that cannot be written is done without.
+    A file carries a hash of its content: one that is truncated, changed or of another shape is not used. If the file
+    cannot be written, the result is not cached.
 
     Parameters
     ----------
     folder : Path
-        Where files are kept; made when it is missing.
+        Folder of the cache; created if it is missing.
     name : str
-        Of the kind of array, the first part of the file's name.
+        Name of the kind of array, the first part of the file's name.
     made_of : iterable of arrays
-        Everything that the result depends on.
+        Everything on which the result depends.
     shape : tuple of int
-        Of the result; the first may be −1, for any number of rows.
+        Shape of the result; the first number may be −1, for any number of rows.
     find : callable
-        What makes it.
+        Computes the result.
     """
     path = _path(folder, name, made_of)
     if (kept := _read(path, shape)) is not None:
@@ -48,7 +48,7 @@ def kept_array(
 
 
 def is_kept(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
-    """Whether `kept_array` would find nothing anew."""
+    """Whether `kept_array` would return a cached array."""
     return _read(_path(folder, name, made_of), shape) is not None
 
 
@@ -80,7 +80,7 @@ def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all, also when two processes write it at once."""
+    """Write a file atomically, also when two processes write it at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:

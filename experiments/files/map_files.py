@@ -1,4 +1,4 @@
-"""Haptic maps in files: what a map was made of as a NumPy archive, from which it is made again to the last bit."""
+"""Haptic maps in files: a NumPy archive of what a map was made of, from which it is rebuilt to the last bit."""
 
 import hashlib
 from pathlib import Path
@@ -21,7 +21,7 @@ def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
     Parameters
     ----------
     haptic_map : Cylindrical, Composite or Lifted
-        What to keep.
+        Map to write.
     path : Path
         ``.npz`` file.
     """
@@ -29,12 +29,12 @@ def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
 
 
 def load_map(path: Path) -> Cylindrical | Composite | Lifted:
-    """Map of a file that `save_map` wrote.
+    """Read a map that `save_map` wrote.
 
     Raises
     ------
     SimError
-        If the file cannot be read, is none of these, or what it holds makes no map.
+        If the file cannot be read, is of another kind, or its content does not define a map.
     """
     kind, arrays = read_archive(path, _KINDS, "map")
     try:
@@ -44,12 +44,12 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
 
 
 def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple[Clip, ...]]:
-    """Map of the figure in a file, and the clips that it was made of.
+    """Read a map of the figure, and the clips of which it was made.
 
     Raises
     ------
     SimError
-        As `load_map`, or if its poses are not the figure's.
+        As `load_map`, or if its poses are not those of the figure.
     """
     haptic_map = load_map(path)
     if haptic_map.nq != N_POSE:

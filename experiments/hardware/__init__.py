@@ -1,1 +1,1 @@
-"""Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
+"""Hardware runs: checks of the machine, link measurement, permit, run, calibration and identification of devices."""

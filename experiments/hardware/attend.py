@@ -1,7 +1,7 @@
-"""The person beside a hardware run: Enter arms and disarms, Ctrl-C ends, and what changes is said.
+"""Operator's terminal of a hardware run: Enter arms and disarms, Ctrl-C ends, and changes of state are printed.
 
-Enter never does more than what is on the screen: keys that were pressed before a question or a fault are thrown away,
-an Enter under force lets go, and the end of the input, such as Ctrl-D, ends the run.
+Enter never does more than the screen says: keys pressed before a prompt or a fault are discarded, Enter under force
+disarms, and the end of the input, such as Ctrl-D, ends the run.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from experiments.hardware.link import link_now
 from experiments.hardware.run_options import RunHardware
 from sim.hardware.controls import HardwareRun, Look, Recorded
 
-_POLL = 0.05  # [s] between two looks, each of which is the controls' heartbeat
+_POLL = 0.05  # [s] between two polls, each of which is also the heartbeat of the controls
 _DISARMED = "Disarmed: the motors are off."
 
 
@@ -30,9 +30,9 @@ class _Key(enum.Enum):
 
 
 def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Console) -> Look:
-    """Arm, look, and say what changes, for so many seconds [s] from the first arming on; gives the last look.
+    """Arm, poll and print changes of state for `seconds` [s] from the first arming on; returns the last poll.
 
-    With `options.arm` there is nobody to ask: it arms at once, and a fault ends it.
+    With `options.arm` no operator is asked: the device is armed at once, and a fault ends the run.
     """
     terminal = sys.stdin.isatty() and not options.arm
     until, state, look, recording = None, None, run.poll(), True
@@ -75,7 +75,7 @@ def _recording_ended(recorded: Recorded) -> str:
 
 
 def _obeyed(run: HardwareRun, look: Look) -> bool:
-    """Do what Enter means in a state; whether it arms."""
+    """Do what Enter means in the current state; returns whether it arms the device."""
     if look.state not in (State.DISARMED, State.FAULT):
         run.request(DISARM)
         return False
@@ -87,14 +87,14 @@ def _obeyed(run: HardwareRun, look: Look) -> bool:
 
 
 def _key() -> _Key:
-    """What has been pressed."""
+    """The key that was pressed, without waiting."""
     if not select.select([sys.stdin], [], [], 0.0)[0]:
         return _Key.NONE
     return _Key.ENTER if sys.stdin.readline() else _Key.END
 
 
 def _forget_keys() -> None:
-    """Throw away what was typed so far."""
+    """Discard pending input."""
     import termios  # not on Windows
 
     termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)

@@ -1,4 +1,4 @@
-"""``hvf hardware calibrate``: where the encoders' zero is, from readings of a stylus that stands at a known pose."""
+"""``hvf hardware calibrate``: zero offsets of the encoders, from readings of a stylus held at a known pose."""
 
 import time
 
@@ -18,18 +18,18 @@ from sim.hardware.emulated import EmulatedPhantom
 from sim.users.arm import Arm
 
 STILL = 5e-3
-"""How far a joint may turn while it is read [rad]: a millimetre at the tip, a hand's tremor and not its motion."""
+"""Largest motion of a joint while it is read [rad], about a millimetre at the tip: allows tremor but no motion."""
 _PERIOD = 1e-3  # s
 
 
 def calibrate(options: CalibrateHardware) -> int:
-    """Read a device at a known pose with its motors off, say where its zero is, and write it.
+    """Read a device at a known pose with its motors off, print its zero offsets, and write them.
 
     Raises
     ------
     SimError
-        If no Phantom can be at the pose, there is no such device, it moves or gives no readings, or the file has a
-        calibration.
+        If the pose is beyond the joint limits, there is no such device, it moves or gives no readings, or the file
+        already has a calibration.
     """
     if not within_limits(options.pose):
         raise SimError(
@@ -60,24 +60,24 @@ def calibrate(options: CalibrateHardware) -> int:
 
 
 def zero_of(readings: Array, pose: Array) -> tuple[Array, Array]:
-    """What readings (n, 3) of a stylus at a pose (3,) are more than that, and half of an interval for it [rad].
+    """Offset of mean readings (n, 3) from the pose (3,), and its margin [rad], shapes (3,).
 
-    The interval is half an encoder's count, or half of what the hand shook.
+    The margin is half an encoder count, or half the range of the readings if that is larger.
     """
     margin = 0.5 * np.maximum(np.array(ENCODER_STEP), np.ptp(readings, axis=0))
     return readings.mean(axis=0) - pose, margin
 
 
 def still_readings(driver: Driver, seconds: float) -> Array:
-    """Angles that a device at rest tells for so long [s], shape (n, 3) [rad].
+    """Joint angles of a device at rest, read for `seconds` [s], shape (n, 3) [rad].
 
     Raises
     ------
     SimError
-        If none come, or the joints turn.
+        If no readings arrive, or the joints turn.
     """
     reading, found = np.zeros(READING_SIZE), list[Array]()
-    driver.write(np.zeros(3), False)  # an emulated device may be compiled first
+    driver.write(np.zeros(3), False)  # before the clock starts, as an emulated device may first have to be compiled
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         driver.write(np.zeros(3), False)
@@ -96,7 +96,7 @@ def still_readings(driver: Driver, seconds: float) -> Array:
 
 
 def _fixture(options: CalibrateHardware) -> EmulatedPhantom:
-    """The emulated device, held at the pose as stiffly as a fixture holds."""
+    """The emulated device, held at the pose as stiffly as by a fixture."""
     a, b, c = options.pose
     start = np.array(vector_to_hand_frame(forward_kinematics((a, b, c))))
     held = Arm(path=np.stack([start, start]), stiffness=2e4, damping=50.0)

@@ -1,4 +1,4 @@
-"""What stands between this machine and a device: libraries, permissions, the system's limits, and how late it is."""
+"""Checks whether this machine can drive a device: libraries, permissions, system limits and timer latency."""
 
 import math
 import os
@@ -17,24 +17,24 @@ from sim.devices.hardware_list import RULES_FILE, FoundDevice
 from sim.devices.hdapi import HDAPI
 
 PERIOD = 1e-3
-"""Of the loop whose lateness is measured [s]."""
+"""Period of the loop whose lateness is measured [s]."""
 OK, WEAK, MISSING = "ok", "weak", "missing"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """Result of one check.
 
     Parameters
     ----------
     what : str
-        Such as ``memory lock``.
+        Subject of the check, such as ``memory lock``.
     state : str
-        ``ok``, ``weak`` (it goes, less well) or ``missing``.
+        ``ok``, ``weak`` (works, but less well) or ``missing``.
     says : str
         What was found.
     remedy : str
-        What would make it right; empty if it is.
+        How to mend it; empty if nothing is wrong.
     """
 
     what: str
@@ -43,12 +43,12 @@ class Finding:
     remedy: str = ""
 
     def lines(self) -> list[str]:
-        """In lines for a person."""
+        """The finding in words."""
         return [f"{self.state:8} {self.what}: {self.says}", *([f"{'':9}{self.remedy}"] if self.remedy else [])]
 
 
 class Lateness(NamedTuple):
-    """How much later than it was due a loop of 1 kHz woke up [s], and how many deadlines it missed by a period."""
+    """Wake-up lateness of a 1 kHz loop [s], and the number of deadlines that it missed by a whole period."""
 
     loops: int
     p50: float
@@ -59,7 +59,7 @@ class Lateness(NamedTuple):
 
 
 def findings(devices: list[FoundDevice]) -> list[Finding]:
-    """Everything but the timing."""
+    """All checks except the measurement of lateness."""
     return [*_libraries(), *_permissions(devices), *_limits()]
 
 
@@ -119,7 +119,7 @@ def _limits() -> list[Finding]:
 
 
 def _is_given_precedence() -> bool:
-    """Whether the system gives this process SCHED_FIFO; it is as before after this."""
+    """Whether the system grants this process SCHED_FIFO; the scheduling policy is restored afterwards."""
     policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
@@ -158,7 +158,7 @@ def _text(path: str) -> str:
 
 
 def measured_lateness(seconds: float = 1.0) -> Lateness:
-    """Lateness of a loop of 1 kHz with absolute deadlines in this process; one that is missed is left out."""
+    """Lateness of a 1 kHz loop with absolute deadlines in this process; missed deadlines are skipped and counted."""
     late: list[float] = []
     deadlines = math.ceil(seconds / PERIOD)
     begin, k, missed = time.monotonic(), 0, 0

@@ -1,4 +1,4 @@
-"""``hvf hardware identify``: from recordings of a device that nobody holds to a device file."""
+"""``hvf hardware identify``: identifies friction, inertia, delay and offsets from recordings of a free device."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,17 +16,17 @@ from sim.hardware.identification import NAMES, Identified, Motion, identify_link
 from sim.recording.recording import Recording
 
 _SETTLING = 2.5
-"""Left out after the force is in [s]: a hand that held the stylus lets go meanwhile."""
+"""Time left out after the device becomes active [s], in which the hand that held the stylus lets go."""
 _UNITS = {"coulomb": "N m", "viscous": "N m s/rad", "inertia": "kg m²", "delay": "s", "offset": "rad", "weight": "N m"}
 
 
 def identify(options: IdentifyHardware) -> int:
-    """Find out what a device is, say it, and write it.
+    """Identify the parameters of a device, print them, and write its device file.
 
     Raises
     ------
     SimError
-        If a recording is none of a hardware run, tells too little, or the file exists.
+        If a recording is not of a hardware run or has too little motion, or the file exists.
     """
     if options.out.exists() and not options.overwrite:
         raise SimError(f"{options.out}: exists; choose another --out, or --overwrite it")
@@ -42,12 +42,12 @@ def identify(options: IdentifyHardware) -> int:
 
 
 def device_of_runs(runs: Sequence[Path]) -> dict[str, Any]:
-    """Content of the device file that all of these runs were made with; empty where there was none.
+    """Content of the device file with which all of these runs were made; empty if there was none.
 
     Raises
     ------
     SimError
-        If they were made with different ones.
+        If the runs were made with different device files.
     """
     files = [(path if path.is_dir() else path.parent) / DEVICE for path in runs]
     contents = [read_device_file(file) if file.exists() else {} for file in files]
@@ -58,12 +58,12 @@ def device_of_runs(runs: Sequence[Path]) -> dict[str, Any]:
 
 
 def recorded_motions(path: Path) -> list[Motion]:
-    """Stretches of a recording, or of a run's folder, in which the device was active and nobody held it.
+    """Parts of a recording, or of the recording in a run's folder, in which the device was active and nobody held it.
 
     Raises
     ------
     SimError
-        If it is no recording of a hardware run.
+        If it is not the recording of a hardware run.
     """
     file = path / RECORDING if path.is_dir() else path
     with Recording(file) as recording:
@@ -84,7 +84,7 @@ def recorded_motions(path: Path) -> list[Motion]:
 
 
 def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
-    """What was found, a line each."""
+    """Identified parameters in words, one per line."""
     seconds = sum(float(motion.clock[-1] - motion.clock[0]) for motion in motions)
     said = [
         f"{seconds:.1f} s of motion, {found.windows} windows; {found.unexplained:.2%} of the torque is unexplained."

@@ -1,4 +1,4 @@
-"""How a device answers: round trip, loss, jitter and staleness, measured with its motors off or as a run shows them."""
+"""Quality of the link to a device: round trip, loss, jitter and staleness, with its motors off or during a run."""
 
 import time
 from collections.abc import Mapping
@@ -11,24 +11,25 @@ from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, D
 from sim.devices.exchange import READING_SIZE
 
 PERIOD = 1e-3
-"""Between two commands while a link is measured [s]."""
+"""Nominal period of the commands while a link is measured [s]."""
 
 
 class Link(NamedTuple):
-    """How a device answers.
+    """Measured quality of the link to a device.
 
     Attributes
     ----------
     seconds : float
-        For how long it was measured [s].
+        Duration of the measurement [s].
     readings, lost, refused : int
-        Readings that came, were lost on the way, and were refused for a wrong checksum or an old number.
+        Number of readings received, lost on the way, and refused for a wrong checksum or an old sequence number.
     round_trip, round_trip_p99 : float
-        From a command to the reading that answers it [s]: median and 99 of 100. NaN where it does not tell.
+        Time from a command to the reading that answers it [s]: median and 99th percentile; NaN if the device does not
+        report it.
     jitter : float
-        Of the arrivals (RFC 3550, section 6.4.1) [s], median.
+        Median interarrival jitter (RFC 3550, section 6.4.1) [s].
     staleness_p99 : float
-        How much later than the quickest a reading came [s], 99 of 100.
+        99th percentile of the delay of a reading relative to the quickest one [s].
     """
 
     seconds: float
@@ -42,7 +43,7 @@ class Link(NamedTuple):
 
     @classmethod
     def of(cls, seconds: float, counts: tuple[float, float, float], times: Array) -> "Link":
-        """From readings, losses and refusals, and round trip, jitter and staleness at each reading, shape (n, 3)."""
+        """From the counts of readings, losses and refusals, and from round trip, jitter and staleness [s], (n, 3)."""
 
         def quantile(column: int, share: float) -> float:
             known = times[:, column][~np.isnan(times[:, column])]
@@ -54,7 +55,7 @@ class Link(NamedTuple):
         )
 
     def lines(self) -> list[str]:
-        """In lines for a person."""
+        """The link in words."""
         return [
             f"{self.readings} readings in {self.seconds:.2f} s, {self.lost} lost, {self.refused} refused",
             f"round trip {in_us(self.round_trip)} (p99 {in_us(self.round_trip_p99)}), jitter {in_us(self.jitter)}, "
@@ -63,12 +64,12 @@ class Link(NamedTuple):
 
 
 def in_us(seconds: float) -> str:
-    """A time [s] in microseconds, in words."""
+    """Text of a time [s] in microseconds."""
     return "not told" if np.isnan(seconds) else f"{seconds * 1e6:.0f} µs"
 
 
 def link_now(row: Mapping[str, Array]) -> str:
-    """The link as a tick of `sim.hardware.gated_servo.CHANNELS` has it, in a line."""
+    """The link in one line, from the channels of a tick (`sim.hardware.gated_servo.CHANNELS`)."""
     trip, jitter, stale = (in_us(float(row[name])) for name in ("round_trip", "jitter", "staleness"))
     return (
         f"round trip {trip}, jitter {jitter}, staleness {stale}, {float(row['lost']):.0f} readings lost, "
@@ -77,7 +78,7 @@ def link_now(row: Mapping[str, Array]) -> str:
 
 
 def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
-    """How a device answers commands that leave its motors off, for so long [s]."""
+    """Measure the link for `seconds` [s] with commands that leave the motors off."""
     reading, told = np.zeros(READING_SIZE), driver.telemetry
     times: list[Array] = []
     begin, first = time.monotonic(), told.copy()
@@ -85,7 +86,7 @@ def measured_link(driver: Driver, seconds: float = 1.0) -> Link:
         driver.write(np.zeros(3), False)
         if driver.read(reading, 2.0 * PERIOD):
             times.append(told[[ROUND_TRIP, JITTER, STALENESS]])
-        time.sleep(0.5 * PERIOD)  # a device that waits for nothing is not asked as often as it can answer
+        time.sleep(0.5 * PERIOD)  # limits the rate for devices that answer without waiting
     counts = told - first
     return Link.of(
         time.monotonic() - begin,

@@ -1,4 +1,4 @@
-"""What a hardware run was: from its recording, and from what the servo said at its end."""
+"""Outcome of a hardware run, from its recording and from the servo's final report."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,36 +16,36 @@ from sim.recording.recording import Recording, RecordingError
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a hardware run was.
+    """Outcome of a hardware run.
 
     Attributes
     ----------
     device, transport : str
-        Of the device.
+        Name and transport of the device.
     fault : str
-        What it let go for at last; empty if for nothing.
+        Fault that was latched at the end; empty if there was none.
     let_go : tuple of str
-        Every time that it let go, and for what; all but the last may have been cleared.
+        All faults at which the device released its force, with their times; all but the last may have been cleared.
     silent : bool
-        Whether the servo stopped without a word.
+        Whether the servo's process ended without a final report.
     broken : str
-        The program's own failure in the servo's process.
+        Program error in the servo's process.
     ticks, missed : int
-        Run, and deadlines missed.
+        Number of ticks run, and of deadlines missed.
     compute, lateness : three floats
-        p50, p99, p99.9 of a tick's computing time, and of how late it began [s]; zeros of a servo that was killed.
+        p50, p99, p99.9 of a tick's computing time and of its lateness [s]; zeros if the servo was killed.
     memory_growth, descriptors : float, int
-        Of the servo's process after its first second [MB].
+        Growth of the servo's process after its first second: memory [MB] and open files.
     recorded, dropped : int
-        Ticks in the recording, and those that its process did not take in time.
+        Number of ticks in the recording, and of ticks that the recorder's process did not take in time.
     active : float
         Time under full force [s].
     distance, force, heat : float
-        While active: RMS distance from the curve [m], largest force [N], largest share of a motor's heat.
+        While active: RMS distance from the curve [m], largest force [N], largest share of a motor's thermal limit.
     link : Link
-        How the device answered.
+        Quality of the link.
     apart, hand_force : float
-        RMS of the twin's prediction of a tick [m], largest force of the hand as it tells it [N], while active.
+        While active: RMS error of the twin's one-tick prediction [m], largest hand force estimated by the twin [N].
     """
 
     device: str
@@ -72,15 +72,15 @@ class Outcome:
 
     @property
     def sound(self) -> bool:
-        """Whether nothing ended the run before its time."""
+        """Whether the run ended without a fault or failure."""
         return not (self.fault or self.silent or self.broken)
 
     def to_json(self) -> dict[str, object]:
-        """All of it by name."""
+        """All attributes by name, as plain data."""
         return {**asdict(self), "link": self.link._asdict()}
 
     def lines(self) -> list[str]:
-        """What a person wants to know, first what went wrong."""
+        """The outcome in words, faults and failures first."""
         wrong = [f"The device let go: {self.fault}."] if self.fault else []
         if len(self.let_go) > bool(self.fault):
             wrong += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]

@@ -1,4 +1,4 @@
-"""The page of a hardware run: device, force and figure as the servo's last row has them; in a process of its own."""
+"""Live view of a hardware run in a browser: device, force and figure from the servo's latest row; its own process."""
 
 import os
 import signal
@@ -26,21 +26,21 @@ from sim.viewer.live_page import LivePage
 from sim.viewer.shown import Shown
 from sim.world.shown_phantom import show_angles, shown_phantom
 
-_PAUSE = 1.0 / 60.0  # [s] between two looks: half a picture's time
+_PAUSE = 1.0 / 60.0  # [s] between two polls: half the time between two pictures
 
 
 def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Session:
-    """What the page shows: the kinematic figure, or the device alone where the figure is led; see `wire`."""
+    """Session that the page shows: with the kinematic figure, or the device alone if the figure is led; see `wire`."""
     if config.map.kind == "led":
         return session_of(served(config), ready)
     return wire(replace(config, figure=replace(config.figure, kind="kinematic")), ready=ready)
 
 
 def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -> None:
-    """Show a run until whoever started this is gone; the target of a process. Nobody waits for it.
+    """Show a run until the parent process ends; the target of a process on which no other one waits.
 
-    The force of the hand is what the twin tells (`told`, of the recorder). The figure is the animation h(p) itself; one
-    that is led has a walker that lives in the servo, and is not shown.
+    The force of the hand is the twin's estimate (`told`, from the recorder). The figure is the animation h(p) itself; a
+    figure that is led is not shown, as its walker is in the servo's process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     led, session = config.map.kind == "led", page_session(config)
@@ -63,7 +63,7 @@ def show_status(config: RunConfig, status: SharedNumbers, told: SharedNumbers) -
 
 
 def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
-    """What the page says of a tick: state, fault, and how the device answers."""
+    """Notes of the page on a tick: state of the gate, fault, and quality of the link."""
     fault = Fault(int(tick["fault"]))
     state = State(int(tick["state"])).name.lower()
     return (f"{state}: {fault.words(float(tick['fault_value']))}" if fault else state, *link_now(tick).split(", "))

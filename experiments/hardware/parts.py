@@ -1,4 +1,4 @@
-"""What is driven in the servo's process, from what can be sent to it."""
+"""Factories of the servo and of the emulated device, which are sent to their processes and called there."""
 
 import socket
 from dataclasses import dataclass, replace
@@ -26,16 +26,19 @@ from sim.world.world import World
 
 
 def served(config: RunConfig) -> RunConfig:
-    """A configuration as the servo has it: no figure, and one physics step a period, for no physics decides anything.
+    """The configuration of the servo's process: without a figure, and with one physics step per period.
 
-    The figure is evaluated where it is shown. Neither is what a certificate is of.
+    The device replaces the simulated physics, and the figure is evaluated where it is shown; the certificate depends on
+    neither of the two.
     """
     clock = Clock(servo_period=config.clock.servo_period, physics_step=config.clock.servo_period)
     return replace(config, figure=replace(config.figure, kind="none"), clock=clock)
 
 
 def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: float = SILENT_PERIODS) -> Session:
-    """A run of a field on a device behind two arrays, which may be silent for so many periods, wired up.
+    """Put together the run of a field on a device that is accessed through two arrays (`sim.devices.exchange`).
+
+    The device may be silent for `silent` periods of the servo before that is a fault.
 
     Raises
     ------
@@ -50,32 +53,32 @@ def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: flo
 
 
 def start_of(session: Session) -> Array:
-    """Where the run begins, in H [m], shape (3,)."""
+    """Position of the stylus at which the run begins, in H [m], shape (3,)."""
     return session.world.data.site(PHANTOM + "tip").xpos - P_WH
 
 
 @dataclass(frozen=True)
 class MakeServo:
-    """Opens the device and makes what is driven; sent to the servo's process and called there.
+    """Opens the device and makes the gated servo; sent to the servo's process and called there.
 
     Parameters
     ----------
     config : RunConfig
-        As `served`.
+        Configuration returned by `served`.
     name : str
-        Of the device, for `sim.devices.hardware_list`.
+        Name of the device, for `sim.devices.hardware_list`.
     gate : Gate
-        Its limits.
+        Safety gate with its limits.
     offset : three floats
-        Of its encoders [rad].
+        Offset of the encoders [rad].
     calibration : Calibration, optional
-        Whose offset that is.
+        Calibration from which the offset comes.
     packets : socket, optional
-        Of an emulated device, instead.
+        Socket of an emulated device, which is used instead of a real one.
     calibrated : bool
-        Whether that one knows its zero.
+        Whether the emulated device knows its zero.
     silent : float
-        Periods without a new reading that are a fault.
+        Number of periods without a new reading after which there is a fault.
     """
 
     config: RunConfig
@@ -88,7 +91,7 @@ class MakeServo:
     silent: float = SILENT_PERIODS
 
     def __call__(self) -> GatedServo:
-        """Make it.
+        """Open the device and make the servo.
 
         Raises
         ------
@@ -107,7 +110,7 @@ class MakeServo:
     def _driver(self) -> Driver:
         if self.packets is not None:
             return EmulatedDriver(self.packets, self.calibrated)
-        from sim.devices.hardware_list import open_device  # loads what drivers there are
+        from sim.devices.hardware_list import open_device  # imported late, as it loads the installed drivers
 
         return open_device(self.name)
 
@@ -119,11 +122,11 @@ class MakeEmulated:
     Parameters
     ----------
     scene : SceneConfig
-        Its rates.
+        Rates of the emulation.
     start : Array
-        Where the stylus is [m], shape (3,).
+        Initial position of the stylus in H [m], shape (3,).
     linkage : Linkage
-        What it is.
+        Parameters of the emulated linkage.
     """
 
     scene: SceneConfig
@@ -131,5 +134,5 @@ class MakeEmulated:
     linkage: Linkage
 
     def __call__(self) -> EmulatedPhantom:
-        """Make it."""
+        """Make the device."""
         return EmulatedPhantom(self.scene, self.start, self.linkage)

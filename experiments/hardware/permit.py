@@ -1,4 +1,4 @@
-"""Whether a device may be armed with a field: what the certificate, the device and its calibration say."""
+"""Checks whether a device may be armed with a field: certificate, limits, device and calibration."""
 
 from pathlib import Path
 
@@ -15,31 +15,31 @@ from models.mocap.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 
-HAND_PUSH = 1.0  # the default of `hvf certify` [N]
+HAND_PUSH = 1.0  # [N], the default of `hvf certify`
 RAMP = 0.25
-"""Least time in which a real device's force comes in [s]: somebody who is surprised takes as long to let go."""
+"""Shortest ramp of a real device's force [s]: the reaction time in which a surprised person lets go."""
 
 
 def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
-    """The certificate of a field, if it is of this one, on this device, and says that the loop is stable.
+    """Read a certificate and check that it is for this field on this device, and that it certifies stability.
 
     Parameters
     ----------
     certificate : Path
         A folder of ``hvf certify``, or its certificate.json.
     config : RunConfig
-        Of the field.
+        Configuration of the field.
     delay : float
-        Of the torques [s].
+        Delay of the torques [s].
 
     Raises
     ------
     CertificateError
-        If there is none there.
+        If there is no certificate.
     ChangedInputs
-        If it is of another field, device, delay or code.
+        If it is for another field, device, delay or code.
     SimError
-        If it does not say that the loop is stable, or not for the delay of the device's file.
+        If it does not certify that the loop is stable, or `delay` is less than that of the device file.
     """
     file = certificate / "certificate.json" if certificate.is_dir() else certificate
     found_delay = linkage_of(config.device).delay
@@ -68,12 +68,12 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
 
 
 def check_limits(options: RunHardware) -> None:
-    """Refuse limits that are none to a hand on a real device: a person may lower them, and raise them this far.
+    """Refuse limits that would not protect a hand on a real device.
 
     Raises
     ------
     SimError
-        With the option, and how far it goes.
+        If an option is beyond its bound; the message names both.
     """
     for name, most, unit in (
         ("force", 8.5, "N, the Premium's peak"), ("speed", 2.0, "m/s"), ("small", 2.0, "N"),
@@ -91,12 +91,14 @@ def check_limits(options: RunHardware) -> None:
 
 
 def check_device(identity: DeviceIdentity, calibration: Calibration | None, identified: bool = False) -> list[str]:
-    """What is to be said of a device that may be armed, with the zero, and the friction and inertia, of its file.
+    """Check whether a device may be armed, given its calibration; returns warnings for the operator.
+
+    `identified` says whether the device file has friction and inertia of this device.
 
     Raises
     ------
     SimError
-        If it may not: it has no motors, or nobody knows where its encoders' zero is.
+        If it has no motors, is not calibrated, or the calibration is of another device.
     """
     if not identity.forces:
         raise SimError(f"{identity.name} has no motors: no force can be felt on it; it plays, it is not armed")

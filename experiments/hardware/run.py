@@ -1,4 +1,4 @@
-"""A hardware run from a configuration to a folder: permit, processes, a person who arms, what happened."""
+"""Runs a field on a device, from the configuration to a folder: permit, processes, operator, outcome."""
 
 import contextlib
 import multiprocessing
@@ -40,12 +40,12 @@ from sim.recording.recording import Recording
 
 
 def run_hardware(config: RunConfig, options: RunHardware) -> int:
-    """Run a field on a device, and write what happened into a folder.
+    """Run a field on a device, and write the results into a folder.
 
     Parameters
     ----------
     config : RunConfig
-        Of the field; how long it is armed is its `seconds`.
+        Configuration of the field; its `seconds` is the time from the first arming to the end.
     options : RunHardware
         Device, certificate, limits.
 
@@ -57,8 +57,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     Raises
     ------
     ModelError, ControllerError, SimError
-        If there is no such device, or it may not be armed with this field; the folder is then as it was, but where only
-        the device itself, once it is open, tells so.
+        If there is no such device, or it may not be armed with this field. The folder is then left unchanged, unless
+        this is found only after the device has been opened.
     """
     console = Console(stderr=True)
     check_folder(options.out, options.overwrite)
@@ -102,7 +102,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
 
 
 def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Session:
-    """What the servo is to run, with all compiled that it and the page need, before anybody waits for them."""
+    """The session of the servo; compiles all units that servo and page need before their processes start."""
     session = session_of(served(config), ready=lambda units: compile_once(console, units))
     if options.view:
         page_session(config, ready=lambda units: compile_once(console, units))
@@ -112,7 +112,7 @@ def _compiled(config: RunConfig, options: RunHardware, console: Console) -> Sess
 
 
 def _begin_folder(config: RunConfig, content: dict[str, Any], options: RunHardware) -> None:
-    """An empty folder but for the configuration, and the device file."""
+    """Clear the folder, and write the configuration and the device file into it."""
     clear_folder(options.out)
     (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
     if content:
@@ -120,7 +120,7 @@ def _begin_folder(config: RunConfig, content: dict[str, Any], options: RunHardwa
 
 
 def _gate(config: RunConfig, options: RunHardware) -> Gate:
-    """The limits that are asked for, of a device that has its permit."""
+    """The safety gate with the limits of the options, for a device that has passed `_permit`."""
     return Gate(
         config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
         small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
@@ -128,12 +128,12 @@ def _gate(config: RunConfig, options: RunHardware) -> Gate:
 
 
 def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
-    """Refuse a device with motors that has no certificate of this field, and limits that are none.
+    """Refuse a real device without a certificate of this field, and limits that would not protect a hand.
 
     Raises
     ------
     CertificateError, SimError
-        If it is not there, or may not be armed.
+        If the device or its certificate is missing, or the device may not be armed.
     """
     if options.name != EMULATED:
         check_limits(options)
@@ -150,7 +150,7 @@ def _permit(config: RunConfig, options: RunHardware, console: Console) -> None:
 
 @contextlib.contextmanager
 def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, None, None]:
-    """The emulated device in its process; gives the servo's end of its packets."""
+    """Run the emulated device in its own process; yields the servo's end of the socket."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
     end = EmulatedEnd(theirs, shown, make.scene.servo_period)
@@ -184,7 +184,7 @@ def _write(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None
     (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
-        from experiments.results.hardware_report import write_hardware_report  # brings plots with it
+        from experiments.results.hardware_report import write_hardware_report  # imported late, as it loads matplotlib
 
         with Recording(out / RECORDING) as recording:
             write_hardware_report(out, recording, outcome.lines())

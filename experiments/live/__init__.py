@@ -1,1 +1,1 @@
-"""The page on which a person takes the stylus: a servo of its own, what it shows, and what is done with it."""
+"""The live page, on which a person takes the stylus: engine process, state and actions, panels, access gate."""

@@ -1,4 +1,4 @@
-"""Numbers that two processes share: one writes, the other reads the newest whole set of them, and neither waits."""
+"""Shared memory between two processes: one writes a set of numbers, the other reads the latest complete set."""
 
 import itertools
 import time
@@ -10,21 +10,21 @@ import numpy.typing as npt
 
 from controllers.state import Array
 
-_PATIENCE = 1.0  # [s] no writing lasts longer
+_PATIENCE = 1.0  # [s] longest time for which a reader retries; a write is much shorter
 
 
 class Board:
     """Named rows of numbers in shared memory, with one writer.
 
-    A sequence number is odd while they are written; a reader tries again where it was, or has changed meanwhile
-    (Lamport 1977, "Concurrent reading and writing").
+    A sequence lock: the sequence number is odd during a write, and a reader tries again if the number was odd or has
+    changed while it read (Lamport 1977, "Concurrent reading and writing").
 
     Parameters
     ----------
     memory : ctypes array of double
-        Of `Board.memory`.
+        Memory made by `Board.memory`.
     sizes : Mapping
-        How many numbers each name has.
+        Number of values of each row, by name.
     """
 
     def __init__(self, memory: Any, sizes: Mapping[str, int]):
@@ -34,18 +34,18 @@ class Board:
 
     @staticmethod
     def memory(sizes: Mapping[str, int]) -> Any:
-        """Memory for a board, to be handed to a process when it is started."""
+        """Memory for a board, to be passed to a process when it is started."""
         from multiprocessing import get_context
 
         return get_context("spawn").RawArray("d", 1 + sum(sizes.values()))
 
     @property
     def sequence(self) -> int:
-        """Changes with every writing."""
+        """Sequence number, which changes with every write."""
         return int(self._all[0])
 
     def write(self, values: Mapping[str, npt.ArrayLike]) -> None:
-        """Write some rows; one that is shorter than its place leaves the rest as it was."""
+        """Write some rows; a value shorter than its row leaves the rest of the row unchanged."""
         self._all[0] += 1.0
         for name, value in values.items():
             row = np.ravel(np.asarray(value, dtype=np.float64))
@@ -53,7 +53,7 @@ class Board:
         self._all[0] += 1.0
 
     def read(self) -> dict[str, Array]:
-        """A copy of all rows as they were written together; as they are, if the writer ended in the middle of it."""
+        """A consistent copy of all rows; if the writer died during a write, the rows as they are."""
         end = time.monotonic() + _PATIENCE
         while True:
             before = self._all[0]

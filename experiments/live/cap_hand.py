@@ -1,4 +1,4 @@
-"""The hand on a SpaceMouse: while its cap is pushed the hand has the stylus, and its first button is the switch."""
+"""A SpaceMouse as the hand: while its cap is pushed the hand holds the stylus; its first button is the switch."""
 
 import time
 
@@ -10,16 +10,16 @@ from sim.devices.hardware_list import found_devices, open_hid
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
-RESTS = 0.3  # [s] after which a cap that nobody pushes has let go
+RESTS = 0.3  # [s] without a push of the cap after which the hand releases the stylus
 
 
 class CapHand:
-    """A cap that moves the hand.
+    """A hand that is moved by the cap of a SpaceMouse.
 
     Parameters
     ----------
     mouse : SpaceMouse
-        Open; owned from here on.
+        An open device, which this object owns and closes.
     """
 
     def __init__(self, mouse: SpaceMouse):
@@ -28,17 +28,17 @@ class CapHand:
         self.holds = False
 
     def wish(self, stylus: Array) -> tuple[Array, bool] | None:
-        """Where the hand means to have the stylus, in H [m], and whether its switch is pressed; None if it rests.
+        """Target position of the stylus in H [m], and whether its switch is pressed; None if the hand does not hold it.
 
         Parameters
         ----------
         stylus : Array
-            Where the stylus is, in H [m], shape (3,): there a hand begins that takes it.
+            Position of the stylus in H [m], shape (3,), where the hand begins when it takes hold.
 
         Raises
         ------
         DriverFault
-            If the device is gone.
+            If the device was disconnected.
         """
         if not self.holds:
             self._mouse.start_at(stylus)
@@ -50,12 +50,12 @@ class CapHand:
         return (self._mouse.tip, bool(self._reading[READING_SWITCH])) if self.holds else None
 
     def close(self) -> None:
-        """Give the device back."""
+        """Close the device."""
         self._mouse.close()
 
 
 def cap_there() -> tuple[CapHand | None, str]:
-    """The first SpaceMouse that this machine has and this user may open, and what is to be said."""
+    """The first SpaceMouse of this machine, opened, or None; and a message for the user, which may be empty."""
     try:
         found = next((device for device in found_devices() if device.kind == "spacemouse"), None)
         if found is None:

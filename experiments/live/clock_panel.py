@@ -1,4 +1,4 @@
-"""Time on the page: pause, step, slow motion, reset, looking back; and what the hand does with its fingers."""
+"""Panel of the live page for time (pause, step, pace, reset, looking back) and for the stylus switch and grip."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,11 +17,11 @@ class ClockPanel:
     Parameters
     ----------
     gui : viser.GuiApi
-        Where they are laid.
+        GUI to which the buttons are added.
     desk : Desk
-        What they work on.
+        State and actions of the page.
     acts : callable
-        Around what they do: see `Page.acts`.
+        Wraps every event handler; see `Page.acts`.
     """
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
@@ -67,21 +67,21 @@ class ClockPanel:
 
     @property
     def pressed(self) -> bool:
-        """Whether the switch is pressed while the hand has the stylus."""
+        """Whether the switch is pressed while the hand holds the stylus."""
         return self._press.value
 
     @property
     def keeps(self) -> bool:
-        """Whether the hand holds on when the mouse lets go."""
+        """Whether the hand keeps holding the stylus when the mouse lets go."""
         return self._keep.value
 
     @property
     def seconds_ago(self) -> float:
-        """How far back one looks [s]."""
+        """How far the view looks back in time [s]."""
         return -self._back.value
 
     def write(self) -> None:
-        """Show how it is."""
+        """Update the buttons from the state of the run."""
         desk = self._desk
         self._from.visible = self.seconds_ago > 0.0
         self._rearm.visible = bool(desk.now["fault"][0] != 0.0)

@@ -1,4 +1,4 @@
-"""``hvf live``: the page behind its gate, until Ctrl-C."""
+"""``hvf live``: serves the live page behind its access gate until Ctrl-C."""
 
 import secrets
 from dataclasses import replace
@@ -11,27 +11,27 @@ from experiments.live.page import Page
 from experiments.live.run_panel import FOR_EVER
 from sim.errors import SimError
 
-LEAST_TOKEN = 16  # characters: none that can be guessed
+LEAST_TOKEN = 16  # [characters] of a given token, so that it cannot be guessed
 
 
 def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") -> None:
-    """Serve the page of a run that is driven.
+    """Serve the live page of a run that a person drives.
 
     Parameters
     ----------
     config : RunConfig
-        What runs first.
+        Configuration of the first run.
     host, port
-        To listen on; the next free port is taken if it is in use.
+        Address to listen on; if the port is in use, the next free one is taken.
     out : Path
         Folder for takes and clips.
     given : str
-        The token; by default a new one, where one is needed.
+        Token; by default a new one is made if the host needs one.
 
     Raises
     ------
     ParameterError
-        If a token is too easily guessed, there is no figure to be shown, or the hand is somebody else's.
+        If the token is too easily guessed, the run has no figure to show, or it has a simulated user of its own.
     SimError
         If the page cannot be served there, or the servo's process ends.
     """
@@ -57,12 +57,12 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
 
 
 def token_for(host: str, given: str) -> str | None:
-    """The token of a page on a host: none where only this machine comes.
+    """Access token of the page on a host; None if the host is reachable from this machine only and no token is given.
 
     Raises
     ------
     ParameterError
-        If the one that is given can be guessed.
+        If the given token is too easily guessed.
     """
     if host in HERE and not given:
         return None

@@ -1,4 +1,4 @@
-"""What the page knows and can do, without a page: the engine's process, what it shows, and what was done with it."""
+"""State and actions of the live page, without its GUI: engine process, displayed values, undo, takes and clips."""
 
 import re
 import time
@@ -33,14 +33,14 @@ from experiments.live.messages import (
 from experiments.live.workers import Uploaded, Worker, preparation, verdicts
 from sim.errors import SimError
 
-REMEMBERED = 60.0  # [s] that can be looked at again
-PICTURES = 30.0  # that are remembered of a second
-MOST_BYTES = 30_000_000  # of a motion file: an hour of a capture
+REMEMBERED = 60.0  # [s] of history that can be looked at again
+PICTURES = 30.0  # states stored per second of history
+MOST_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
 _MOTIONS = (".bvh", ".amc", ".asf", ".txt", ".json")
 
 
 class Doing(NamedTuple):
-    """Something that can be undone: gains that were moved, or a bend (without configurations)."""
+    """An action that can be undone: a change of gains, or, without configurations, a bend of the curve."""
 
     before: RunConfig | None = None
     after: RunConfig | None = None
@@ -52,9 +52,9 @@ class Desk:
     Parameters
     ----------
     folder : Path
-        Where takes and clips are kept.
+        Folder of takes and clips.
     say : callable
-        Told what a person should read, a line at a time.
+        Called with each line of text that the person should read.
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None):
@@ -79,7 +79,7 @@ class Desk:
     # What it shows
 
     def poll(self) -> None:
-        """Take in what the processes have told."""
+        """Process the messages of the engine and of the workers, and read the latest displayed values."""
         while (told := self.engine.told()) is not None:
             self._hear(told)
         while (found := self._verdicts.told()) is not None:
@@ -126,7 +126,7 @@ class Desk:
             self.history.append(now)
 
     def at(self, seconds_ago: float) -> dict[str, Array]:
-        """What was shown so long ago [s], of what is remembered; now, for 0."""
+        """The displayed values of `seconds_ago` [s] before now, from the history; the current ones for 0."""
         if seconds_ago <= 0.0 or not self.history:
             return self.now
         wanted = self.now["t"][0] - seconds_ago
@@ -135,51 +135,51 @@ class Desk:
     # What can be done
 
     def build(self, config: RunConfig) -> None:
-        """Put another run together; the one that runs goes on until it is there."""
+        """Put another run together; the current one continues until it is ready."""
         self.let_go()
         self.engine.ask(Build(config))
 
     def hold(self, target: Array, pressed: bool) -> None:
-        """Take the stylus to a point of H [m], with its switch pressed or not."""
+        """Hold the stylus with a target position in H [m], with its switch pressed or not."""
         self.engine.held.write({"grip": 1.0, "pressed": float(pressed), "target": target})
 
     def press(self, pressed: bool) -> None:
-        """Press or let go of the switch of a stylus that is held."""
+        """Press or release the switch of the held stylus."""
         self.engine.held.write({"pressed": float(pressed)})
 
     def let_go(self) -> None:
-        """Let go of the stylus."""
+        """Release the stylus."""
         self.engine.held.write({"grip": 0.0, "pressed": 0.0})
 
     @property
     def holds(self) -> bool:
-        """Whether somebody has the stylus."""
+        """Whether a person holds the stylus."""
         return bool(self.engine.held.rows["grip"][0] > 0.0)
 
     @property
     def target(self) -> Array:
-        """Where the stylus is held, in H [m], shape (3,)."""
+        """Target position of the held stylus in H [m], shape (3,)."""
         return self.engine.held.rows["target"].copy()
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still."""
+        """Whether the simulation is paused."""
         return bool(self.engine.held.rows["paused"][0] > 0.0)
 
     def pause(self, paused: bool) -> None:
-        """Stop time, or let it go on."""
+        """Pause the simulation, or let it continue."""
         self.engine.held.write({"paused": float(paused)})
 
     def step(self) -> None:
-        """Let a block of 8 ms pass."""
+        """Pause, and advance by a block of 8 ms."""
         self.engine.held.write({"paused": 1.0, "steps": self.engine.held.rows["steps"][0] + 1.0})
 
     def pace(self, share: float) -> None:
-        """Let time go as fast as this share of the wall clock."""
+        """Set the pace of the simulation, as a share of real time."""
         self.engine.held.write({"pace": share})
 
     def look(self, at_field: bool) -> None:
-        """Look at the field on a slice, or not."""
+        """Switch the computation of the field on a slice on or off."""
         self.engine.held.write({"slice": float(at_field)})
 
     def reset(self) -> None:
@@ -188,7 +188,7 @@ class Desk:
         self.engine.ask(Reset())
 
     def go_back(self, seconds_ago: float) -> None:
-        """Go on from so long ago [s]: from the last state before it that is kept, one a second."""
+        """Continue from the last stored state before the time `seconds_ago` [s] ago; one state is stored per second."""
         self.let_go()
         self.engine.ask(GoBack(float(self.at(seconds_ago)["t"][0])))
 
@@ -197,16 +197,16 @@ class Desk:
         self.engine.ask(Perform(now))
 
     def rearm(self) -> None:
-        """Forget a latched fault."""
+        """Clear a latched fault."""
         self.engine.ask(Rearm())
 
     def set_gain(self, name: str, value: float) -> None:
-        """Move a gain.
+        """Set a gain.
 
         Raises
         ------
         ParameterError
-            If it is out of its interval.
+            If the value is out of its interval.
         """
         if self.config is None:
             return
@@ -215,7 +215,7 @@ class Desk:
             return
         last = self._done[-1] if self._done else Doing()
         if last.after is before and self._moved(last) == {name}:
-            self._done[-1] = Doing(last.before, after)  # one way of a slider is one thing to undo
+            self._done[-1] = Doing(last.before, after)  # successive moves of a slider are undone together
         else:
             self._done.append(Doing(before, after))
         self._undone.clear()
@@ -228,7 +228,7 @@ class Desk:
         return {name for name in before if before[name] != after[name]}
 
     def undo(self) -> None:
-        """Take back what was done last: a bend, or gains that were moved."""
+        """Undo the last action: a bend or a change of gains."""
         if not self._done:
             self._say("Nothing is left to undo.")
             return
@@ -241,7 +241,7 @@ class Desk:
             self._take_over(doing.before)
 
     def redo(self) -> None:
-        """Do again what was taken back."""
+        """Redo the last undone action."""
         if not self._undone:
             self._say("Nothing is left to do again.")
             return
@@ -266,11 +266,11 @@ class Desk:
 
     @property
     def records(self) -> bool:
-        """Whether a take is recorded."""
+        """Whether a take is being recorded."""
         return bool(self.now["recording"][0] > 0.0)
 
     def takes(self) -> tuple[str, ...]:
-        """Names of the takes that there are."""
+        """Names of the existing takes."""
         folder = self.folder / "takes"
         return tuple(sorted(path.parent.name for path in folder.glob("*/edited.bvh")))
 
@@ -284,7 +284,7 @@ class Desk:
         Raises
         ------
         SimError
-            If the name is none, or another take has it.
+            If the name is invalid, or another take has it.
         """
         if not re.fullmatch(r"[\w][\w .-]{0,60}", name):
             raise SimError(f"a take cannot be named {name!r}; expected letters, digits, space, dot and dash")
@@ -293,16 +293,16 @@ class Desk:
         self.engine.ask(Record(self.take(name)))
 
     def stop(self) -> None:
-        """End the take; it is measured and kept."""
+        """End the take; it is measured and saved."""
         self.engine.ask(Stop())
 
     def upload(self, name: str, content: bytes) -> None:
-        """Have a motion file prepared, in a process of its own.
+        """Have a motion file prepared in a separate process.
 
         Raises
         ------
         SimError
-            If it is too large, of no kind that is read, or another one is being prepared.
+            If it is too large or of an unsupported format, or another file is being prepared.
         """
         file = Path(name).name
         if Path(file).suffix.lower() not in _MOTIONS:
@@ -333,7 +333,7 @@ class Desk:
         self._say(made.text)
 
     def close(self) -> None:
-        """End all processes; a take that is under way is kept."""
+        """End all processes; a take in progress is saved."""
         self.engine.close()
         self._verdicts.close()
         if self._preparation is not None:
@@ -341,7 +341,7 @@ class Desk:
 
 
 def numbers(history: deque[dict[str, Array]], names: tuple[str, ...], seconds: float) -> tuple[Array, ...]:
-    """Times [s] and norms of what is remembered of the last seconds, for plots."""
+    """Times [s], and norms of the named values over the last `seconds` [s] of the history, for plots."""
     if not history:
         return (np.zeros(2), *(np.zeros(2) for _ in names))
     last = history[-1]["t"][0]

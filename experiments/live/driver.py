@@ -1,12 +1,12 @@
-"""Who drives: of all who watch the page, one."""
+"""Choice of the one browser that may drive; all others watch."""
 
 import time
 
-IDLE = 10.0  # [s] after which a driver who does nothing may be relieved
+IDLE = 10.0  # [s] without an action after which another browser may take over
 
 
 class Driver:
-    """The one browser whose mouse and buttons count: the first that does something, until it leaves or is relieved."""
+    """The browser whose input counts: the first that acts, until it disconnects or another one takes over."""
 
     def __init__(self) -> None:
         self._client: int | None = None
@@ -14,11 +14,11 @@ class Driver:
 
     @property
     def client(self) -> int | None:
-        """Who drives, if anybody."""
+        """Id of the driving browser; None if there is none."""
         return self._client
 
     def may(self, client: int | None) -> bool:
-        """Whether what a browser does counts; one that does something while nobody drives is the driver then."""
+        """Whether a browser's action counts; a browser that acts while nobody drives becomes the driver."""
         if self._client is None:
             self._client = client
         if client != self._client:
@@ -27,14 +27,14 @@ class Driver:
         return True
 
     def take_over(self, client: int | None) -> bool:
-        """Let another browser drive, if the driver has done nothing for `IDLE`; whether it does then."""
+        """Let another browser drive, if the driver has been idle for `IDLE`; returns whether it drives now."""
         if self._client is not None and client != self._client and time.monotonic() - self._acted < IDLE:
             return False
         self._client, self._acted = client, time.monotonic()
         return True
 
     def leave(self, client: int) -> bool:
-        """A browser has gone; whether it was the driver."""
+        """Handle the disconnection of a browser; returns whether it was the driver."""
         was = client == self._client
         if was:
             self._client = None

@@ -1,4 +1,4 @@
-"""A servo in somebody's hand: run block by block, while gains move, curves are bent, and a take may be recorded."""
+"""The engine of a live session: runs the servo block by block while a person drags the stylus and changes gains."""
 
 import time
 from collections import deque
@@ -21,15 +21,15 @@ from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import KeptState, kept_state, put_back
 from sim.users.dragged import dragged, relaxed, tremor
 
-BLOCK = 8  # ticks between two looks at the hand: 8 ms, in which nobody sees a hand stop
-STRONGEST = 8.0  # [N] about what the motors can give for a moment; a person pulls no harder
-FASTEST = 0.6  # [m/s] of the hand: a quick reach over the Phantom's workspace
-HAND_TIME = 0.03  # [s] in which the hand comes to where the mouse is: two or three pictures of the page
-KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be gone back to, and how many there are
+BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short for a pause of the hand to be seen
+STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force
+FASTEST = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
+HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three pictures of the page
+KEPT_EVERY, KEPT = 1.0, 120  # [s] between states that can be returned to, and their largest number
 
 
 class Drag(NamedTuple):
-    """Where a person means to have the stylus, in H [m], and whether its switch is pressed."""
+    """A person's target for the stylus in H [m], and whether its switch is pressed."""
 
     target: Array
     pressed: bool = False
@@ -41,14 +41,14 @@ class Engine:
     Parameters
     ----------
     session : Session
-        That has not begun.
+        Session that has not been run yet.
 
     Attributes
     ----------
     config : RunConfig
-        With the gains as they are now.
+        Configuration with the current gains.
     tick : int
-        The next one.
+        Number of the next tick.
     """
 
     def __init__(self, session: Session):
@@ -56,7 +56,7 @@ class Engine:
         self.config = cast(RunConfig, session.config)
         assert isinstance(session.servo.device, SimulatedPhantom)
         field = session.servo.field
-        # The parameters of a law are its own; here they move.
+        # A copy, as the gains change here and the law must keep its own parameters.
         self._servo = session.servo._replace(field=field._replace(params=field.params.copy()))
         self._device, self._arm = session.servo.device, session.servo.device.user.arm
         self._block = self._servo.figure_ticks * max(1, BLOCK // self._servo.figure_ticks)
@@ -72,12 +72,12 @@ class Engine:
 
     @property
     def period(self) -> float:
-        """Of the servo [s]."""
+        """Period of the servo [s]."""
         return self._servo.plant.period
 
     @property
     def seconds(self) -> float:
-        """Of a block [s]."""
+        """Duration of a block [s]."""
         return self._block * self.period
 
     @property
@@ -92,12 +92,12 @@ class Engine:
 
     @property
     def memory(self) -> Array:
-        """Of the field."""
+        """Memory of the field."""
         return self._servo.field.memory
 
     @property
     def field(self) -> Field:
-        """The compiled field with its parameters as they are now."""
+        """The compiled field with its current parameters."""
         return self._servo.field
 
     @property
@@ -107,9 +107,9 @@ class Engine:
         return law if isinstance(law, StretchyTubes) else None
 
     def advance(self) -> tuple[TickLog, FrameLog]:
-        """Run a block; its logs are used again by the next one."""
+        """Run a block and return its logs, which the next block overwrites."""
         t, seconds = self.time, self.seconds
-        if self.drag is None or self.tick == 0:  # where the stylus is, nobody knows before it has been sensed
+        if self.drag is None or self.tick == 0:  # before the first tick the position of the stylus is not measured
             arm = relaxed(self._arm)
             self._intended[:] = np.nan
         else:
@@ -120,7 +120,7 @@ class Engine:
             arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
             self._intended = end
         device = self._device._replace(user=self._device.user._replace(arm=arm))
-        begin = time.thread_time()  # what is computed, not what other programs take of the processor meanwhile
+        begin = time.thread_time()  # processor time of this thread, without the time that other programs take
         run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
         self._costs.append((time.thread_time() - begin) / self._block)
         self.tick += self._block
@@ -129,21 +129,21 @@ class Engine:
         return self.logs
 
     def cost(self) -> tuple[float, float]:
-        """Median and 99th percentile of the processor time of a tick of late [s], and zeros before the first."""
+        """Median and 99th percentile of the processor time per tick over recent blocks [s]; zeros before the first."""
         if not self._costs:
             return 0.0, 0.0
         middle, most = np.percentile(self._costs, (50.0, 99.0))
         return float(middle), float(most)
 
     def set_gains(self, config: RunConfig) -> None:
-        """Take over the numbers of a configuration's mode, while it runs.
+        """Apply the gains of a configuration's mode during the run.
 
-        A curve that is bent in the memory keeps the pace that it was given: bends are kept by its phases.
+        A curve that is bent in the field's memory keeps its original timing, as bends are stored by phase.
 
         Raises
         ------
         ControllerError
-            If a number is out of its interval, or more than numbers would change.
+            If a number is out of its interval, or the structure of the field would change.
         """
         parts = parts_of(config, self.session.parts.maps)
         new, old, field = parts.program, self.session.parts.program, self._servo.field
@@ -161,42 +161,42 @@ class Engine:
         self.config = cast(RunConfig, parts.config)
 
     def perform(self, now: bool) -> None:
-        """Let the bent curve be performed from now on, or be bent again; of a mode that has both."""
+        """Perform the bent curve from now on, or make it bendable again, in a mode that has both."""
         self._performs_from = self.time if now else np.inf
         if self.tubes is not None:
             self._servo.field.params[self._until] = self._performs_from
 
     @property
     def performs(self) -> bool:
-        """Whether a bent curve is performed."""
+        """Whether a bent curve is being performed."""
         return bool(np.isfinite(self._performs_from))
 
     def undo(self) -> bool:
-        """Take the last bend back; False if there is none."""
+        """Undo the last bend; False if there is none."""
         return self._may_edit() and undo_bend(self.memory, self._record)
 
     def redo(self) -> bool:
-        """Bend again what was taken back; False if there is nothing."""
+        """Redo the last undone bend; False if there is none."""
         return self._may_edit() and redo_bend(self.memory, self._record)
 
     def _may_edit(self) -> bool:
-        """Whether there is a curve that nobody has in his hand, also as the field has it."""
+        """Whether the mode bends a curve and nobody holds it, neither by a drag nor by the switch as last sensed."""
         return self.tubes is not None and self.drag is None and self._device.hand[HAND_SWITCH] == 0.0
 
     def bends(self) -> int:
-        """How many bends are in force."""
+        """Number of bends in force."""
         return 0 if self.tubes is None else len(self.tubes.edits(self.memory))
 
     def rearm(self) -> None:
-        """Forget a latched fault of the device: the force is ramped in from zero."""
+        """Clear a latched fault of the device; the force is ramped in from zero."""
         rearm_servo(self._servo)
 
     def reset(self) -> None:
-        """Go back to the beginning; gains stay as they are."""
+        """Go back to the beginning; the gains are kept."""
         self._go_to(self._begin)
 
     def back_to(self, t: float) -> float:
-        """Go back to the last state that was kept at or before a time [s]; returns the time that it is of."""
+        """Go back to the last stored state at or before the time t [s]; returns the time of that state [s]."""
         state = next((kept for kept in reversed(self._kept) if kept.tick * self.period <= t), self._kept[0])
         self._go_to(state)
         return self.time
@@ -212,7 +212,7 @@ class Engine:
         self._intended[:] = np.nan
 
     def _end_of_stretching(self) -> int:
-        """Where in the parameters stands when stretching ends; and keep the memory as it begins."""
+        """Index of the parameter with the time at which stretching ends; also stores the field's initial memory."""
         program: Program = self.session.parts.program
         self._initial = program.memory.copy()
         laws = program.ops[program.ops[:, 0] >= 0]
@@ -224,13 +224,13 @@ class Engine:
 
 
 def take_session(session: Session, config: RunConfig, handled: tuple[tuple[float, float], ...]) -> Session:
-    """A session as a take of it is measured: with the gains of its end, and the spans in which a hand had it."""
+    """The session with which a take is measured: with the gains at its end, and the spans in which the hand dragged."""
     parts = replace(session.parts, config=config, handled=handled)
     return replace(session, parts=parts)
 
 
 def _within_reach(point: Array, centre: Array, reach: float) -> Array:
-    """A point, or the nearest one of a ball about another."""
+    """The point, or if it is outside a ball about `centre`, the nearest point of the ball."""
     away = point - centre
     distance = float(np.linalg.norm(away))
     return point if distance <= reach else centre + away * (reach / distance)

@@ -1,4 +1,4 @@
-"""The engine in a process of its own: the servo never waits for the page, nor for its interpreter."""
+"""The process of the engine, so that the servo never waits for the page nor for the page's Python interpreter."""
 
 import os
 import queue
@@ -48,15 +48,15 @@ from sim.errors import SimError
 from sim.loop.field_slice import field_slice
 from sim.loop.loop import configuration_size, shown_configuration
 
-PICTURE = 0.012  # [s] at least between two pictures: every other block of 8 ms, so that each of the page's is new
-SLICE = 0.25  # [s] between two looks at the field
-SLICE_WIDTH = 0.14  # [m]
-IDLE = 0.01  # [s] between two looks at the page while nothing runs
-LATE = 0.1  # [s] of delay that is not made up for
+PICTURE = 0.012  # [s] least time between two pictures: every other block of 8 ms, so that each of the page's is new
+SLICE = 0.25  # [s] between two computations of the field's slice
+SLICE_WIDTH = 0.14  # [m] side of the slice
+IDLE = 0.01  # [s] between two polls of the page while nothing runs
+LATE = 0.1  # [s] of delay from which it is not made up for
 
 
 class EngineProcess:
-    """The engine's process as the page has it: boards to read and write, and a queue either way."""
+    """The page's handle of the engine's process: boards to read and write, and a queue in each direction."""
 
     def __init__(self) -> None:
         context = get_context("spawn")
@@ -65,16 +65,16 @@ class EngineProcess:
         self.held.write({"pace": 1.0})
         self._orders: Any = context.Queue()
         self._told: Any = context.Queue()
-        # Not a daemon: it starts compilers.
+        # Not a daemon, as it starts compiler processes.
         self._process = context.Process(target=_main, args=(shown, held, self._orders, self._told), name="hvf-servo")
         start_undisturbed(self._process)
 
     def ask(self, order: object) -> None:
-        """Have something done."""
+        """Send an order."""
         self._orders.put(order)
 
     def told(self, seconds: float = 0.0) -> object | None:
-        """What it has told, if it has, within so long [s]."""
+        """Next message of the process, waiting for at most `seconds` [s]; None if there is none."""
         try:
             return self._told.get(timeout=seconds) if seconds > 0.0 else self._told.get_nowait()
         except queue.Empty:
@@ -82,11 +82,11 @@ class EngineProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the process is there."""
+        """Whether the process is running."""
         return self._process.is_alive()
 
     def close(self) -> None:
-        """End it; a take that is under way is kept."""
+        """End the process; a take in progress is saved."""
         self.ask(Quit())
         self._process.join(30.0)
         if self._process.is_alive():
@@ -114,7 +114,7 @@ class _Runner:
         self._curve, self._changed = 0, True
 
     def run(self) -> None:
-        """Until it is told to quit, or the page's process has gone."""
+        """Run until told to quit, or until the page's process has ended."""
         origin, pace = time.perf_counter(), 1.0
         before = 0.0
         while self._going and os.getppid() == self._parent:
@@ -189,7 +189,7 @@ class _Runner:
             Stop: lambda order: self._stop(engine),
         }
         if isinstance(order, Reset | GoBack):
-            self._stop(engine)  # a take is one stretch of time
+            self._stop(engine)  # a take must be continuous in time
         done[type(order)](order)
 
     def _record(self, order: Record, engine: Engine) -> None:
@@ -215,7 +215,7 @@ class _Runner:
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
         self._scratch = self._engine.memory.copy()
         self._changed = True
-        self._slice(self._engine)  # what it needs is compiled or read now, not in the middle of the run
+        self._slice(self._engine)  # so that its code is compiled or loaded now, not during the run
         self._told.put(_built(session, self._engine))
         self._picture()
 
@@ -264,7 +264,7 @@ class _Runner:
         self._shown.write(shown)
 
     def _ghost(self, trace: Array, pose: Array) -> Array:
-        """The default animation's pose; where rivers play clips of their own, the animation's."""
+        """Pose of the default animation; where rivers play their own clips, that of the animation itself."""
         if self._poses is None or not np.isfinite(trace[TRACE_DISTANCE]):
             return pose
         nearest, phase, river = trace[TRACE_POINT : TRACE_POINT + 3], trace[TRACE_PHASE], trace[TRACE_RIVER]
@@ -282,14 +282,14 @@ class _Runner:
 
 
 def slice_points(height: float) -> Array:
-    """Points of a horizontal plane of the hand frame [m], shape (81, 3)."""
+    """Grid points in a horizontal plane at a height in H [m], shape (81, 3)."""
     side = np.linspace(-0.5 * SLICE_WIDTH, 0.5 * SLICE_WIDTH, SLICE_SIDE)
     x, y = np.meshgrid(side, side)
     return np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1)
 
 
 def _course(engine: Engine) -> Array:
-    """Points of the curve as it is now, shape (241, 3)."""
+    """Points of the curve as it is bent now, in H [m], shape (241, 3)."""
     curve = engine.session.curve if engine.tubes is None else engine.tubes.edited(engine.memory)
     return curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
 

@@ -1,8 +1,8 @@
-"""Whether the gains of a run are certain to be stable, fast enough to be asked while a slider moves.
+"""Stability verdicts on the gains of a run, fast enough to follow a slider.
 
-The verdict is that of `controllers.certificates.loop.stability.stability` at these gains, reached in the order of what
-is cheap: the loops of all hands do not depend on the gains and are kept, so a verdict takes their eigenvalues at one
-pair of gains; the margin, which takes a search, comes after it.
+The verdict is that of `controllers.certificates.loop.stability.stability` at these gains, with the cheap steps first:
+the loops of all hands do not depend on the gains and are cached, so that a verdict takes only their eigenvalues at one
+pair of gains; the margin, which takes a search, is found afterwards.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,20 +24,20 @@ from sim.errors import SimError
 
 
 class GainVerdict(NamedTuple):
-    """What is certain of the gains of a law.
+    """Verdict on the gains of a law.
 
     Attributes
     ----------
     law : str
-        What it is the law of: "field", "held tube", "performance".
+        Name of the law: "field", "held tube", "performance".
     verdict : {"certified", "refuted", "unknown"}
-        Of its linear stability along the curve, with all that the run executes besides.
+        Verdict on linear stability along the curve, taking account of all laws that the run executes.
     reason : str
-        In one line.
+        Reason in one line.
     margin : float or None
-        (critical k_r)/k_r − 1; None while it is looked for.
+        (critical k_r)/k_r − 1; None while it is being computed.
     passive : str
-        Verdict on its passivity, and why.
+        Verdict on passivity, with its reason.
     """
 
     law: str
@@ -48,11 +48,11 @@ class GainVerdict(NamedTuple):
 
 
 _NAMES = {"": "field", "_held": "held tube", "_then": "performance"}
-_LEAST = 1e-3  # [N/m] [N s/m] below which a gain is none
+_LEAST = 1e-3  # [N/m] least stiffness with which the margin is computed
 
 
 class GainVerdicts:
-    """Verdicts on the gains of runs; loops and verdicts are kept."""
+    """Verdicts on the gains of runs, with caches of loops, verdicts and critical gains."""
 
     def __init__(self) -> None:
         self._loops: dict[object, tuple[list[SampledLoop], list[SampledLoop]]] = {}
@@ -60,7 +60,7 @@ class GainVerdicts:
         self._critical: dict[object, float] = {}
 
     def of(self, config: RunConfig) -> Iterator[tuple[GainVerdict, ...]]:
-        """Verdicts on all laws of a run: without margins, as soon as they are there, and then with them."""
+        """Yield the verdicts on all laws of a run: first without margins, as soon as they are found, then with them."""
         try:
             if any(law.law == "leading" for law in certified_laws(config).values()):
                 said = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
@@ -113,7 +113,7 @@ class GainVerdicts:
         return quick._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _LEAST) - 1.0)
 
     def _governed(self, river: River, drag: float, alone: GainVerdict) -> GainVerdict:
-        """The verdict on a river with a governor of some drag [N s/m], by the circle criterion alone."""
+        """The verdict on a river with a governor of a given drag [N s/m], by the circle criterion alone."""
         if alone.verdict != "certified":
             return alone
         certain = min(most_drag(loop, river.k_r, river.b_d) for loop in self._of_river(river)[0])

@@ -1,4 +1,4 @@
-"""Numbers of a mode that a slider moves while it runs."""
+"""Gains of a mode that sliders change during a run."""
 
 from dataclasses import fields, replace
 from typing import Any, NamedTuple, cast
@@ -8,14 +8,14 @@ from experiments.setups.defaults import resolved
 
 
 class Gain(NamedTuple):
-    """A number of a mode, and between what a slider has it.
+    """A gain of a mode, and the range of its slider.
 
     Attributes
     ----------
     name, symbol, unit : str
-        Of the mode's field; the paper's symbol; [unit].
+        Name of the mode's attribute, the paper's symbol, and the unit.
     least, most, step : float
-        Of the slider; what is typed may not be beyond them either.
+        Range and step of the slider, also for typed values.
     """
 
     name: str
@@ -36,22 +36,22 @@ GAINS = (
     Gain("bunny_width", "δ", "m", 0.005, 0.1, 0.001),
     Gain("leash", "k_l", "N/m", 10.0, 1000.0, 10.0),
 )
-"""Wider than what is stable, so that one sees where it ends."""
+"""Sliders of all gains; the ranges exceed the stable gains, so that the boundary can be seen."""
 
 
 def gains_of(config: RunConfig) -> dict[Gain, float]:
-    """The gains of a run's mode that can be moved, and what they are."""
+    """The adjustable gains of a run's mode, with their values."""
     mode = cast(Any, resolved(config).mode)
     names = {option.name for option in fields(mode)}
     return {gain: float(getattr(mode, gain.name)) for gain in GAINS if gain.name in names}
 
 
 def with_gain(config: RunConfig, name: str, value: float) -> RunConfig:
-    """A configuration with another number in its mode.
+    """A configuration with another value of a gain.
 
     Raises
     ------
     ParameterError
-        If it is out of its interval.
+        If the value is out of its interval.
     """
     return replace(config, mode=cast(Any, replace)(resolved(config).mode, **{name: value}))

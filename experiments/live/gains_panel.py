@@ -1,4 +1,4 @@
-"""Gains as sliders, and beside them whether they are certain to be stable."""
+"""Panel of the live page with the gains as sliders, and the verdict on their stability."""
 
 import html
 from collections.abc import Callable
@@ -16,7 +16,7 @@ _WORDS = {"certified": "stable", "refuted": "unstable", "unknown": "unknown"}
 
 
 class GainsPanel:
-    """Sliders of the mode that runs; the arguments are those of `ClockPanel`."""
+    """Sliders of the current mode; the arguments are those of `ClockPanel`."""
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
         self._gui, self._desk, self._acts = gui, desk, acts
@@ -25,7 +25,7 @@ class GainsPanel:
         self._sliders: dict[Gain, viser.GuiSliderHandle[float]] = {}
 
     def rebuild(self) -> None:
-        """Lay the sliders of the mode that runs now."""
+        """Make the sliders of the current mode."""
         for slider in self._sliders.values():
             slider.remove()
         self._sliders.clear()
@@ -41,7 +41,7 @@ class GainsPanel:
                 self._sliders[gain] = slider
 
     def write(self) -> None:
-        """Show the verdict, and gains that somebody has undone."""
+        """Show the verdict, and update sliders whose gains were undone or redone."""
         desk = self._desk
         self._verdict.content = verdict_html(desk.verdict, desk.checking)
         if desk.config is None:
@@ -59,9 +59,9 @@ class GainsPanel:
 
 
 def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
-    """The verdicts of a run, a block each: green, red or amber, with margin; the reason opens, of a red one it is open.
+    """HTML of the verdicts of a run, a short block each: green, red or amber, with margin.
 
-    Short, so that the sliders stand beside it.
+    The reason of a certified law is folded away; that of any other law is shown.
     """
     if not verdicts:
         return '<p style="margin:.5rem .75rem;color:#a8700a"><b>checking…</b></p>'

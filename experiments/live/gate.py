@@ -1,8 +1,8 @@
-"""The gate before the page: who has no token does not come in, and no other web page uses this one.
+"""Access gate of the live page: admits only clients with the token, and refuses requests from other web pages.
 
-viser asks nobody who they are, so it listens on this machine only, on a port of its own, and what comes from outside
-passes here. A connection is judged by its first request and carries no other one, so nothing comes in behind another's
-token: a page's files are one answer each, and its web socket, once let in, is piped both ways.
+viser has no authentication, so it listens on 127.0.0.1 only, and outside connections pass through this gate. A
+connection is judged by its first request and carries no further one, so that nothing passes on another request's
+token: each file of the page takes its own connection, and its web socket, once admitted, is piped both ways.
 """
 
 import asyncio
@@ -16,8 +16,8 @@ from sim.errors import SimError
 
 HERE = ("127.0.0.1", "localhost", "::1")
 _COOKIE = "hvf_token"
-_PATIENCE = 10.0  # [s] for a request
-_MOST = 65536  # bytes of a request's head, and of a piece that is piped
+_PATIENCE = 10.0  # [s] timeout for the head of a request
+_MOST = 65536  # most bytes of a request's head, and of a chunk that is piped
 _DENIED = (
     "<!doctype html><meta name=viewport content='width=device-width'><p style='font:16px system-ui;margin:2em'>"
     "This page needs its token: open the address that <code>hvf live</code> has printed, with <code>?token=…</code>."
@@ -30,9 +30,9 @@ class Request(NamedTuple):
     Attributes
     ----------
     path : str
-        With its query.
+        Path with its query.
     headers : dict
-        By their names in lower case.
+        Header values by name in lower case.
     """
 
     path: str
@@ -40,12 +40,12 @@ class Request(NamedTuple):
 
     @staticmethod
     def of(head: bytes) -> "Request":
-        """From its bytes.
+        """Parse the head of a request.
 
         Raises
         ------
         ValueError
-            If it is no head of a request.
+            If it is not the head of a GET or HEAD request.
         """
         first, *lines = head.decode("latin-1").rstrip("\r\n").split("\r\n")
         method, path, _ = first.split(" ")
@@ -56,20 +56,20 @@ class Request(NamedTuple):
 
 
 def answer(request: Request, token: str | None) -> bytes | None:
-    """What a request is answered by the gate itself; None for one that may pass.
+    """The gate's own response to a request; None if the request may pass.
 
     Parameters
     ----------
     request : Request
-        The first of a connection.
+        First request of a connection.
     token : str or None
-        That has to be known; None where only this machine comes here.
+        Required token; None where only this machine can connect.
     """
     host, origin = request.headers.get("host", ""), request.headers.get("origin")
     if origin is not None and urlsplit(origin).netloc != host:
         return _response(403, "Forbidden", "This page is not to be used by another one.")
     if token is None:
-        # A name that has been turned to this machine (DNS rebinding) is none of its own.
+        # A foreign host name that resolves to this machine (DNS rebinding) is refused.
         known = urlsplit(f"//{host}").hostname in HERE
         return None if known else _response(403, "Forbidden", "Open this page as http://127.0.0.1 or http://localhost.")
     parts = urlsplit(request.path)
@@ -89,14 +89,14 @@ def _response(code: int, said: str, body: str, more: str = "") -> bytes:
 
 
 class Gate:
-    """A server before a page on this machine.
+    """Server in front of a page on this machine.
 
     Parameters
     ----------
     host : str
-        To listen on.
+        Address to listen on.
     port : int
-        The next free one of twenty is taken if it is in use.
+        Port to listen on; if it is in use, the next free one of twenty is taken.
     behind : int
         Port of the page on 127.0.0.1.
     token : str or None
@@ -123,7 +123,7 @@ class Gate:
         self.port: int = self._server.sockets[0].getsockname()[1]
 
     def close(self) -> None:
-        """Let nobody in any more, and nobody stay."""
+        """Stop listening and close all connections."""
         self._loop.call_soon_threadsafe(self._server.close)
         self._end()
 

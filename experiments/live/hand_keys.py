@@ -1,4 +1,4 @@
-"""Keys that move the hand: a step a press, and the repeats of a key that is held."""
+"""Keys that move the hand: one step per press or key repeat."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +10,7 @@ from controllers.state import Array
 from experiments.live.clock_panel import Acts
 from experiments.live.desk import Desk
 
-STEP = 0.003  # [m] of a press; a keyboard repeats some thirty times a second, which makes 0.1 m/s
+STEP = 0.003  # [m] per press; at some thirty key repeats a second this is 0.1 m/s
 LETS_GO = "H"
 WAYS: dict[str, tuple[str, Array]] = {
     "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
@@ -20,11 +20,11 @@ WAYS: dict[str, tuple[str, Array]] = {
     "U": ("Hand up", np.array([0.0, 0.0, 1.0])),
     "O": ("Hand down", np.array([0.0, 0.0, -1.0])),
 }
-"""What a key does, and its direction in H, as the views have it; WASD, Q, E and the arrows move viser's camera."""
+"""Label and direction in H of each key, as seen in the views; WASD, Q, E and the arrows move viser's camera."""
 
 
 def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[], bool]) -> None:
-    """Let keys move the hand; it keeps the stylus until `LETS_GO`. Arguments as in `ClockPanel`.
+    """Let keys move the hand, which holds the stylus until `LETS_GO`; the first arguments are those of `ClockPanel`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the page asks of the engine's process, and what that tells it; what changes all the time is on boards."""
+"""Messages between the page and the engine's process; values that change continuously are on shared boards."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Any
 
 from experiments.config.run_config import RunConfig
 
-COURSE_POINTS = 241  # of the curve as it is bent
-SLICE_SIDE = 9  # points of the field's slice along either side
+COURSE_POINTS = 241  # points at which the bent curve is drawn
+SLICE_SIDE = 9  # points along each side of the field's slice
 
 SHOWN = {
     "t": 1, "cost": 2, "pace": 1, "fault": 1, "bends": 1, "performs": 1, "recording": 1, "curve": 1, "qpos": 256,
@@ -15,10 +15,10 @@ SHOWN = {
     "phase": 1, "residual": 1, "course": 3 * COURSE_POINTS,
     "slice": 6 * SLICE_SIDE**2,
 }  # fmt: skip
-"""Board of the engine: what it shows, and how many numbers each is; ``curve`` counts changes of ``course``."""
+"""Rows of the engine's board, with their sizes: the displayed values; ``curve`` counts changes of ``course``."""
 
 HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1, "slice": 1}
-"""Board of the page: how it holds the stylus and the clock; ``steps`` counts steps that were asked for."""
+"""Rows of the page's board, with their sizes: grip, target and clock; ``steps`` counts the requested single steps."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Build:
 
 @dataclass(frozen=True)
 class SetGains:
-    """Take over the gains of a configuration."""
+    """Apply the gains of a configuration."""
 
     config: RunConfig
 
@@ -42,19 +42,19 @@ class Reset:
 
 @dataclass(frozen=True)
 class GoBack:
-    """Go back to the state that was kept before a time [s]."""
+    """Go back to the last stored state at or before a time [s]."""
 
     t: float
 
 
 @dataclass(frozen=True)
 class Undo:
-    """Take the last bend back."""
+    """Undo the last bend."""
 
 
 @dataclass(frozen=True)
 class Redo:
-    """Make a bend again."""
+    """Redo the last undone bend."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Perform:
 
 @dataclass(frozen=True)
 class Rearm:
-    """Forget a latched fault."""
+    """Clear a latched fault."""
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,18 @@ class Quit:
 
 @dataclass(frozen=True)
 class Built:
-    """A run is there.
+    """A run has been put together.
 
     Attributes
     ----------
     config : RunConfig
-        With all that was left to defaults.
+        Configuration with all defaults filled in.
     drawn : dict
-        What a recording keeps of curves and tubes (`Session.static`).
+        Curves, tubes and scene, as recordings store them (`Session.static`).
     bends : bool
         Whether its curve can be bent.
     remarks : tuple of str
-        What is to be said.
+        Remarks for the person.
     """
 
     config: RunConfig
@@ -110,7 +110,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Progress:
-    """What goes on, and how far it is, from 0 to 1."""
+    """An operation in progress, and its completed share from 0 to 1."""
 
     text: str
     share: float
@@ -118,14 +118,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Refused:
-    """Something could not be done, and why."""
+    """The reason why an order was refused."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Saved:
-    """A take is in its folder; what happened in it, a sentence each."""
+    """A take was saved in its folder; its summary, one sentence per line."""
 
     folder: Path
     lines: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The live page: a scene in which the stylus is dragged, and panels beside it. See docs/how-to/live.md."""
+"""The live page: a 3D scene in which the stylus is dragged, with panels beside it. See docs/how-to/live.md."""
 
 import contextlib
 import html
@@ -38,10 +38,10 @@ from sim.viewer.shown import Shown
 from sim.viewer.views import DEFAULT_SIZE, VIEWS, is_phone, look, look_from
 from sim.world.world import World
 
-FASTEST = 1.0 / 60.0  # [s] between two pictures
-SHARE = 0.5  # of a core that pictures may take; a slower machine draws fewer
-POLL = 0.2  # [s] between two looks at what is written and plotted
-LINES = 4  # of what was said that are shown
+FASTEST = 1.0 / 60.0  # [s] least time between two pictures
+SHARE = 0.5  # share of a core that drawing may take; a slower machine draws fewer pictures
+POLL = 0.2  # [s] between two updates of texts and plots
+LINES = 4  # most recent messages that are shown
 
 
 class Page:
@@ -50,20 +50,20 @@ class Page:
     Parameters
     ----------
     config : RunConfig
-        What runs first.
+        Configuration of the first run.
     folder : Path
-        Where takes and clips are kept.
+        Folder of takes and clips.
     port : int
-        On 127.0.0.1; the next free one is taken if it is in use, and any for 0.
+        Port on 127.0.0.1; if it is in use, the next free one is taken, and for 0 any free one.
     shadows : bool
-        Whether they are drawn; a machine without a graphics card is much faster without.
+        Whether shadows are drawn; without a graphics card the page is much faster without them.
     """
 
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
         self.desk, self.driver = Desk(folder, self.say), Driver()
         self._said: list[str] = []
         self._closed, self._turn = threading.Event(), threading.RLock()
-        with contextlib.redirect_stdout(io.StringIO()):  # the command says where the page is
+        with contextlib.redirect_stdout(io.StringIO()):  # the command prints the address of the gate instead
             self.server = viser.ViserServer(host="127.0.0.1", port=port, label="haptic vector fields", verbose=False)
         self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         look(self.server.initial_camera, VIEWS["both"], DEFAULT_SIZE)
@@ -81,22 +81,22 @@ class Page:
 
     @property
     def port(self) -> int:
-        """That it is served on."""
+        """Port on which the page is served."""
         return self.server.get_port()
 
     def say(self, line: str) -> None:
-        """Show a line to everybody."""
+        """Show a line to all browsers."""
         self._said = [*self._said, line][-LINES:]
         if hasattr(self, "_lines"):
             lines = (f'<p style="margin:.15rem .75rem">{html.escape(one)}</p>' for one in self._said)
             self._lines.content = f'<div style="font-size:.8rem;padding-bottom:.6rem">{"".join(lines)}</div>'
 
     def acts(self, does: Callable[[Any], None]) -> Callable[[Any], None]:
-        """What a browser's event does: only if it drives, between two pictures; what is refused is said on the page."""
+        """Wrap an event handler: it runs for the driving browser only, between two pictures, and shows errors."""
 
         def done(event: Any) -> None:
             if event.client_id is None:
-                return  # the page has set it itself
+                return  # the value was set by the page itself, not by a browser
             if not self.driver.may(event.client_id):
                 if event.client is not None:
                     event.client.add_notification(
@@ -163,7 +163,7 @@ class Page:
         written, due = 0.0, 0.0
         while not self._closed.is_set():
             begin = time.perf_counter()
-            with self._turn:  # events come in threads of their own
+            with self._turn:  # viser calls event handlers in other threads
                 self.desk.poll()
                 if self.desk.builds != self._builds:
                     self._set_stage()
@@ -177,7 +177,7 @@ class Page:
             self._closed.wait(max(due - now, 1e-3))
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop serving and end all processes."""
         self._closed.set()
         if self._cap is not None:
             self._cap.close()
@@ -214,7 +214,7 @@ class Page:
             self.desk.hold(target, shift or self._clock.pressed)
 
     def _push(self) -> None:
-        """Let a SpaceMouse that is plugged in here move the hand, while no mouse has it."""
+        """Let a connected SpaceMouse move the hand while no mouse drags it."""
         if self._cap is None or self._ball is None or self._ball.dragged:
             return
         held = self._cap.holds
@@ -258,7 +258,7 @@ class Page:
                 ball.rest(desk.target if desk.holds else now["p"])
             stage.shows_ghost(not self._takes.compares)
             self._takes.draw()
-        self.server.flush()  # viser would wait 1/60 s from the end of the last sending, and leave pictures out
+        self.server.flush()  # otherwise viser waits 1/60 s after its last transmission and drops pictures
 
     def _write(self) -> None:
         desk = self.desk
@@ -276,5 +276,5 @@ class Page:
 
 
 def _looks(client: viser.ClientHandle) -> None:
-    """Let a browser that comes look at both sides; a phone at the workspace, above the panel."""
+    """Set the initial view of a new browser: workspace and stage; on a phone the workspace, above the panel."""
     look_from(client, VIEWS["workspace" if is_phone(client) else "both"])

@@ -1,4 +1,4 @@
-"""Force, deviation and residual over the last seconds."""
+"""Plots of force, deviation and residual force over the last seconds."""
 
 from collections import deque
 
@@ -10,7 +10,7 @@ from controllers.state import Array
 from experiments.live.desk import numbers
 from sim.viewer.palette import FIELD, TUBE, USER
 
-SECONDS = 12.0  # that are plotted
+SECONDS = 12.0  # [s] that are plotted
 
 
 class Plots:
@@ -19,7 +19,7 @@ class Plots:
     Parameters
     ----------
     gui : viser.GuiApi
-        Where they are laid.
+        GUI to which the plots are added.
     """
 
     def __init__(self, gui: viser.GuiApi):
@@ -38,7 +38,7 @@ class Plots:
         )  # fmt: skip
 
     def write(self, history: deque[dict[str, Array]]) -> None:
-        """Draw what is remembered."""
+        """Draw the last seconds of the history."""
         t, force, user, distance, residual = numbers(history, ("force", "user", "distance", "residual"), SECONDS)
         if len(t) < 2:
             return

@@ -1,4 +1,4 @@
-"""What runs: mode, map, figure and clips."""
+"""Panel of the live page for the choice of mode, map, figure and clips."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from experiments.live.desk import Desk
 from experiments.live.messages import Built
 from models.mocap.library import embedded_names
 
-FOR_EVER = 86400.0  # [s] of a session: a day
+FOR_EVER = 86400.0  # [s] longest session: a day
 SLOTS = {
     "cylindrical": ("inner low", "outer low", "inner high", "outer high"),
     "composite": ("lower body", "upper body inside", "upper body outside"),
@@ -23,16 +23,16 @@ SLOTS = {
     "led": ("walks",),
     "file": (),
 }
-"""What the clips of a map are for, by its kind."""
+"""Roles of a map's clips, by kind of map."""
 
 
 class RunPanel:
-    """Mode, map, figure and clips, and the button that puts them together; further arguments as in `ClockPanel`.
+    """Choice of mode, map, figure and clips, and the button that runs them; other arguments as in `ClockPanel`.
 
     Parameters
     ----------
     config : RunConfig
-        What is chosen at first.
+        The initial choice.
     """
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, config: RunConfig):
@@ -59,7 +59,7 @@ class RunPanel:
         self._build.on_click(acts(lambda event: desk.build(self.config())))
 
     def config(self) -> RunConfig:
-        """The run that is chosen, with its mode's default gains.
+        """The chosen run, with the default gains of its mode.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class RunPanel:
         return run_config(mode=mode, map=chosen, **words)
 
     def show(self, built: Built) -> None:
-        """Choose what runs now."""
+        """Set the choice to the current run."""
         config = built.config
         self._chosen = tuple(_name(clip) for clip in config.map.clips)
         self._mode.value, self._figure.value = config.mode.kind, config.figure.kind
@@ -86,7 +86,7 @@ class RunPanel:
         self._lay_slots()
 
     def write(self) -> None:
-        """Offer clips that have come."""
+        """Offer newly prepared clips."""
         if self._clips() != self._known:
             new = [name for name in self._clips() if name not in self._known]
             self._known = self._clips()
@@ -132,12 +132,12 @@ def _default_clips(kind: str) -> tuple[str, ...]:
 
 
 def _name(clip: str) -> str:
-    """How a clip is called in a list: a file by its stem."""
+    """Name of a clip in a list: of a file its stem."""
     return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
 
 
 def configuration_text(config: RunConfig | None) -> str:
-    """A configuration as the file that ``hvf run --config`` takes.
+    """A configuration as JSON, as ``hvf run --config`` reads it.
 
     Raises
     ------

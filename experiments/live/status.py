@@ -1,4 +1,4 @@
-"""What the page says at its top: clock, pace, who drives, what goes on; and what a newcomer does first."""
+"""Status lines at the top of the live page: clock, pace, driver, progress, faults; and the first steps."""
 
 import html
 
@@ -18,7 +18,7 @@ FIRST_STEPS = """
 
 
 def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
-    """The lines at the top; what is wrong stands there, too."""
+    """HTML of the status lines, including a fault of the device."""
     middle, most = 1e3 * now["cost"]
     doing = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
     said = [f"<b>{now['t'][0]:.2f} s</b> · {doing}"]

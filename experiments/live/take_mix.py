@@ -1,7 +1,7 @@
-"""Takes beside each other: what of them is compared, and one animation mixed of several.
+"""Comparison of takes, and mixing of one animation from several takes.
 
-Two performances of a curve are not in step: each has its own pace. So a moment of one is held against the moment of the
-other at which the stylus was at the same phase of the curve.
+Two performances of a curve are not synchronous, as each has its own pace. A moment of one take therefore corresponds to
+the moment of the other at which the stylus was at the same phase of the curve.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from models.mocap.clip import Clip
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
-FPS = 50.0  # of what is compared and exported, as that of a run's BVH
+FPS = 50.0  # [Hz] frame rate at which takes are compared and exported, that of a run's BVH
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +29,15 @@ class TakeData:
     Attributes
     ----------
     name : str
-        Of its folder.
+        Name of its folder.
     poses : Array
-        The animation as the hand made it, shape (n, 75).
+        The animation as the hand made it, qpos, shape (n, 75).
     phase : Array
-        Of the curve, going on from lap to lap [s], shape (n,).
+        Phase along the curve, unwrapped over laps [s], shape (n,).
     lap : float
         Duration of a lap [s]; infinite for an open curve.
     path : Array
-        Of the stylus, in H [m], shape (n, 3).
+        Positions of the stylus in H [m], shape (n, 3).
     force, distance : Array
         Norm of the force on the hand [N], and distance from the curve [m], shape (n,).
     """
@@ -52,12 +52,12 @@ class TakeData:
 
     @property
     def times(self) -> Array:
-        """Of the frames [s], shape (n,)."""
+        """Times of the frames [s], shape (n,)."""
         return np.arange(len(self.poses)) / FPS
 
     @staticmethod
     def of(folder: Path) -> "TakeData":
-        """From the folder of a take.
+        """Read a take from its folder.
 
         Raises
         ------
@@ -78,12 +78,12 @@ class TakeData:
         return TakeData(folder.name, poses, phase, lap, ticks["p"], force, ticks["distance"])
 
     def frames_at(self, phases: Array) -> Array:
-        """Frames, with their fractions, at which it is at phases [s]; of a closed curve in the lap that fits best.
+        """Fractional frame numbers at which the take is at given phases [s]; on a closed curve in the best lap.
 
         Raises
         ------
         ParameterError
-            If it never comes there.
+            If the take does not pass these phases.
         """
         onward = np.maximum.accumulate(self.phase)
         wanted = phases
@@ -100,7 +100,7 @@ class TakeData:
 
 
 class Region(NamedTuple):
-    """From when until when [s] of a take another one is taken in its place."""
+    """Span of time [s] of a take in which another take replaces it."""
 
     start: float
     end: float
@@ -108,17 +108,17 @@ class Region(NamedTuple):
 
 
 def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array:
-    r"""Poses of a take with regions of other ones, shape (n, 75).
+    r"""Poses of a take in which regions are replaced by other takes, shape (n, 75).
 
     .. math:: q = q_a \exp\bigl(s \log(q_a^{-1} q_b)\bigr), \qquad s = \sigma(x)
 
-    with σ = x³ (10 − 15 x + 6 x²) over `ease` seconds within either end of a region, so velocity and acceleration
-    are continuous. Later regions are laid over earlier ones.
+    with σ = x³ (10 − 15 x + 6 x²) over `ease` [s] within each end of a region, so that velocity and acceleration are
+    continuous. Later regions are laid over earlier ones.
 
     Raises
     ------
     ParameterError
-        If a region is not in the take, too short to ease in and out, or of phases that the other take has not.
+        If a region is not in the take, too short to ease in and out, or of phases that the other take does not pass.
     """
     poses, times = take.poses.copy(), take.times
     for start, end, other in regions:
@@ -137,19 +137,19 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
 
 
 def mixed_clip(take: TakeData, regions: Sequence[Region], name: str) -> Clip:
-    """What `mixed` gives, as a clip that can be written."""
+    """The poses of `mixed` as a clip."""
     return Clip(mixed(take, regions), FPS, name)
 
 
 def between(start: Array, end: Array, share: Array) -> Array:
-    """Poses (n, 75) at a share (n,) of the way from some to others: straight at the root, by the shortest turns."""
+    """Interpolate poses (n, 75) with shares (n,): linearly for the root position, by slerp for the rotations."""
     shape = (len(start), -1, 4)
     turned = quaternions.slerped(start[:, 3:].reshape(shape), end[:, 3:].reshape(shape), share[:, None, None])
     return np.hstack([start[:, :3] + share[:, None] * (end - start)[:, :3], turned.reshape(len(start), -1)])
 
 
 def _at(poses: Array, places: Array) -> Array:
-    """Poses between frames, at places (k,) with fractions."""
+    """Poses at fractional frame numbers, shape (k,) → (k, 75)."""
     low = np.clip(np.floor(places).astype(int), 0, len(poses) - 1)
     high = np.minimum(low + 1, len(poses) - 1)
     return between(poses[low], poses[high], places - low)

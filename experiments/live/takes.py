@@ -1,4 +1,4 @@
-"""Takes: stretches of a live session, each a folder as ``hvf run`` writes one, that ``hvf report`` draws."""
+"""Takes: recorded spans of a live session, each in a folder like those of ``hvf run``, for ``hvf report``."""
 
 import time
 from dataclasses import asdict
@@ -23,22 +23,22 @@ from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 
 LIVE = "dragged by hand on the live page; no configuration says what the hand did"
-"""What a recording's ``live`` says: that it cannot be made again from its configuration."""
-LEAST = 0.5  # [s] of a take: less is a slip of the mouse
+"""Text ``live`` of a take's recording, which marks that it cannot be reproduced from its configuration."""
+LEAST = 0.5  # [s] shortest take that is measured; a shorter one is a slip of the mouse
 
 
 class Take:
-    """A take that is recorded.
+    """A take that is being recorded.
 
-    Its time begins at 0. Gains that move and bends are in its channels as forces, not as events: the configuration
-    beside it is that of its end.
+    Its time begins at 0. Changes of gains and bends are recorded through their forces, not as events; the stored
+    configuration is that at the end of the take.
 
     Parameters
     ----------
     folder : Path
-        To write into; it may not hold a run.
+        Folder to write into; it may not hold a run.
     engine : Engine
-        That runs.
+        The running engine.
 
     Raises
     ------
@@ -59,11 +59,11 @@ class Take:
         self._handled: list[tuple[float, float]] = []
 
     def seconds(self, engine: Engine) -> float:
-        """How long it is [s]."""
+        """Duration so far [s]."""
         return engine.time - self._began
 
     def add(self, logs: tuple[TickLog, FrameLog], engine: Engine) -> None:
-        """Record the block that was run last."""
+        """Record the last block."""
         ticks, frames = logs
         ticks.hand[:, 0] -= self._began
         frames.t[:] -= self._began
@@ -76,12 +76,12 @@ class Take:
             self._handled.append((begin, end))
 
     def end(self, engine: Engine) -> tuple[str, ...]:
-        """Close the recording, measure it, and write what ``hvf run`` would write beside it; its lines.
+        """Measure and close the recording, and write the files of ``hvf run`` beside it; returns the summary's lines.
 
         Raises
         ------
         SimError
-            If it is too short to be measured; the recording is then kept as one that was cut short.
+            If it is too short to be measured; the recording is then kept as an interrupted one.
         """
         seconds = self.seconds(engine)
         self._recorder.flush()

@@ -1,4 +1,4 @@
-"""Takes on the page: recorded, named, compared, mixed, downloaded."""
+"""Panel of the live page for takes: record, name, compare, mix and download."""
 
 import tempfile
 import time
@@ -23,12 +23,12 @@ NONE = "none"
 
 
 class TakesPanel:
-    """The list of takes and what is done with them; further arguments as in `ClockPanel`.
+    """The list of takes and its actions; other arguments as in `ClockPanel`.
 
     Parameters
     ----------
     scene : viser.SceneApi
-        In which takes are shown.
+        Scene in which takes are shown.
     """
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, scene: viser.SceneApi):
@@ -68,17 +68,17 @@ class TakesPanel:
         self._export.on_click(acts(self._on_export))
 
     def stage_set(self, model: mujoco.MjModel) -> None:
-        """There is another scene, and nothing of takes is in it."""
+        """Reset the comparison after the scene was built anew."""
         self._model, self._ghosts = model, None
         self._compare.value = False
 
     @property
     def compares(self) -> bool:
-        """Whether takes stand in the place of the default animation."""
+        """Whether takes are shown instead of the default animation."""
         return self._ghosts is not None
 
     def draw(self) -> None:
-        """Draw where the takes that are compared are now: they are played again and again."""
+        """Draw the current poses of the compared takes, which are played in a loop."""
         ghosts = self._ghosts
         if ghosts is None:
             return
@@ -87,7 +87,7 @@ class TakesPanel:
         ghosts.show([poses[min(frame, len(poses) - 1)] for poses in self._poses])
 
     def write(self) -> None:
-        """Show how it is."""
+        """Update the button and the lists of takes."""
         self._record.label = "Stop" if self._desk.records else "Record"
         names = self._desk.takes() or (NONE,)
         for known in (self._list, self._other):
@@ -140,7 +140,7 @@ class TakesPanel:
             first, second = self._pair()
             start, end = self._span.value
             regions = [*self._regions, Region(float(start), float(end), second)]
-            mixed(first, regions)  # refused before it is kept
+            mixed(first, regions)  # raises if the region is invalid, before it is stored
             self._regions = regions
         self._on_compare()
         said = [f"{r.start:.1f} to {r.end:.1f} s from {r.take.name}" for r in self._regions]

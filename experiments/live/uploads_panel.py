@@ -1,4 +1,4 @@
-"""One's own motion: a file is uploaded, prepared, and offered among the clips."""
+"""Panel of the live page for uploading a motion file, which is prepared and then offered among the clips."""
 
 import time
 from typing import Any
@@ -27,7 +27,7 @@ class UploadsPanel:
         self._upload.on_upload(acts(self._came))
 
     def write(self) -> None:
-        """Show what is being prepared, and which clips have come."""
+        """Show the file being prepared and the clips that are ready."""
         preparing = self._desk.preparing
         self._bar.visible = self._going.visible = preparing is not None
         if preparing is not None:

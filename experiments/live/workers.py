@@ -1,4 +1,4 @@
-"""Processes that do for the page what would make it wait: verdicts on gains, and the preparation of a capture."""
+"""Worker processes for tasks that would block the page: verdicts on gains, and preparation of motion files."""
 
 import os
 import queue
@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 from models.errors import ModelError
 
-_LISTENS = 0.5  # [s] between two looks whether the page is still there
+_LISTENS = 0.5  # [s] between two checks whether the page's process still exists
 
 
 def start_undisturbed(process: Any) -> None:
-    """Start a process that Ctrl-C does not end, not even while it begins: the page tells it when to end."""
+    """Start a process with SIGINT blocked, so that Ctrl-C does not end it: the page tells it when to end."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
     try:
         process.start()
@@ -24,12 +24,12 @@ def start_undisturbed(process: Any) -> None:
 
 
 class Worker:
-    """A process that is asked and tells; of what it is asked, only the newest counts.
+    """A process that answers requests; only the newest pending request counts.
 
     Parameters
     ----------
     does : callable
-        Called in the process with two queues, of what is asked and of what is told.
+        Called in the process with two queues, of requests and of answers.
     """
 
     def __init__(self, does: Callable[[Any, Any], None]):
@@ -40,11 +40,11 @@ class Worker:
         start_undisturbed(self._process)
 
     def ask(self, what: object) -> None:
-        """Have it done."""
+        """Send a request."""
         self._asked.put(what)
 
     def told(self) -> Any:
-        """What it has told, or None."""
+        """The next answer, or None."""
         try:
             return self._told.get_nowait()
         except queue.Empty:
@@ -52,11 +52,11 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether the process is there."""
+        """Whether the process is running."""
         return self._process.is_alive()
 
     def close(self) -> None:
-        """End it, whatever it is about."""
+        """End the process, whatever it is doing."""
         self._process.terminate()
         self._process.join()
         for line in (self._asked, self._told):
@@ -65,12 +65,12 @@ class Worker:
 
 
 def _main(does: Callable[[Any, Any], None], asked: Any, told: Any) -> None:
-    os.nice(2)  # the servo goes before
+    os.nice(2)  # the servo has priority
     does(asked, told)
 
 
 def newest(asked: Any) -> Any:
-    """The last of what is asked; None, for ever, when the page has gone."""
+    """Wait for a request and return the newest one; None if the page's process has ended."""
     parent = os.getppid()
     while True:
         try:
@@ -87,8 +87,8 @@ def newest(asked: Any) -> Any:
 
 
 def verdicts(asked: Any, told: Any) -> None:
-    """Verdicts on the gains of configurations: tells (configuration, verdicts, whether there is more to come)."""
-    from experiments.live.gain_verdict import GainVerdicts  # CasADi is started here, not in the page
+    """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
+    from experiments.live.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
 
     found = GainVerdicts()
     while (config := newest(asked)) is not None:
@@ -99,16 +99,16 @@ def verdicts(asked: Any, told: Any) -> None:
 
 
 class Uploaded(NamedTuple):
-    """A motion file that was prepared, or why not.
+    """Result of the preparation of a motion file.
 
     Attributes
     ----------
     name : str
-        Of the file.
+        Name of the file.
     path : Path or None
-        Of the clip; None if there is none.
+        File of the clip; None if the preparation failed.
     text : str
-        What is said of it, in one line.
+        Result in one line.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Uploaded(NamedTuple):
 
 
 def preparation(asked: Any, told: Any) -> None:
-    """Prepared clips: asked for (source, target), tells an `Uploaded`."""
+    """Worker for preparing clips: answers an `Uploaded` to a pair (source, target) of files."""
     from experiments.preparation.command import prepare_file, summary
     from models.mocap.library import load
     from models.mocap.readers.own_bvh import write_bvh
@@ -127,7 +127,7 @@ def preparation(asked: Any, told: Any) -> None:
         begin = time.perf_counter()
         try:
             loaded = load(source)
-            if loaded.report is None:  # the figure's own skeleton, as this page writes it: taken as it is
+            if loaded.report is None:  # already on the figure's own skeleton, as this page writes it
                 write_bvh(loaded.clip, target)
                 said = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
             else:

@@ -1,4 +1,4 @@
-"""Figure 8: rivers that cross, and a hand that goes over from one into another."""
+"""Figure 8: crossing rivers, and a hand that changes from one to another."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ POINTS = 3000
 
 
 def crossing_rivers(runs: Path) -> Figure:
-    """Figure 8: three rivers, the way of a hand in the colour of the river that has it, and when it changes over."""
+    """Figure 8: three rivers, the path of a hand in the colour of the river that has it, and the times of changes."""
     with Recording(recording_in(runs / RIVERS)) as recording:
         drawn, changes = courses(recording.arrays | recording.texts), river_changes(recording)
         t, p, user, river = ticks(recording, 0.0, np.inf, "p", "user", "river")

@@ -27,12 +27,12 @@ from experiments.results.folder import config_of
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
-SECONDS = 0.25  # of motion that an arrow of Figure 1 shows
-LONGEST = 22.0  # arrow of Figure 4 [mm]
+SECONDS = 0.25  # duration of motion that the length of an arrow of Figure 1 stands for [s]
+LONGEST = 22.0  # longest arrow of Figure 4 [mm]
 PER_NEWTON = 6.0  # drawn length of a force [mm/N]
-POSES = 12  # around the curve
+POSES = 12  # poses around the curve
 STATURE = 24.0  # drawn length of a metre of the figure [mm]
-RING = 1.72  # of the poses, in radii of the curve
+RING = 1.72  # radius of the ring of poses, in radii of the curve
 
 
 def trajectory_and_vectors(runs: Path) -> Figure:
@@ -57,7 +57,7 @@ def trajectory_and_vectors(runs: Path) -> Figure:
 
 
 def field_and_map(runs: Path) -> Figure:
-    """Figure 2: the field around a curve from above, and what the map makes of the places on it."""
+    """Figure 2: the field around a curve from above, and the poses to which the map sends points of the curve."""
     with Recording(recording_in(runs / CYLINDER)) as recording:
         curve, radius = curve_of(recording), MILLIMETRES * float(recording.array("tube_radius"))
         start, end = pushed_lap(recording)
@@ -99,7 +99,7 @@ def field_and_map(runs: Path) -> Figure:
 
 
 def v_plus_u(runs: Path) -> Figure:
-    """Figure 4: a river V, a performance that left it, U of that, and the integral curve of V + U."""
+    """Figure 4: a river V, a performance that left it, the field U of the performance, and the integral of V + U."""
     with Recording(recording_in(runs / CYLINDER)) as recording:
         curve, mode = curve_of(recording), config_of(recording).mode
         start, end = pushed_lap(recording)

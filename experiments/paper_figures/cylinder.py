@@ -32,7 +32,7 @@ LEGS = ("pelvis", "thigh", "shank", "foot")
 
 
 def four_motion_cylinder(runs: Path) -> Figure:
-    """Figure 3: four motions on the edges of a cylinder, the hand in FOLLOW between them, frames of what it played."""
+    """Figure 3: four motions on the edges of a cylinder, the hand in FOLLOW between them, frames of the animation."""
     with Recording(recording_in(runs / CYLINDER)) as recording:
         config, curve = config_of(recording), curve_of(recording)
         names = [clip.name for clip in clips_of(recording)]
@@ -66,7 +66,7 @@ def four_motion_cylinder(runs: Path) -> Figure:
 
 
 def red_and_blue_inputs(runs: Path) -> Figure:
-    """Figure 5: the red input moves the lower body, two blue inputs the upper; what the hand mixes of them."""
+    """Figure 5: the red input moves the lower body, two blue inputs the upper; frames of the mixed animation."""
     with Recording(recording_in(runs / COMPOSITE)) as recording:
         clips, curve = clips_of(recording), curve_of(recording)
         start, end = pushed_lap(recording)

@@ -1,4 +1,4 @@
-"""All figures of the paper: the runs that they need, the drawings as PDF and PNG, and a page of them."""
+"""Draws all figures of the paper: makes the runs that they need, the drawings as PDF and PNG, and a page."""
 
 import html
 from collections.abc import Callable
@@ -32,13 +32,13 @@ class Drawing(NamedTuple):
     ----------
     number : int
     title : str
-        What the paper's figure is of, in a few words.
+        Subject of the paper's figure, in a few words.
     shows : str
-        What is drawn here, and of what run.
+        What is drawn here, and from which run.
     runs : tuple of str
-        That it needs.
+        Runs that it needs.
     draw : callable
-        From the folder of runs to the figure.
+        Makes the figure from the folder of runs.
     """
 
     number: int
@@ -77,7 +77,7 @@ DRAWINGS = (
 
 
 def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
-    """Draw all figures into a folder, from the runs in its folder ``runs``; those that are missing are made first.
+    """Draw all figures into a folder, from the runs in its folder ``runs``; missing runs are made first.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
     started : float
         `time.perf_counter` when the program began.
     overwrite : bool
-        Draw again what is there.
+        Replace existing figures.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
     Raises
     ------
     SimError
-        If the folder holds figures already, or a recording is not what is drawn.
+        If the folder holds figures already, or a recording is not of the expected run.
     """
     if (out / PAGE).exists() and not overwrite:
         raise SimError(f"{out}: holds figures; choose another --out, or --overwrite them (their runs are kept)")
@@ -122,7 +122,7 @@ def draw_one(drawing: Drawing, runs: Path, out: Path) -> Path:
     stem = out / f"figure-{drawing.number}"
     with mpl.rc_context(STYLE):
         figure = drawing.draw(runs)
-        # Without the time of day: the same recordings give the same file.
+        # Without a creation date, so that the same recordings give the same file.
         figure.savefig(stem.with_suffix(".pdf"), metadata={"CreationDate": None})
         figure.savefig(stem.with_suffix(".png"), dpi=DPI)
     return stem.with_suffix(".png")
@@ -137,7 +137,7 @@ def _recorded(folder: Path) -> bool:
 
 
 def _page() -> str:
-    """The figures one below the other, each with what it shows."""
+    """HTML of the figures, one below the other, each with its description."""
     parts = [
         f'<figure id="figure-{d.number}"><a href="figure-{d.number}.pdf"><img alt="{html.escape(d.title)}" '
         f'src="figure-{d.number}.png"></a><figcaption><b>Figure {d.number}. {html.escape(d.title)}.</b> '

@@ -1,4 +1,4 @@
-"""The figure as outlines on paper: the parallel projection of its geoms, those behind drawn first."""
+"""Outlines of the figure in a drawing: parallel projection of its geoms, drawn from back to front."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,23 +13,23 @@ from models.humanoid.skeleton import figure_model
 
 Paint = Callable[[str, Array], str | tuple[float, ...]]
 
-_CORNERS = 28  # of an outline
+_CORNERS = 28  # corners of an outline
 _FIRST_HIDDEN_GROUP = 3
 
 
 class Outline(NamedTuple):
-    """What is seen of a geom.
+    """Projected outline of a geom.
 
     Attributes
     ----------
     body : str
-        That it belongs to.
+        Body of the geom.
     rgba : array (4,)
-        Its colour in the model.
+        Colour in the model.
     depth : float
-        Of its centre, away from who looks [m].
+        Depth of its centre, away from the viewer [m].
     corners : array (n, 2)
-        To the right, and up [m].
+        Corners: to the right, and up [m].
     """
 
     body: str
@@ -46,10 +46,10 @@ class Silhouettes:
         self._data = mujoco.MjData(self._model)
 
     def outlines(self, pose: Array, azimuth: float) -> list[Outline]:
-        r"""What is seen of a pose when one looks along an azimuth [rad], the root's place at 0.
+        r"""Outlines of a pose viewed along an azimuth [rad], relative to the position of the root.
 
-        An ellipsoid with semi-axes s and rotation R is seen as the ellipse of A Aᵀ, A = P R diag(s) with P the 2 × 3
-        projection; a capsule as the hull of two discs.
+        An ellipsoid with semi-axes s and rotation R projects to the ellipse of A Aᵀ, A = P R diag(s) with P the 2 × 3
+        projection; a capsule to the hull of two discs.
         """
         model, data = self._model, self._data
         data.qpos[:] = pose
@@ -76,7 +76,7 @@ class Silhouettes:
         self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
         paint: Paint = lambda body, rgba: tuple(rgba), zorder: float = 3.0,
     ) -> None:  # fmt: skip
-        """Draw a pose with its root above a point of the axes, so many of their units for a metre."""
+        """Draw a pose with its root above a point of the axes, with `scale` units of the axes per metre."""
         for outline in self.outlines(pose, azimuth):
             color = paint(outline.body, outline.rgba)
             corners = np.asarray(at) + scale * outline.corners
@@ -84,7 +84,7 @@ class Silhouettes:
 
 
 def facing(pose: Array) -> float:
-    """Azimuth in which a pose's root faces [rad]."""
+    """Heading of a pose's root [rad]."""
     w, x, y, z = (float(value) for value in pose[3:7])
     return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 

@@ -1,4 +1,4 @@
-"""The runs of which the paper's figures are drawn, and what the drawings read of a recording."""
+"""The runs from which the paper's figures are drawn, and access to their recordings."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ MILLIMETRES = 1e3
 
 
 def configs() -> dict[str, RunConfig]:
-    """The runs, by the name of their folder: pure data, each a run that `hvf run` makes."""
+    """Configurations of the runs by name of their folder; each is a run that `hvf run` could make."""
     return {
         CYLINDER: demo_config(),
         COMPOSITE: RunConfig(map=Composite(), user=User(does="push"), seconds=9.0),
@@ -27,7 +27,7 @@ def configs() -> dict[str, RunConfig]:
 
 
 def curve_of(recording: Recording) -> Trajectory:
-    """The curve of a recording, as it leads."""
+    """The curve of a recording that leads the hand."""
     start, end = (float(time) for time in recording.array("curve_span"))
     points = recording.array("curve")
     return Trajectory(
@@ -43,7 +43,7 @@ def ticks(recording: Recording, start: float, end: float, *names: str) -> tuple[
 
 
 def pushed_lap(recording: Recording) -> tuple[float, float]:
-    """From and until when the hand pushes, and a quarter of a second about it [s]."""
+    """Start and end of the time in which the hand pushes, extended by a quarter of a second at each end [s]."""
     t, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
     pushing = t[np.linalg.norm(user, axis=1) > 0.2]
     return max(0.0, float(pushing[0]) - 0.25), min(float(t[-1]), float(pushing[-1]) + 0.25)

@@ -1,4 +1,4 @@
-"""The workspace in three dimensions on paper: axes in millimetres that are equally long, arrows, tubes."""
+"""The workspace in 3D plots: axes of H in millimetres with equal scale, arrows, paths."""
 
 from typing import Any
 
@@ -9,11 +9,11 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from controllers.state import Array
 
-_AZIMUTH = -60.0  # of who looks [degrees]
+_AZIMUTH = -60.0  # of the viewer [degrees]
 
 
 def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0, zoom: float = 1.0) -> Axes3D:
-    """Axes of the hand frame [mm] around points (n, 3) in millimetres, all to one scale."""
+    """3D axes of the hand frame H [mm] around points (n, 3) [mm], with equal scale."""
     ax: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.06 * float(np.max(high - low))
@@ -49,6 +49,6 @@ def path(ax: Axes3D, points: Array, color: str, label: str = "", width: float = 
 
 
 def colored_path(ax: Axes3D, points: Array, colors: list[str], width: float = 2.0) -> None:
-    """A line through points (n, 3), every piece in the colour of its first point."""
+    """A line through points (n, 3), each segment in the colour of its first point."""
     pieces = np.stack((points[:-1], points[1:]), axis=1)
     ax.add_collection3d(Line3DCollection(list(pieces), colors=colors[:-1], linewidths=width))

@@ -1,4 +1,4 @@
-"""Figures 6 and 7: a curve before it is stretched, after it, and performed; and the result, rendered."""
+"""Figures 6 and 7: a curve before and after it is stretched, and performed; and the result, rendered."""
 
 from pathlib import Path
 from typing import cast
@@ -51,7 +51,7 @@ def stretching(runs: Path) -> Figure:
 
 
 def rendered_result(runs: Path) -> Figure:
-    """Figure 7: what the stretched curve makes of the animation, rendered: the figure beside the default animation."""
+    """Figure 7: the animation of the stretched curve, rendered: the figure beside the default animation."""
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
         began = performance_start(recording)
@@ -68,12 +68,12 @@ def rendered_result(runs: Path) -> Figure:
 
 
 def performance_start(recording: Recording) -> float:
-    """When the bent curve began to be performed [s].
+    """Time at which the performance of the bent curve begins [s].
 
     Raises
     ------
     RecordingError
-        If the run was cut short or performs nothing.
+        If the run was interrupted or has no performance.
     """
     told = (recording.summary or {}).get("performance")
     if not isinstance(told, dict):

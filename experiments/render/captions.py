@@ -1,4 +1,4 @@
-"""Words on the frames of a film: what is seen, when, and how hard field and hand push."""
+"""Captions on the frames of a film: content, time, and forces of field and hand."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,8 +12,8 @@ from PIL import ImageDraw, ImageFont
 from experiments.render.graphics import Image
 
 INK = "#222a38"
-_PLATE = 0.7  # of white under words
-_SHARE = 0.028  # of the height: the size of letters
+_PLATE = 0.7  # opacity of the white plate under words
+_SHARE = 0.028  # size of letters as a share of the picture's height
 
 
 class Entry(NamedTuple):
@@ -24,12 +24,12 @@ class Entry(NamedTuple):
 
 
 class Captions:
-    """Letters of a size that fits a picture.
+    """Writes captions in a size that fits a picture.
 
     Parameters
     ----------
     height : int
-        Of the picture [pixels].
+        Height of the picture [pixels].
     """
 
     def __init__(self, height: int):

@@ -1,4 +1,4 @@
-"""A film of a run, from its recording: the workspace beside the stage, a frame after the other."""
+"""Renders a film of a run from its recording: the workspace beside the stage, frame by frame."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
@@ -25,31 +25,31 @@ from sim.viewer.palette import FIELD, TUBE, USER
 
 Show = Literal["both", "workspace", "stage"]
 
-WORKSPACE_SHARE = 0.42  # of the width, where both are shown
-LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # on which letters can be read [pixels]
-_SHIRT = "#3d6ba1"  # of the figure in its model
+WORKSPACE_SHARE = 0.42  # of the width, if both are shown
+LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # smallest frame on which letters can be read [pixels]
+_SHIRT = "#3d6ba1"  # colour of the figure's shirt in its model
 _NAMES = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
 _GHOSTS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
 
 
 @dataclass(frozen=True)
 class Film:
-    """What of a run is filmed, and how.
+    """Settings of a film.
 
     Attributes
     ----------
     show : Show
         Workspace, stage, or both side by side.
     camera : Camera
-        From where the stage is seen, with respect to where the figure faces.
+        Direction from which the stage is seen, relative to the figure's heading.
     ghost : Ghost
-        What stands beside the figure.
+        Animation that is shown beside the figure.
     start : float
-        Of what is shown [s].
+        Start of the filmed part of the run [s].
     seconds : float or None
-        Of what is shown [s]; all that there is by default.
+        Duration of the filmed part [s]; by default up to the end.
     width, height : int
-        Of a frame [pixels], even.
+        Size of a frame [pixels], even.
     fps : float
         Frames per second [1/s].
     """
@@ -76,16 +76,16 @@ class Film:
 
 
 class Frames:
-    """Frames of a film, drawn when they are asked for.
+    """Frames of a film, drawn on demand.
 
     Parameters
     ----------
     recording : Recording
     folder : Path
-        Where it lies.
+        Folder of the recording.
     film : Film
     backend : str
-        As `offscreen_backend` gives it.
+        Result of `offscreen_backend`.
     """
 
     def __init__(self, recording: Recording, folder: Path, film: Film, backend: str):
@@ -96,7 +96,7 @@ class Frames:
             recording, folder, self._world, film.fps, film.start, film.seconds, film.ghost
         )
         left = round(WORKSPACE_SHARE * film.width / 2) * 2
-        # A run without a figure has a workspace only.
+        # A run without a figure has no stage.
         show = "workspace" if self._world.kind == "none" else film.show
         widths = {"both": (left, film.width - left), "workspace": (film.width, 0), "stage": (0, film.width)}
         self._left, self._right = widths[show]
@@ -128,12 +128,12 @@ class Frames:
         return picture
 
     def close(self) -> None:
-        """Give the buffers back."""
+        """Release the graphics buffers."""
         self._canvas.close()
 
 
 def _bent(recording: Recording, folder: Path) -> tuple[float, Array | None]:
-    """From when a bent curve is performed [s], and its points; never, and none, where there is none."""
+    """Time from which a bent curve is performed [s], and its points; infinity and None if there is none."""
     told = (recording.summary or {}).get("performance")
     if not isinstance(told, dict) or not (folder / CURVE_FILE).exists():
         return np.inf, None
@@ -142,7 +142,7 @@ def _bent(recording: Recording, folder: Path) -> tuple[float, Array | None]:
 
 
 def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
-    """Who is on the stage."""
+    """Legend of the stage: the figure and its ghost."""
     actors = (Entry(_SHIRT, _NAMES[world.kind]),)
     if not world.has_figure or ghost == "none":
         return actors
@@ -152,15 +152,15 @@ def _cast(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
 
 @dataclass(frozen=True)
 class Filmed:
-    """What is to be known of a film.
+    """Result of rendering a film.
 
     Attributes
     ----------
     files : tuple of str
-        Written.
+        Files written.
     frames : int
     clearance : mapping of str to Clearance
-        How low the figure and the ghost reach, of those that are shown.
+        How low the figure and the ghost reach, for those that are shown.
     """
 
     files: tuple[str, ...]
@@ -168,7 +168,7 @@ class Filmed:
     clearance: Mapping[str, Clearance]
 
     def lines(self) -> list[str]:
-        """How low the figures reach, a line each."""
+        """How low the figures reach, one line each."""
         return [
             f"The lowest point of the {name} was {1e3 * lowest:+.1f} mm from the floor at {at:.1f} s"
             f"{', and was drawn higher by that' if lowest < 0.0 else ''}."
@@ -182,19 +182,19 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
     Parameters
     ----------
     folder : Path
-        Of a run.
+        Folder of the run.
     target : Path
-        ``.mp4`` or ``.gif``.
+        ``.mp4`` or ``.gif`` file.
     film : Film
     gif : bool
-        Write a GIF beside it as well: half as large, every second frame.
+        Also write a GIF beside it: half as large, every second frame.
     overwrite : bool
-        Replace what exists.
+        Replace existing files.
 
     Raises
     ------
     SimError
-        If the recording, the target or this machine's graphics do not do.
+        If the recording cannot be filmed, the target not be written, or this machine cannot draw.
     """
     beside = target.with_suffix(".gif") if gif and target.suffix.lower() != ".gif" else None
     targets = (target,) if beside is None else (target, beside)
@@ -220,7 +220,7 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
 
 
 def _told(rows: range, console: Console) -> Iterator[int]:
-    """Rows, while a bar tells how long it still takes."""
+    """Yield rows, with a progress bar that shows the remaining time."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
         yield from bar.track(rows, description="drawing")

@@ -1,4 +1,4 @@
-"""A film being written: as H.264 or GIF, by ffmpeg, under its own name only when it is whole."""
+"""Writes a film as H.264 or GIF by ffmpeg; the file gets its name only when it is complete."""
 
 from collections.abc import Generator
 from pathlib import Path
@@ -13,8 +13,8 @@ from sim.viewer.palette import FIELD, TUBE, USER
 
 SUFFIXES = (".mp4", ".gif")
 _QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
-# One palette for all frames; for its choice the colours that mean something are painted over a corner, so that thin
-# arrows keep them.
+# One palette for all frames. To choose it, the colours of arrows and tube are painted over a corner, so that thin
+# arrows keep theirs.
 _MEANT = "".join(
     f"drawbox=x={k}*iw/6:y=0:w=iw/6:h=ih/6:color=0x{color[1:]}:t=fill," for k, color in enumerate((FIELD, USER, TUBE))
 )
@@ -27,7 +27,7 @@ def check_target(target: Path, overwrite: bool) -> None:
     Raises
     ------
     SimError
-        Saying what would be right.
+        With what is expected.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise SimError(f"{target}: films are written as {' or '.join(SUFFIXES)}; expected a name that ends so")
@@ -38,14 +38,14 @@ def check_target(target: Path, overwrite: bool) -> None:
 
 
 class FilmFile:
-    """A film to which frames are added; what is left half done is removed.
+    """A film to which frames are added; an incomplete file is removed.
 
     Parameters
     ----------
     target : Path
-        ``.mp4`` or ``.gif``.
+        ``.mp4`` or ``.gif`` file.
     width, height : int
-        Of a frame [pixels]; even for ``.mp4``.
+        Size of a frame [pixels]; even for ``.mp4``.
     fps : float
         Frames per second [1/s].
 
@@ -85,7 +85,7 @@ def _pen(file: Path, width: int, height: int, fps: float) -> Generator[None, Any
         raise SimError(
             "films are written by ffmpeg, which is not installed; expected pip install 'haptic-vector-fields[video]'"
         ) from None
-    # Without types: it takes fractions of frames a second, and no quality where there are parameters for it.
+    # Untyped, since its annotations forbid a fractional frame rate, and None as quality where parameters give it.
     write: Any = write_frames
     if file.suffix == ".gif":
         return write(

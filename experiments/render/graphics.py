@@ -1,4 +1,4 @@
-"""Drawing without a display: which off-screen OpenGL a machine has, and a canvas on which MuJoCo draws with it."""
+"""Off-screen rendering: detection of the machine's OpenGL backend, and a canvas on which MuJoCo draws with it."""
 
 import os
 import subprocess
@@ -15,9 +15,9 @@ from sim.errors import SimError
 
 Image = npt.NDArray[np.uint8]
 
-OFFSCREEN = ("egl", "osmesa")  # a graphics card or Mesa's software; Mesa's software alone
+OFFSCREEN = ("egl", "osmesa")  # EGL uses a graphics card or Mesa's software renderer, OSMesa only the latter
 INSTALL = "apt-get install libegl1 libgl1-mesa-dri, or libosmesa6"
-_SECONDS = 60.0  # a driver that has not answered by then does not
+_SECONDS = 60.0  # [s] timeout for a backend's trial
 _TRIAL = """
 import mujoco, sys
 from importlib import import_module
@@ -30,21 +30,21 @@ import os; os._exit(0)
 """
 
 
-SUN = (38.0, -52.0)  # where its light goes: azimuth to that of the view, elevation [degrees]
-SUN_DISTANCE = 5.0  # of its shadow map from what is looked at [m]
+SUN = (38.0, -52.0)  # direction of the sunlight: azimuth relative to that of the view, elevation [degrees]
+SUN_DISTANCE = 5.0  # distance of the sun's shadow map from the point that is looked at [m]
 
 
 class NoGraphics(SimError):
-    """A machine on which nothing can be drawn."""
+    """Raised on a machine that cannot render off-screen."""
 
 
 def offscreen_backend() -> str:
-    """The first of `OFFSCREEN` that draws here, tried in a process of its own; `MUJOCO_GL` names the only one to try.
+    """The first working backend of `OFFSCREEN`, each tried in its own process; `MUJOCO_GL` names the only one to try.
 
     Raises
     ------
     NoGraphics
-        If none does; the message says what to install.
+        If none works; the message says what to install.
     """
     asked = os.environ.get("MUJOCO_GL", "").lower().strip()
     candidates = (asked,) if asked in OFFSCREEN else OFFSCREEN
@@ -58,7 +58,7 @@ def offscreen_backend() -> str:
 
 
 def _failure(backend: str) -> str:
-    """What a backend dies of, in a few words; empty if it draws."""
+    """Why a backend fails, in a few words; empty if it works."""
     try:
         tried = subprocess.run(
             [sys.executable, "-c", _TRIAL, backend], capture_output=True, text=True, timeout=_SECONDS, check=False
@@ -72,16 +72,16 @@ def _failure(backend: str) -> str:
 
 
 class View(NamedTuple):
-    """From where a world is seen.
+    """Camera pose.
 
     Attributes
     ----------
     lookat : tuple of float
-        Point in the middle of the picture [m].
+        Point in the middle of the picture, in W [m].
     distance : float
-        From it [m].
+        Distance of the camera from this point [m].
     azimuth, elevation : float
-        Direction in which one looks [degrees]: along +x at 0, along +y at 90; negative downwards.
+        Viewing direction [degrees]: azimuth 0 along +x, 90 along +y; elevation negative downwards.
     """
 
     lookat: tuple[float, float, float]
@@ -90,31 +90,31 @@ class View(NamedTuple):
     elevation: float
 
     def camera(self) -> mujoco.MjvCamera:
-        """The same for MuJoCo."""
+        """The view as a MuJoCo camera."""
         camera = mujoco.MjvCamera()
         camera.lookat[:], camera.distance = self.lookat, self.distance
         camera.azimuth, camera.elevation = self.azimuth, self.elevation
         return camera
 
     def direction(self, azimuth: float, elevation: float) -> npt.NDArray[np.float64]:
-        """Unit vector at an azimuth from the view's own, and an elevation [degrees]."""
+        """Unit vector at an azimuth relative to the view's, and an elevation [degrees]."""
         a, e = np.deg2rad(self.azimuth + azimuth), np.deg2rad(elevation)
         return np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
 
 
 class Canvas:
-    """Pictures of a world from a camera.
+    """Renders pictures of a world.
 
     Parameters
     ----------
     model : mujoco.MjModel
-        The world; its ``vis.global_`` says how large a picture may be.
+        The world; its ``vis.global_`` sets the largest size of a picture.
     backend : str
-        As `offscreen_backend` gives it.
+        Result of `offscreen_backend`.
     most_geoms : int
-        Room for geoms in a picture.
+        Largest number of geoms in a picture.
     reach : float, optional
-        Half width of what casts shadows [m], by default the world's: the smaller, the sharper they are.
+        Half width of the region that casts shadows [m], by default the world's; the smaller, the sharper the shadows.
     """
 
     def __init__(self, model: mujoco.MjModel, backend: str, most_geoms: int = 2000, reach: float | None = None):
@@ -128,20 +128,20 @@ class Canvas:
         self.scene = mujoco.MjvScene(model, most_geoms)
 
     def look(self, data: mujoco.MjData, view: "View", group: int) -> None:
-        """Take the geoms of a group, as the world is and seen from a view, into the scene."""
+        """Start a scene with the geoms of a group in the world's current state, seen from a view."""
         self._option.geomgroup[:] = 0
         self._option.geomgroup[group] = 1
         mujoco.mjv_updateScene(
             self._model, data, self._option, self._perturbed, view.camera(), mujoco.mjtCatBit.mjCAT_ALL, self.scene
         )
-        # The sun stands behind the left shoulder of whoever looks, so that what is looked at is lit.
+        # The sun is behind the left shoulder of the viewer, so that the visible sides are lit.
         for light in self.scene.lights[: self.scene.nlight]:
             if light.castshadow:
                 light.dir[:] = view.direction(*SUN)
                 light.pos[:] = np.asarray(view.lookat) - SUN_DISTANCE * light.dir
 
     def add(self, data: mujoco.MjData) -> None:
-        """Add what moves, as the world is now, to the scene that was looked at."""
+        """Add the moving geoms in the world's current state to the scene."""
         mujoco.mjv_addGeoms(
             self._model, data, self._option, self._perturbed, mujoco.mjtCatBit.mjCAT_DYNAMIC, self.scene
         )
@@ -149,21 +149,21 @@ class Canvas:
     def connect(
         self, kind: mujoco.mjtGeom, start: npt.ArrayLike, end: npt.ArrayLike, width: float, color: tuple[float, ...]
     ) -> None:
-        """Add a rod or an arrow between two points of the world to the scene."""
+        """Add a rod or an arrow between two points in W to the scene."""
         geom = self.scene.geoms[self.scene.ngeom]
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(color, dtype=np.float32))
         mujoco.mjv_connector(geom, kind, width, np.asarray(start, dtype=float), np.asarray(end, dtype=float))
         self.scene.ngeom += 1
 
     def picture(self, width: int, height: int) -> Image:
-        """The scene, shape (height, width, 3)."""
+        """Render the scene, shape (height, width, 3)."""
         rectangle, rows = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), dtype=np.uint8)
         mujoco.mjr_render(rectangle, self.scene, self._context)
         mujoco.mjr_readPixels(rows, None, rectangle, self._context)  # pyright: ignore[reportArgumentType]
         return rows[::-1]
 
     def close(self) -> None:
-        """Give the buffers back."""
+        """Release the graphics buffers."""
         self._gl.make_current()
         self._context.free()
         self._gl.free()

@@ -1,4 +1,4 @@
-"""How low what is seen of a body reaches: the support function of its geoms, downwards."""
+"""Lowest point of the visible geoms of a body, from their support functions."""
 
 from collections.abc import Sequence
 
@@ -8,11 +8,11 @@ import numpy as np
 from controllers.state import Array
 
 _GEOM = mujoco.mjtGeom
-FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for looking at
+FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision and not drawn
 
 
 def seen_geoms(model: mujoco.MjModel, prefix: str) -> tuple[int, ...]:
-    """Geoms that are drawn of the bodies whose names begin with a prefix."""
+    """Visible geoms of the bodies whose names begin with a prefix."""
     return tuple(
         geom
         for geom in range(model.ngeom)
@@ -25,14 +25,14 @@ def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int
 
     .. math:: z - h(R^T e_z), \quad h(d) = \max_{x} d \cdot x \text{ over the geom about its own centre}
 
-    with h = r of a sphere, r + ℓ|d_z| of a capsule, ‖s d‖ of an ellipsoid, Σ sᵢ|dᵢ| of a box, r√(1−d_z²) + ℓ|d_z| of
-    a cylinder.
+    with h = r for a sphere, r + ℓ|d_z| for a capsule, ‖s d‖ for an ellipsoid, Σ sᵢ|dᵢ| for a box, r√(1−d_z²) + ℓ|d_z|
+    for a cylinder.
     """
     return min(float(data.geom_xpos[g][2]) - _reach(model, g, data.geom_xmat[g][6:9]) for g in geoms)
 
 
 def _reach(model: mujoco.MjModel, geom: int, d: Array) -> float:
-    """Support of a geom in the direction d of its own frame, which is symmetric about its centre, or a mesh's −d."""
+    """Support of a geom in the direction d of its own frame; of a mesh, which is not symmetric, in the direction −d."""
     kind, s = model.geom_type[geom], model.geom_size[geom]
     if kind == _GEOM.mjGEOM_SPHERE:
         return float(s[0])

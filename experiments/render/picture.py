@@ -1,4 +1,4 @@
-"""A picture of a run from its recording: the Phantom at the hardest push, moments of the figure beside its ghost."""
+"""Renders a still of a run from its recording: the Phantom at the hardest push, poses of the figure and its ghost."""
 
 from pathlib import Path
 
@@ -16,12 +16,12 @@ from models.mocap.clip import PlanarDisplacement
 from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
-FINER = 3  # times as many rows and columns are drawn
-DEVICE_REACH = 0.8  # half width of what casts shadows on the device [m]
-DEVICE_SHARE = 0.34  # of the width
-MOMENTS = 4  # of the figure, evenly over the second half of the run
-SPACING = 1.1  # between them [m]
-GHOST_AT = np.array([-0.95, 0.45])  # from the figure: behind it out of its reach, to its left [m]
+FINER = 3  # supersampling factor of rows and columns
+DEVICE_REACH = 0.8  # half width of the region that casts shadows on the device [m]
+DEVICE_SHARE = 0.34  # share of the width for the device
+MOMENTS = 4  # poses of the figure, evenly over the second half of the run
+SPACING = 1.1  # distance between them [m]
+GHOST_AT = np.array([-0.95, 0.45])  # position of the ghost relative to the figure: behind, and to its left [m]
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
 
@@ -31,7 +31,7 @@ def draw_picture(folder: Path, target: Path) -> None:
     Raises
     ------
     SimError
-        If the recording or this machine's graphics do not do.
+        If the recording cannot be drawn, or this machine cannot draw.
     """
     with Recording(folder / RECORDING) as recording:
         world = shown_world(recording, FINER * WIDTH, FINER * HEIGHT)
@@ -43,13 +43,13 @@ def draw_picture(folder: Path, target: Path) -> None:
             with Canvas(world.model, backend, 20_000, SHADOW_REACH) as canvas:
                 figures = _figures(recording, world, moments, canvas, FINER * (WIDTH - left))
             picture = np.hstack((picture, figures))
-    # Each pixel is the mean of several: edges of shadows and limbs are smooth.
+    # Supersampling: each pixel is the mean of several, which smooths edges of shadows and limbs.
     pixels = picture.reshape(HEIGHT, FINER, WIDTH, FINER, 3).mean(axis=(1, 3))
     matplotlib.image.imsave(target, np.rint(pixels).astype(np.uint8))
 
 
 def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
-    """The workspace at the hardest push across the stylus, which lies along x and would hide an arrow along it."""
+    """The workspace at the hardest push across x, the direction of the stylus, which would hide an arrow along it."""
     user = recording.channel("ticks", "user")
     row = int(np.argmax([np.linalg.norm(user[int(tick)][1:]) for tick in moments.ticks]))
     Stage(recording, world, moments, "front", 1.0).put(row)
@@ -57,7 +57,7 @@ def _device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: 
 
 
 def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
-    """Moments side by side, turned to the camera together with their ghosts."""
+    """Poses side by side, turned to the camera together with their ghosts."""
     qpos, at = recording.channel("frames", "qpos"), world.figure_at
     n, across = len(moments.t), 0.5 * (MOMENTS - 1) * SPACING
     for k, row in enumerate(np.linspace(n // 2, n - 1, MOMENTS).astype(int)):
@@ -76,7 +76,7 @@ def _figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas:
 
 
 def _facing_the_camera(pose: Array, place: Array) -> PlanarDisplacement:
-    """The move over the floor that puts a pose at a place, facing +x."""
+    """The planar displacement that moves a pose to a place on the floor, facing +x."""
     w, x, y, z = pose[3:7]
     yaw = float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     c, s = np.cos(-yaw), np.sin(-yaw)

@@ -19,7 +19,7 @@ from sim.viewer.palette import FIELD, USER
 
 Camera = Literal["three-quarter", "front", "side", "back", "above"]
 
-# From in front of the figure: azimuth to its heading, elevation [degrees].
+# Viewing directions: azimuth relative to the figure's heading (180 looks at it from in front), elevation [degrees].
 CAMERAS: dict[Camera, tuple[float, float]] = {
     "three-quarter": (205.0, -9.0),
     "front": (180.0, -6.0),
@@ -27,27 +27,27 @@ CAMERAS: dict[Camera, tuple[float, float]] = {
     "back": (0.0, -9.0),
     "above": (205.0, -50.0),
 }
-APART = 0.95  # of the ghost from the figure, to the side [m]
-BEHIND = 0.35  # and further off [m]
-MARGIN = 1.1  # of what is in a picture over what has to be
-ARM_REACH = 0.45  # the stage is seen at least this far to either side of a root [m]
-LEGEND = 0.1  # room at the foot for words [m]
+APART = 0.95  # distance of the ghost from the figure, to the side [m]
+BEHIND = 0.35  # and away from the camera [m]
+MARGIN = 1.1  # size of the picture relative to what must be in it
+ARM_REACH = 0.45  # least visible distance to either side of a root [m]
+LEGEND = 0.1  # room for the legend at the bottom [m]
 ARROW = 0.06  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.6
-HIDDEN = 0.004  # a force of less than this length is not drawn [m]
+HIDDEN = 0.004  # shortest arrow that is drawn [m]
 
 _ARROW, _ROD = mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
 class Clearance(NamedTuple):
-    """How low a figure reaches in what was drawn, before it was drawn higher.
+    """Lowest point of a figure in a film, before it is lifted onto the floor for drawing.
 
     Attributes
     ----------
     lowest : float
-        Height of its lowest point over the floor [m].
+        Height of the lowest point over the floor [m].
     at : float
-        When [s].
+        Time at which it occurs [s].
     """
 
     lowest: float
@@ -55,7 +55,7 @@ class Clearance(NamedTuple):
 
 
 class Workspace:
-    """The Phantom with its curves, the forces on the hand and the way that it came."""
+    """The Phantom with its curves, the forces on the hand, and the recent path of the stylus."""
 
     def __init__(self, recording: Recording, world: ShownWorld, moments: Timeline):
         self._world, self._moments = world, moments
@@ -92,7 +92,7 @@ class Workspace:
 
 
 class Stage:
-    """The figure, or the robot arm, and the ghost beside it, on a floor that neither is seen below."""
+    """The figure, or the robot arm, with the ghost beside it; neither is drawn below the floor."""
 
     def __init__(self, recording: Recording, world: ShownWorld, moments: Timeline, camera: Camera, aspect: float):
         self.world, self._moments = world, moments
@@ -104,7 +104,7 @@ class Stage:
         self._distance, self._height = self._framed(aspect)
 
     def put(self, row: int) -> None:
-        """Put the world into a moment, each figure drawn higher by as much as it is below the floor."""
+        """Set the world to the state of a row; a figure that is below the floor is lifted onto it."""
         qpos, world = self._qpos[int(self._moments.frames[row])].copy(), self.world
         ghost = None
         if self._moments.ghost is not None:
@@ -141,16 +141,16 @@ class Stage:
         return float(self._moments.heading[row]) + self._azimuth
 
     def _beside(self, row: int) -> Array:
-        """From the figure to its ghost over the floor: to the right of who looks, and further off [m]."""
+        """Vector from the figure to its ghost over the floor: right in the view, and away from the viewer [m]."""
         a = np.deg2rad(self._looking(row))
         return APART * np.array([np.sin(a), -np.cos(a)]) + BEHIND * np.array([np.cos(a), np.sin(a)])
 
     def _framed(self, aspect: float) -> tuple[float, float]:
-        """Distance of the camera and height of what it looks at [m], with all that moves in the picture."""
+        """Distance of the camera and height of its target [m], such that everything that moves is in the picture."""
         rows = np.unique(np.linspace(0, len(self._moments.t) - 1, 40).astype(int))
         every = [geom for geoms in self._geoms.values() for geom in geoms]
         if not every:
-            return 1.0, 0.0  # nobody is on the stage
+            return 1.0, 0.0  # the stage is empty
         points: list[Array] = []
         for row in (int(row) for row in rows):
             self.put(row)

@@ -1,7 +1,7 @@
-"""The world of a recording as it is drawn: its bodies, a ghost of the figure, curves in their tubes, light and floor.
+"""The world of a recording for drawing: its bodies, a ghost of the figure, curves in their tubes, light and floor.
 
-It is compiled again for drawing, so that curves and tubes are meshes in it: one surface each, which MuJoCo blends over
-what is behind it. Its configurations are the recorded ones, and behind them the ghost's.
+The model is compiled again for drawing, with curves and tubes as meshes: one surface each, which MuJoCo blends over the
+background. Its qpos is the recorded one followed by that of the ghost.
 """
 
 from dataclasses import dataclass
@@ -27,16 +27,16 @@ BENT = "bent"
 CURVE_RADIUS = 0.0009  # [m]
 TUBE_OPACITY = 0.17
 GHOST_WHITE = 0.45  # share of white in the ghost's colour
-SHADOW_REACH = 5.5  # half width of what is in the shadow map [m]
+SHADOW_REACH = 5.5  # half width of the shadow map [m]
 FIELD_OF_VIEW = 30.0  # vertical [degrees]
 _WOOD = (0.8, 0.71, 0.6, 1.0)
-_WHITE, _LINES = 0.97, 0.8  # of the floor and its lines
-STAGE, BENCH = 1, 2  # groups of geoms: what follows the animation on the floor, and the device with its curves
+_WHITE, _LINES = 0.97, 0.8  # brightness of the floor and of its lines
+STAGE, BENCH = 1, 2  # geom groups: figure, ghost or arm on the floor; the device with its curves
 
 
 @dataclass(frozen=True)
 class ShownWorld:
-    """A world for drawing, and where what moves stands in its configuration.
+    """A world for drawing, with the layout of its configuration.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ShownWorld:
     kind : str
         ``physical``, ``kinematic``, ``none``, or ``robot`` for an arm in the figure's place.
     recorded : int
-        Numbers of a recorded configuration, with which that of this world begins.
+        Length of the recorded qpos, which is the first part of this world's qpos.
     """
 
     model: mujoco.MjModel
@@ -54,7 +54,7 @@ class ShownWorld:
 
     @property
     def prefix(self) -> str:
-        """Of the names of the bodies that follow the animation."""
+        """Name prefix of the bodies that follow the animation."""
         return ROBOT if self.kind == "robot" else FIGURE
 
     @property
@@ -64,7 +64,7 @@ class ShownWorld:
 
     @property
     def figure_at(self) -> int:
-        """Where the figure's pose begins."""
+        """Index in qpos at which the figure's pose begins."""
         return int(self.model.joint(FIGURE + "root").qposadr[0])
 
     def show_bent(self, shown: bool) -> None:
@@ -73,7 +73,7 @@ class ShownWorld:
             self.model.geom(BENT).rgba[3] = float(shown)
 
     def put(self, qpos: Array, ghost: Array | None = None) -> None:
-        """Put the world into a recorded configuration, and its ghost into a pose."""
+        """Set the world to a recorded qpos, and its ghost to a pose."""
         self.data.qpos[: self.recorded] = qpos
         if ghost is not None:
             self.data.qpos[self.recorded : self.recorded + N_POSE] = ghost
@@ -88,14 +88,14 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
     ----------
     recording : Recording
     width, height : int
-        [pixels]
+        Largest size of a picture [pixels].
     bent : array (n, 3), optional
         Points of the curve as the hand bent it, in H [m]; hidden until `ShownWorld.show_bent`.
 
     Raises
     ------
     RecordingError
-        If the recording lacks what is drawn.
+        If the recording lacks a channel that is drawn.
     """
     kind = recording.texts.get("figure", "robot")
     scene = SceneConfig() if kind == "robot" else scene_of(recording)
@@ -133,7 +133,7 @@ def _draw_courses(spec: mujoco.MjSpec, recording: Recording) -> None:
 
 
 def _draw(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color: Rgba) -> None:
-    """A tube around points of the hand frame as one surface."""
+    """Add a tube around points in H as one mesh."""
     vertices, faces = tube(P_WH + points, thickness)
     spec.add_mesh(
         name=name, uservert=vertices.ravel().tolist(), userface=faces.ravel().tolist(),
@@ -145,7 +145,7 @@ def _draw(spec: mujoco.MjSpec, name: str, points: Array, thickness: float, color
 
 
 def _sort(spec: mujoco.MjSpec) -> None:
-    """Give what is seen its group, and the table a lighter wood."""
+    """Assign visible geoms to their groups, and give the table a lighter wood."""
     for geom in spec.geoms:
         name = geom.parent.name
         if geom.name == "floor" or name.startswith((FIGURE, GHOST, ROBOT)):

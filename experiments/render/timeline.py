@@ -1,4 +1,4 @@
-"""Which rows of a recording a film shows, where its camera goes, and how high figures stand over the floor."""
+"""Timeline of a film: rows of the recording, poses of the ghost, and the path of the camera."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,30 +17,30 @@ from sim.viewer.framing import followed
 
 Rows = npt.NDArray[np.int64]
 Ghost = Literal["default", "animation", "none"]
-"""The animation of the curve as it was, that of the hand's path, or nobody."""
+"""Animation that the ghost shows: that of the unedited curve, that of the hand's path, or none."""
 
-TURN_SECONDS = 4.0  # over which the figure's heading is averaged
-FASTEST_TURN = 30.0  # of a camera that goes round with the figure [°/s]
+TURN_SECONDS = 4.0  # window over which the figure's heading is averaged [s]
+FASTEST_TURN = 30.0  # fastest turn of the figure that the camera follows [°/s]
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """A film's moments.
+    """The moments of a film.
 
     Attributes
     ----------
     t : array (n,)
         Time in the recording [s].
     ticks, frames : array (n,)
-        Rows of its two groups.
+        Rows of the recording's two groups.
     ghost : array (n, 75) or None
-        Pose of the ghost.
+        Poses of the ghost.
     kind : Ghost
-        What it is.
+        Animation of the ghost.
     floor : array (n, 2)
         Path of the camera over the floor [m].
     heading : array (n,)
-        Where the figure faces, slowly [degrees].
+        Averaged heading of the figure [degrees].
     """
 
     t: Array
@@ -61,16 +61,16 @@ def timeline(
     ----------
     recording : Recording
     folder : Path
-        Where it lies, with the default animation beside it.
+        Folder of the recording and of the default animation.
     world : ShownWorld
     fps : float
-        Of the film [1/s].
+        Frame rate of the film [1/s].
     start : float
-        Of what is shown [s].
+        Start of the filmed part [s].
     seconds : float or None
-        Of what is shown; all that there is by default [s].
+        Duration of the filmed part [s]; by default up to the end.
     ghost : Ghost
-        What is wanted; a run that was cut short has no default animation, and gets the other.
+        Requested ghost; an interrupted run has no default animation, and gets the other one.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def timeline(
 
 
 def _ghost(recording: Recording, folder: Path, frames: Rows, wanted: Ghost) -> tuple[Array | None, Ghost]:
-    """Poses of the ghost at rows of the recording's frames, and what it is."""
+    """Poses of the ghost at rows of the recording's frames, and its kind."""
     if wanted == "none":
         return None, wanted
     file = folder / DEFAULT
@@ -108,7 +108,7 @@ def _ghost(recording: Recording, folder: Path, frames: Rows, wanted: Ghost) -> t
 
 
 def _slow_heading(q: Array, fps: float) -> Array:
-    """Where roots (n, 4) face [degrees], averaged; where that turns too fast for a camera, what it is at first."""
+    """Averaged heading of root rotations (n, 4) [degrees]; the initial one if it turns too fast for the camera."""
     w, x, y, z = q.T
     turns = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     window = int(TURN_SECONDS * fps) | 1

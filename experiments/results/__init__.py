@@ -1,1 +1,1 @@
-"""What a run leaves: measures, summary, figures, page."""
+"""Results of a run: measures, summary, figures, page."""

@@ -1,4 +1,4 @@
-"""What happened in a run of the robot arm: its recording, in numbers, in words and in a figure."""
+"""Results of a run of the robot arm: recorded channels, measures, summary in words, figure."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,24 +23,24 @@ from sim.world.robot_world import RobotWorld
 
 @dataclass(frozen=True)
 class ArmSummary:
-    """What happened.
+    """Measures of a run of the robot arm.
 
     Attributes
     ----------
     laps : float
     deviation_rms_mm : float
-        Stylus from the curve, first second and pushes left out.
+        RMS distance of the stylus from the curve; the first second, the pushes and a second after each are left out.
     tool_rms_mm, tool_max_mm : float
-        Tool of the arm from where the stylus leads it, the first second left out.
+        Distance of the arm's end effector from where the stylus leads it; the first second is left out.
     joints_rms_deg : float
-        Joint angles from h(p, R), likewise.
+        RMS difference of the joint angles from h(p, R); the first second is left out.
     torque_share : float
-        Largest torque over its motor's limit.
+        Largest ratio of a torque to the limit of its motor.
     nearest_limit_deg : float
         Least distance of a joint from its limit.
     real_time_factor : float
     oscillation : OscillationSummary
-        Stability of the loop as it was measured.
+        Measured stability of the loop.
     """
 
     laps: float
@@ -54,7 +54,7 @@ class ArmSummary:
     oscillation: OscillationSummary
 
     def lines(self) -> list[str]:
-        """What happened, a sentence each."""
+        """Measures in words, one sentence per line."""
         return [
             *self.oscillation.lines(),
             f"The stylus ran {self.laps:.2f} laps, {self.deviation_rms_mm:.2f} mm RMS from the curve when left alone.",
@@ -67,7 +67,7 @@ class ArmSummary:
 
 
 def arm_groups(servo: Servo) -> dict[str, Group]:
-    """What a run records: ``ticks`` as every run, ``frames`` with joint angles [rad] and tool positions [m]."""
+    """Recorded channels: ``ticks`` as in every run, ``frames`` with joint angles [rad] and tool positions [m]."""
     every = groups(servo)
     ticks = {name: shape for name, shape in every["ticks"].channels.items() if name != "residual"}
     n = len(ARM_JOINTS)
@@ -139,7 +139,10 @@ def arm_summary(recording: Recording, arm: mujoco.MjModel, config: ArmConfig, sp
 
 
 def arm_figure(recording: Recording, home: Array, scale: float) -> Figure:
-    """Path of the tool against the stylus's curve, scaled about the home of the tool [m], and how far it is from it."""
+    """Path of the tool over the scaled curve of the stylus, and the tracking error of the tool over time.
+
+    The curve is scaled by `scale` about the home position of the tool [m].
+    """
     t, tool, led = (recording.channel("frames", name)[:] for name in ("t", "tool", "led"))
     curve = home + [0.0, 0.0, PEDESTAL] + scale * recording.array("curve")
     ticks, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]

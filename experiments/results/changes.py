@@ -1,4 +1,4 @@
-"""Changes of river in a run: when one took the hand that another had, in the summary and in the figures."""
+"""Changes of river in a run, for the summary and the figures: when the hand passed from one river to another."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 from sim.recording.recording import Recording
 from sim.reference.transition import DWELL
 
-ROWS = 100_000  # of the recording, read at a time
+ROWS = 100_000  # rows of the recording that are read at a time
 
 
 class RiverChange(NamedTuple):
@@ -16,7 +16,7 @@ class RiverChange(NamedTuple):
     Attributes
     ----------
     t : float
-        Time of the first tick at which the new river has the hand [s].
+        Time of the first tick at which the hand is in the new river [s].
     before, after : str
         Names of the rivers.
     """
@@ -31,10 +31,10 @@ class RiverChange(NamedTuple):
 
 
 def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
-    """All changes of a run, in memory that does not grow with it; none where the field has no rivers to tell apart.
+    """All changes of river in a run, in constant memory; none if the field has no named rivers.
 
-    A river that has the hand again after none had it is no change; the first to have it is none either; nor one that
-    has it for less than its clip would need to play (`sim.reference.transition.DWELL`).
+    Not counted are the first river, a return to the same river after the hand was in none, and a stay that is shorter
+    than `sim.reference.transition.DWELL`, which a river's clip needs to be played.
     """
     if "river_names" not in recording.texts:
         return ()
@@ -47,7 +47,7 @@ def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
         times, rows = t[first : first + ROWS], river[first : first + ROWS]
         edges = np.flatnonzero(np.diff(rows, prepend=current))
         for k, end in zip([-1, *edges], [*edges, len(rows)], strict=True):
-            # Row −1: what the rows before have ended with goes on.
+            # Row −1: the river at the end of the previous block continues.
             if k >= 0:
                 current, since = float(rows[k]), float(times[k])
             lasted = float(times[end] if end < len(rows) else times[-1]) - since

@@ -1,15 +1,15 @@
-"""Faults of a device in a run: which, when, and what the value was."""
+"""Faults of a device in a run: kind, time and value."""
 
 import numpy as np
 
 from controllers.safety.faults import Fault, LatchedFault
 from sim.recording.recording import Recording
 
-_ROWS = 100_000  # of the recording, read at a time
+_ROWS = 100_000  # rows of the recording that are read at a time
 
 
 def fault_lines(recording: Recording) -> tuple[str, ...]:
-    """What is said of each fault that was latched, in order, and of ticks that came late."""
+    """A line for each latched fault, in order of time, and one for the ticks that came late."""
     ticks = recording.groups["ticks"]
     if "fault" not in ticks:
         return ()

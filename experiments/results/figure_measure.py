@@ -1,4 +1,4 @@
-"""How the physical figure followed the animation, of frames that come in blocks."""
+"""Tracking of the animation by the physical figure, measured from blocks of frames."""
 
 import math
 from collections.abc import Mapping
@@ -12,31 +12,31 @@ from sim.body.falls import UP
 from sim.body.residual import ResidualMeasure
 from sim.recording.recording import Recording
 
-TOUCH = 1.0  # [N] from which the ground bears the figure
+TOUCH = 1.0  # [N] vertical ground reaction force above which the figure counts as in contact
 
 
 class MeanSquare:
-    """Root mean square and largest of numbers that come in blocks."""
+    """Root mean square and largest magnitude of numbers that are given in blocks."""
 
     def __init__(self) -> None:
         self._sum, self.count, self.largest = 0.0, 0, 0.0
 
     def add(self, values: Array) -> None:
-        """Take numbers of any shape."""
+        """Add numbers of any shape."""
         self._sum += float(np.sum(values**2))
         self.count += values.size
         self.largest = max(self.largest, float(np.max(np.abs(values), initial=0.0)))
 
     @property
     def root(self) -> float:
-        """Root mean square; 0 of nothing."""
+        """Root mean square; 0 if there are no numbers."""
         return math.sqrt(self._sum / self.count) if self.count else 0.0
 
 
 class FigureMeasure:
-    """`FigureSummary` of frames that come in blocks.
+    """`FigureSummary` of frames that are given in blocks.
 
-    What should be comes from the reference (stance, flight), what is from the simulation (force of the ground).
+    Intended stance and flight are those of the reference; actual contact is taken from the simulated ground force.
     """
 
     def __init__(self, recording: Recording):
@@ -50,7 +50,7 @@ class FigureMeasure:
         self._was_up, self._falls = True, list[float]()
 
     def add(self, frames: Mapping[str, Array]) -> None:
-        """Take a block of frames; those in which the figure lies or is set back count in `seconds` only."""
+        """Add a block of frames; those in which the figure lies or is being set back count in `seconds` only."""
         up = frames["down"] == UP
         falls = ~up & np.concatenate(([self._was_up], up[:-1]))
         self._falls += frames["t"][falls].tolist()
@@ -67,7 +67,7 @@ class FigureMeasure:
         self._ground += float(np.sum(frames["ground"][up][:, 2]))
 
     def summary(self) -> FigureSummary:
-        """What was taken so far."""
+        """Summary of all frames so far."""
         up, stance, flight = max(self._up, 1), self._stance.summary(), self._flight.summary()
         return FigureSummary(
             falls=tuple(self._falls),

@@ -1,10 +1,11 @@
-"""The figures of a run, drawn from its recording and nothing else.
+"""The figures of a run, drawn from its recording alone.
 
-What is read: arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
-texts ``tube_name``, ``hand_does`` and ``distance_from``, "tube", "pushes" and "the curve" without them; of rivers
-``river_curves`` and ``river_names``; when a bent curve is performed, in the summary;
+They read the arrays ``curve`` (m, 3), ``tube_radius``, ``motor_continuous`` (3), ``motor_peak`` (3), ``body_weight``;
+the texts ``tube_name``, ``hand_does`` and ``distance_from`` (by default "tube", "pushes" and "the curve"); for rivers
+``river_curves`` and ``river_names``; from the summary the time from which a bent curve is performed;
 in group ``ticks`` the channels t, p, distance, force, user and torque; in group ``frames`` the channels t, joint_error,
-root_error, residual, ground and flight. SI units and radians there; millimetres, centimetres and degrees in figures.
+root_error, residual, ground, flight and down. The recording has SI units and radians; the figures millimetres,
+centimetres and degrees.
 """
 
 from collections.abc import Callable
@@ -25,7 +26,7 @@ from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 
-POINTS = 20_000  # drawn of a channel at most; of a longer one, every k-th row
+POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
 STYLE: dict[Any, Any] = {
@@ -44,17 +45,17 @@ STYLE: dict[Any, Any] = {
 
 
 def draw_figures(recording: Recording, folder: Path) -> list[Path]:
-    """Draw all figures as PNG files into a folder, which is made when it is missing.
+    """Draw all figures as PNG files into a folder, which is created if it is missing.
 
     Returns
     -------
     list of Path
-        The files, in the order in which a reader wants them.
+        The files, in reading order.
 
     Raises
     ------
     RecordingError
-        If the recording lacks what is drawn.
+        If the recording lacks a channel that is drawn.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
@@ -66,7 +67,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
         "figure": tracking_figure,
     }
     if "joint_error" not in recording.groups["frames"]:
-        del drawings["figure"]  # there was none in the physics
+        del drawings["figure"]  # there was no physical figure
     for name, draw in drawings.items():
         with mpl.rc_context(STYLE):
             drawing = draw(recording)
@@ -76,7 +77,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
 
 
 def path_figure(recording: Recording) -> Figure:
-    """Path of the hand against curve and tube, seen along z and along y of the hand frame [mm]."""
+    """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
     drawn, path = courses(recording.arrays | recording.texts), 1e3 * _rows(recording, "ticks", "p")
     radius = 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
@@ -102,7 +103,7 @@ def path_figure(recording: Recording) -> Figure:
 
 
 def deviation_figure(recording: Recording) -> Figure:
-    """Distance of the hand from what leads it, pushes shaded, and again at a scale for a hand left alone [mm]."""
+    """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
     t = _rows(recording, "ticks", "t")
     distance, radius = 1e3 * _rows(recording, "ticks", "distance"), 1e3 * float(recording.array("tube_radius"))
     pushed = np.linalg.norm(_rows(recording, "ticks", "user"), axis=1) > PUSH
@@ -124,7 +125,7 @@ def deviation_figure(recording: Recording) -> Figure:
 
 
 def forces_figure(recording: Recording) -> Figure:
-    """What the field does to the hand, and what the hand does to the stylus, by component [N]."""
+    """Force of the field on the hand and force of the hand on the stylus, by component [N]."""
     t = _rows(recording, "ticks", "t")
     figure, axes = _panels(2, 1, height=4.2)
     for ax, name, title in zip(
@@ -141,7 +142,7 @@ def forces_figure(recording: Recording) -> Figure:
 
 
 def torques_figure(recording: Recording) -> Figure:
-    """Torques of the three motors against what they can give for long and for a moment [mN m]."""
+    """Torques of the three motors with their continuous and peak limits [mN m]."""
     t, torque = _rows(recording, "ticks", "t"), 1e3 * _rows(recording, "ticks", "torque")
     continuous = 1e3 * recording.array("motor_continuous")
     peak = 1e3 * recording.array("motor_peak")
@@ -150,7 +151,7 @@ def torques_figure(recording: Recording) -> Figure:
         ax.plot(t, torque[:, i], color=AXES[i])
         reach = 1.25 * max(float(np.max(np.abs(torque[:, i]))), float(continuous[i]))
         for name, limit, dashes in (("continuous", continuous[i], "--"), ("peak", peak[i], ":")):
-            # A limit far beyond what the motor gave would only make that small.
+            # A limit far above the torques is left out, as it would squeeze the curve.
             for line in (-limit, limit) if limit < reach else ():
                 ax.axhline(line, color=CURVE, lw=0.8, ls=dashes, label=name if line > 0.0 else None)
         title = f"motor {i + 1}: {continuous[i]:.0f} mN m for long, {peak[i]:.0f} mN m for a moment"
@@ -161,9 +162,9 @@ def torques_figure(recording: Recording) -> Figure:
 
 
 def tracking_figure(recording: Recording) -> Figure:
-    """How well the physical figure follows the animation, and what that takes; flights and falls shaded.
+    """Tracking errors of the physical figure, residual force and ground force; flights and falls shaded.
 
-    While it lies, or is set back onto the animation, there is nothing to tell of it.
+    Frames in which the figure lies, or is being set back onto the animation, are left out.
     """
     t, flight = _rows(recording, "frames", "t"), _rows(recording, "frames", "flight") > 0.5
     down = _rows(recording, "frames", "down") > 0.5
@@ -202,7 +203,7 @@ def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]
 
 
 def legend_above(ax: Axes) -> None:
-    """In a row above the axes, where it hides no data."""
+    """Put the legend in a row above the axes, where it hides no data."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
 
 
@@ -215,7 +216,7 @@ def _tube(recording: Recording) -> str:
 
 
 def _mark_changes(ax: Axes, recording: Recording) -> None:
-    """A line at every change of river, with the name of the new one, and where a bent curve begins to be performed."""
+    """Draw a line at every change of river, with the new river's name, and at the start of a performance."""
     marks = [(change.t, change.after) for change in river_changes(recording)]
     performance = (recording.summary or {}).get("performance")
     if isinstance(performance, dict):
@@ -223,7 +224,7 @@ def _mark_changes(ax: Axes, recording: Recording) -> None:
     low, high = ax.get_xlim()
     last, row = -np.inf, 0
     for t, name in marks:
-        # A name that the next line would run through is below the one before.
+        # Names of marks that are close in time are put on rows below each other.
         row = row + 1 if t - last < 0.1 * (high - low) else 0
         last = t
         ax.axvline(t, color=USER, lw=0.8)

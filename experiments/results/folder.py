@@ -1,4 +1,4 @@
-"""The folder of a run: what lies in it, and what a recording says of its configuration."""
+"""The folder of a run: its files, its lock, and the configuration, clips and world stored in its recording."""
 
 import errno
 import fcntl
@@ -26,7 +26,7 @@ EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
-    """Refuse a folder that cannot be written, or whose run may not be replaced."""
+    """Refuse a folder that cannot be written, is in use, or holds a run that may not be replaced."""
     if out.exists() and not out.is_dir():
         raise SimError(f"{out}: is a file; expected a folder to write the run into")
     if out.exists():
@@ -36,14 +36,14 @@ def check_folder(out: Path, overwrite: bool) -> None:
 
 
 def check_holds(out: Path, overwrite: bool) -> None:
-    """Refuse a folder whose run may not be replaced."""
+    """Refuse a folder that holds a run, unless it may be replaced."""
     if (out / RECORDING).exists() and not overwrite:
         raise SimError(f"{out}: holds a run; choose another --out, or --overwrite it")
 
 
 @contextmanager
 def claimed(out: Path) -> Generator[None]:
-    """Hold a folder, made when it is missing, for this process alone; a process that ends in any way lets go of it.
+    """Lock a folder, created if it is missing, for this process; the system releases the lock when the process ends.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def claimed(out: Path) -> Generator[None]:
         except BlockingIOError:
             raise SimError(f"{out}: another run is being written into it; expected another --out, or wait") from None
         except OSError as error:
-            if error.errno not in (errno.EBADF, errno.ENOLCK, errno.EOPNOTSUPP):  # of file systems without locks
+            if error.errno not in (errno.EBADF, errno.ENOLCK, errno.EOPNOTSUPP):  # raised by file systems without locks
                 raise
         yield
     finally:
@@ -66,7 +66,7 @@ def claimed(out: Path) -> Generator[None]:
 
 
 def clear_folder(out: Path) -> None:
-    """Make the folder, and remove what an earlier run left in it; other files stay."""
+    """Create the folder, and remove the files of an earlier run from it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
     for name in (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE):
         (out / name).unlink(missing_ok=True)
@@ -79,7 +79,7 @@ def config_of(recording: Recording) -> RunConfig:
     Raises
     ------
     SimError
-        If it is of another version of the program.
+        If it was recorded by an incompatible version of the program.
     """
     try:
         return from_dict(RunConfig, recording.config, "the recording's configuration")
@@ -88,19 +88,19 @@ def config_of(recording: Recording) -> RunConfig:
 
 
 def clips_of(recording: Recording) -> tuple[Clip, ...]:
-    """The clips of a recording, as they were on the figure."""
+    """The clips of a recording, as poses of the figure."""
     names = recording.texts["clip_names"].split("\n") if recording.texts["clip_names"] else []
     rates = recording.array("clip_fps")
     return tuple(Clip(recording.array(f"clip_{i}"), float(rates[i]), name) for i, name in enumerate(names))
 
 
 def world_of(recording: Recording) -> mujoco.MjModel:
-    """The model that a recording's configurations are of: with the figure if there was one."""
+    """The MuJoCo model to which the recorded qpos belongs: with the figure if there was one."""
     kind = cast(FigureKind, recording.texts["figure"])
     return World(scene_of(recording), kind).full_model()
 
 
 def scene_of(recording: Recording) -> SceneConfig:
-    """What the world of a recording was made of."""
+    """Configuration of the world of a recording: the figure's size and the rates."""
     stature, mass, servo_period, physics_step = (float(number) for number in recording.array("scene"))
     return SceneConfig(stature, mass, servo_period, physics_step)

@@ -1,4 +1,4 @@
-"""The page of a hardware run, from its recording: what got to the hand and why not, the twin, and the servo's times."""
+"""The page of a hardware run, from its recording: forces and the safety gate's states, twin, servo timing, link."""
 
 import base64
 import html
@@ -20,7 +20,7 @@ from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 
 SHADES = {State.ARMING: "#f1f1f4", State.RAMPING: "#e3ecf6", State.FAULT: "#f8dedb"}
-_WINDOW = 2.0  # [s] of motion in which the prediction can be told from the measurement
+_WINDOW = 2.0  # [s] of motion shown, short enough to tell the prediction from the measurement
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,"><title>{title}</title>
@@ -37,11 +37,11 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     Parameters
     ----------
     folder : Path
-        Of the run.
+        Folder of the run.
     recording : Recording
-        With the channels of `sim.hardware.gated_servo.CHANNELS` and the twin's.
+        Recording with the channels of `sim.hardware.gated_servo.CHANNELS` and those of the twin.
     lines : sequence of str
-        What happened, a sentence each.
+        What happened, one sentence per line.
     """
     (folder / FIGURES).mkdir(exist_ok=True)
     images: list[str] = []
@@ -57,7 +57,7 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
 
 
 def forces_figure(recording: Recording) -> Figure:
-    """Force that the field asks for, what the gate lets through, and distance from the curve; states shaded."""
+    """Force commanded by the field, force after the gate, and distance from the curve; states of the gate shaded."""
     t, asked, force = (_thinned(recording, name) for name in ("t", "asked", "force"))
     figure, (above, below) = _panels(2)
     above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="asked for by the field")
@@ -72,7 +72,7 @@ def forces_figure(recording: Recording) -> Figure:
 
 
 def twin_figure(recording: Recording) -> Figure:
-    """Measured and predicted motion, how far they are apart, and the force of the hand as the twin tells it."""
+    """Measured and predicted motion, the distance between them, and the hand's force as estimated by the twin."""
     last = recording.channel("ticks", "t")[-1]
     t = recording.channel("ticks", "t")[:]
     some = t > last - _WINDOW
@@ -92,7 +92,7 @@ def twin_figure(recording: Recording) -> Figure:
 
 
 def servo_figure(recording: Recording) -> Figure:
-    """How long a tick computed and how late it began: the share of ticks that took longer."""
+    """Complementary distribution of computing time and lateness of the ticks."""
     figure, (axes,) = _panels(1)
     for name, color, says in (("compute", FIELD, "computing"), ("lateness", AXES[1], "late")):
         values = np.sort(np.maximum(1e-6, recording.channel("ticks", name)[:]))
@@ -107,7 +107,7 @@ def servo_figure(recording: Recording) -> Figure:
 
 
 def link_figure(recording: Recording) -> Figure:
-    """How the device answered: round trip and staleness of its readings, and how many were lost or refused."""
+    """Quality of the link: round trip, staleness and jitter; readings lost and refused, deadlines missed."""
     figure, (times, counts) = _panels(2)
     t = _thinned(recording, "t")
     for name, color, says in (("round_trip", FIELD, "round trip"), ("staleness", AXES[1], "staleness"),
@@ -136,7 +136,7 @@ def _thinned(recording: Recording, name: str) -> Array:
 
 
 def _shade(axes: Axes, recording: Recording) -> None:
-    """Shade the states without full force, and mark where the device let go."""
+    """Shade the states of the gate without full force, and mark the faults."""
     t, state, fault = (recording.channel("ticks", name)[:] for name in ("t", "state", "fault"))
     edges = np.flatnonzero(np.concatenate(([True], np.diff(state) != 0.0, [True])))
     for first, after in itertools.pairwise(edges.tolist()):

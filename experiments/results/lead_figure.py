@@ -1,4 +1,4 @@
-"""The picture of a run in which a figure was led: the ways of hand and figure from above, its speed, the force."""
+"""The figure of a run in LEADING: paths of hand and humanoid from above, speed, and force over time."""
 
 from pathlib import Path
 
@@ -12,9 +12,9 @@ from experiments.results.figures import AXES, PALE_TUBE, PALE_USER, STYLE, legen
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
-POINTS = 3000  # drawn of a line
-BACK = (0, (4, 2.5))  # dashes of a way back
-SUPPORTS = ((2, PALE_TUBE, "on two feet"), (0, PALE_USER, "in flight"))  # on one foot it is white
+POINTS = 3000  # most points drawn of a line
+BACK = (0, (4, 2.5))  # line style of the way back
+SUPPORTS = ((2, PALE_TUBE, "on two feet"), (0, PALE_USER, "in flight"))  # single support stays white
 
 
 def draw_lead(recording: Recording, target: Path) -> None:
@@ -24,7 +24,7 @@ def draw_lead(recording: Recording, target: Path) -> None:
 
 
 def lead_figure(recording: Recording) -> Figure:
-    """From above: where the hand led, forth and back, and the figure's way; over time: speed, support and force."""
+    """Paths of the hand and the figure from above, forth and back; over time speed, feet in support, and force."""
     figure = Figure(figsize=(7.2, 7.0), layout="constrained")
     above, moving, feeling = figure.subplots(3, 1, height_ratios=(2.4, 1.0, 1.0))
     every = round(recording.rates["ticks"] / recording.rates["frames"])
@@ -46,7 +46,7 @@ def lead_figure(recording: Recording) -> Figure:
 
 
 def _draw_speed(ax: Axes, recording: Recording, t: Array, s: Array) -> None:
-    """How fast the figure goes along its path, negative on the way back, and on how many feet."""
+    """Speed of the figure along its path, negative on the way back, shaded by the number of feet in support."""
     feet, lap = recording.array("lead_support"), s / float(recording.array("lead_stride"))
     count = feet[(len(feet) * (lap - np.floor(lap))).astype(int) % len(feet)]
     for number, colour, name in SUPPORTS:
@@ -60,7 +60,7 @@ def _draw_speed(ax: Axes, recording: Recording, t: Array, s: Array) -> None:
 
 
 def _draw_ways(ax: Axes, recording: Recording, stride: int, turned: int) -> None:
-    """The hand on the floor and the animation's root, forth and back, and the physical figure's root."""
+    """Paths over the floor: the hand and the animation's root, forth and back, and the physical figure's root."""
     every, scale = round(recording.rates["ticks"] / recording.rates["frames"]), float(recording.array("lead_scale"))
     hand = scale * recording.channel("ticks", "p")[:][:: every * stride]
     shown = recording.channel("frames", "reference")[::stride]

@@ -1,4 +1,4 @@
-"""What happened in a run in which a figure was led, from its recording and the path in the field's memory."""
+"""Measures of a run in LEADING, from its recording and the walked path in the field's memory."""
 
 import math
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from sim.recording.recording import Recording
 IntArray = npt.NDArray[np.int64]
 
 BLOCK_FRAMES = 2000
-_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] that count as much, in looking for the place where it was
-_REMEMBERED = 6000  # places of the way forward, one for each centimetre
+_FAR, _TURNED = 0.01, math.radians(2.0)  # [m] and [rad] weighted equally in the search for the nearest earlier pose
+_REMEMBERED = 6000  # poses kept of the way forwards, one per centimetre of the path
 
 
 @dataclass(frozen=True)
@@ -28,19 +28,19 @@ class LeadSummary:
     Attributes
     ----------
     length_m : float
-        Of the path that it walked.
+        Length of the walked path.
     turn_deg_per_s : tuple of three float
-        Largest turn rates of the path while the figure went over it on no foot, on one and on two.
+        Largest turn rates of the path while the figure went along it on no foot, on one foot and on two.
     force_max : float
-        Largest force of the field in the plane [N].
+        Largest force of the field in the horizontal plane [N].
     slide_cm, physical_slide_cm : float
-        Largest way over the floor of a point of the animation's soles while it touched; and of the physical figure's
-        while it pressed on the floor, until it fell, if it did.
+        Foot skate: largest distance that a point of the animation's soles slid while in contact; the same for the
+        physical figure's soles, until its first fall.
     retrace_cm, retrace_deg : float or None
-        Backwards, how far the animation's root was from its way forwards at most, where it had been; None if it never
-        went back.
+        On the way back, largest distance and yaw difference of the animation's root from its path on the way forwards;
+        None if it never went back.
     physical_retrace_cm, physical_retrace_deg : float or None
-        Likewise the physical figure's, until it fell, if it did.
+        The same for the physical figure, until its first fall.
     """
 
     length_m: float
@@ -54,7 +54,7 @@ class LeadSummary:
     physical_retrace_deg: float | None
 
     def lines(self) -> list[str]:
-        """What happened, a sentence each."""
+        """Measures in words, one sentence per line."""
         none, one, two = self.turn_deg_per_s
         back = "The figure was not led back."
         if self.retrace_cm is not None:
@@ -76,7 +76,7 @@ class LeadSummary:
 def lead_summary(
     recording: Recording, field: Leading, memory: Array, scene: SceneConfig, fell_at: float | None
 ) -> LeadSummary:
-    """Measure a run whose field is `field` and ended with this memory, in memory that does not grow with it."""
+    """Measure a run in constant memory, given its field and the field's memory at the end of the run."""
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
@@ -107,14 +107,14 @@ def _largest(vectors: Array) -> float:
 
 
 def support_at(field: Leading, s: Array) -> IntArray:
-    """Feet that bear at arc lengths s [m], shape (n,)."""
+    """Number of feet in support at arc lengths s [m], shape (n,)."""
     lap = s / field.gait.stride
     counts = field.gait.support
     return counts[(len(counts) * (lap - np.floor(lap))).astype(int) % len(counts)]
 
 
 def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
-    """Largest turn rates [rad/s] of the path at places s [m] passed at speeds [m/s]: on no foot, one, two."""
+    """Largest turn rates [rad/s] of the path at arc lengths s [m] passed at speeds [m/s]: on no foot, one, two."""
     path = field.walker(memory).path
     rates = np.abs(speed * [path_value(path, float(place), PATH_HEADING)[1] for place in s])
     feet = support_at(field, s)
@@ -122,14 +122,14 @@ def turn_rates(field: Leading, memory: Array, s: Array, speed: Array) -> Array:
 
 
 class _Retrace:
-    """How far a figure that goes back is from the way on which it came."""
+    """Distance of a figure that is led back from the path on which it came."""
 
     def __init__(self) -> None:
         self._way = np.empty((0, 4))
         self._distance, self._turn = -1.0, 0.0
 
     def add(self, s: Array, poses: Array, farthest: float) -> None:
-        """Take a block of arc lengths and poses; `farthest` is the largest s before it."""
+        """Add a block of arc lengths [m] and poses; `farthest` is the largest arc length before the block."""
         if len(s) == 0:
             return
         front = np.maximum.accumulate(np.concatenate(([farthest], s)))
@@ -139,13 +139,13 @@ class _Retrace:
         new = (s > front[:-1]) & (np.floor(100.0 * s) > np.floor(100.0 * front[:-1]))
         self._way = np.concatenate([self._way, rows[new]])[-_REMEMBERED:]
         for place, ahead in zip(rows, front[1:], strict=True):
-            # Where the figure turns round its filter has not come up with it: the way there is not recorded yet.
+            # Near the turning point the filtered figure lags behind, and its way forwards is not yet recorded there.
             if ahead - place[0] > 0.1:
                 self._compare(place)
 
     def _compare(self, place: Array) -> None:
         near = self._way[np.abs(self._way[:, 0] - place[0]) < 0.3]
-        # Behind where it began there is no way forwards.
+        # Behind the start there is no way forwards to compare with.
         if len(near) < 2 or place[0] < self._way[0, 0]:
             return
         start, step = near[:-1], np.diff(near, axis=0)
@@ -154,12 +154,12 @@ class _Retrace:
         share = np.clip(((place[1:3] - start[:, 1:3]) * step[:, 1:3]).sum(axis=1) / length, 0.0, 1.0)
         apart = np.linalg.norm(start[:, 1:3] + share[:, None] * step[:, 1:3] - place[1:3], axis=1)
         turn = np.remainder(place[3] - start[:, 3] - share * step[:, 3] + np.pi, 2.0 * np.pi) - np.pi
-        # A pelvis that sways comes by one place more than once, or turns on the spot.
+        # A swaying pelvis passes a place more than once or turns on the spot, so position and yaw decide together.
         k = int(np.argmin(np.hypot(apart / _FAR, turn / _TURNED)))
         self._distance, self._turn = max(self._distance, float(apart[k])), max(self._turn, abs(float(turn[k])))
 
     def result(self) -> tuple[float | None, float | None]:
-        """Largest distance [cm] and turn [degrees]."""
+        """Largest distance [cm] and yaw difference [degrees]; None if the figure never went back."""
         if self._distance < 0.0:
             return None, None
         return 100.0 * self._distance, math.degrees(self._turn)

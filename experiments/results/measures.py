@@ -1,4 +1,4 @@
-"""A recording measured block by block, in memory that does not grow with the run."""
+"""Measures of a run, computed from its recording block by block in constant memory."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,14 +27,14 @@ from models.mocap.clip import pose_difference
 from sim.recording.recording import Recording
 
 Span = tuple[float, float]
-"""From and until when [s]."""
+"""Start and end of a span of time [s]."""
 
-SETTLING = 1.0  # [s] after which a relaxed hand has found the curve, and after which a pushed one is back on it
-HAND_AT_WORK = 1e-3  # [N] a hand that presses harder is pushing
-STANDS = 1e-3  # [m] within which a stylus stands still
-SOLES_RATE = 100.0  # [Hz] at which the animation's soles are looked at
-BLOCK_FRAMES = 2000  # of the figure, read at a time
-BLOCK_ROWS = 16_000  # of the ticks, likewise
+SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
+HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
+STANDS = 1e-3  # [m] of motion within which the stylus counts as standing still
+SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
+BLOCK_FRAMES = 2000  # frames of the figure that are read at a time
+BLOCK_ROWS = 16_000  # ticks that are read at a time
 _TICKS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAMES = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 
@@ -46,21 +46,21 @@ def summarise(
     warnings: dict[str, int],
     handled: Sequence[Span] = (),
 ) -> RunSummary:
-    """Measure a run, in memory that does not grow with it.
+    """Measure a run in constant memory.
 
     Parameters
     ----------
     recording : Recording
-        With the channels of `sim.loop.loop.groups`, and arrays ``curve_span`` (start and end of the phase),
-        ``curve_closed``, ``clip_seconds`` (of a lap at the clips' own pace, NaN where a lap plays none), ``scene``,
-        ``body_weight`` and ``com_height``.
+        Recording with the channels of `sim.loop.loop.groups`, and the arrays ``curve_span`` (first and last phase),
+        ``curve_closed``, ``clip_seconds`` (duration of a lap at the clips' own pace, NaN where a lap plays no clip),
+        ``scene``, ``body_weight`` and ``com_height``.
     default_poses : callable
-        Poses of the map on the curve as it was given, at nearest points (k, 3) of phases (k,) on rivers (k,); called
+        Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
         in order of time.
     speed, warnings
-        Taken over.
+        Copied into the summary.
     handled : sequence of Span
-        When the hand does something else than push: it grabs, traces, leads.
+        Times in which the hand does something other than pushing: it grabs, traces or leads.
     """
     path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
@@ -75,7 +75,7 @@ def measured(
 ) -> tuple[PathSummary, AnimationSummary | None, FigureSummary | None, TankSummary]:  # fmt: skip
     """Measure the part of a run between two times; the other arguments are those of `summarise`.
 
-    There is no animation without a figure, and no figure that is not in the physics.
+    The animation is None in a run without a figure, the figure None if it is not simulated physically.
     """
     path, animation, figure = (
         PathMeasure(recording, span[0], handled),
@@ -104,7 +104,7 @@ def measured(
 
 
 def trace_summary(recording: Recording) -> TraceSummary:
-    """Measure a hand that traces."""
+    """Measure a hand that traces the curve."""
     ticks, distance, force = recording.groups["ticks"], MeanSquare(), 0.0
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         rows = slice(first, first + BLOCK_ROWS)
@@ -114,7 +114,7 @@ def trace_summary(recording: Recording) -> TraceSummary:
 
 
 class PathMeasure:
-    """`PathSummary` of ticks that come in blocks, the first at `since` [s]; `handled` as for `summarise`."""
+    """`PathSummary` of ticks that are given in blocks, from the time `since` [s] on; `handled` as for `summarise`."""
 
     def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
         self._since, self._handled = since, tuple(handled)
@@ -130,7 +130,7 @@ class PathMeasure:
         self._pushing = False
 
     def add(self, ticks: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
-        """Take a block; returns at which ticks the hand pushes, or did so less than `SETTLING` ago."""
+        """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
         at_work = size > HAND_AT_WORK
         last = np.maximum.accumulate(np.where(at_work, t, self._released))
@@ -144,7 +144,7 @@ class PathMeasure:
         return pushed
 
     def _add_place(self, t: Array, p: Array) -> None:
-        """When the stylus was last more than `STANDS` from where it was."""
+        """Update the time at which the stylus last moved by more than `STANDS`."""
         k = 0
         while k < len(t):
             far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDS
@@ -192,7 +192,7 @@ class PathMeasure:
 
 
 def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
-    """One push that was seen in two blocks."""
+    """Join the two parts of a push that crosses the border of two blocks."""
     further = max(before, after, key=lambda push: push.deviation_mm)
     return PushSummary(
         before.start, after.start + after.seconds - before.start, max(before.peak_force, after.peak_force),
@@ -201,7 +201,7 @@ def _joined(before: PushSummary, after: PushSummary) -> PushSummary:
 
 
 class AnimationMeasure:
-    """`AnimationSummary` of frames that come in blocks, the first at `since` [s]."""
+    """`AnimationSummary` of frames that are given in blocks, from the time `since` [s] on."""
 
     def __init__(self, recording: Recording, since: float = 0.0) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
@@ -209,7 +209,7 @@ class AnimationMeasure:
         self._pushed, self._unpushed = 0.0, 0.0
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: npt.NDArray[np.bool_]) -> None:
-        """Take a block of frames, their poses at the curve, and at which the hand pushes."""
+        """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
         self._soles.add(frames["reference"][self._next :: self._stride])
         self._next = (self._next - len(default)) % self._stride
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)

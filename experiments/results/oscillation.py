@@ -1,14 +1,14 @@
-r"""Whether a run's loop was stable: where it shook, how fast that grew, and what moved at high frequency.
+r"""Measured stability of the loop in a run: when it oscillated, how fast that grew, and which motion there was.
 
-The detector of real devices finds a force that shakes. So does a stable loop whose damping makes rounded encoders felt:
-there the stylus does not move, its reading does. Which it was is told by the size of that fast motion x beside what
-rounding alone makes of a stylus at rest,
+The oscillation detector that guards real devices reports a shaking force. It also does so in a stable loop whose
+damping turns the quantisation of the encoders into a force: there the reading shakes but the stylus does not. The two
+are told apart by the size of the fast motion x relative to what quantisation alone gives for a stylus at rest,
 
 .. math:: r^2 = \max(\overline{x_\perp^2} / 2,\ \overline{x^2} / 3) / \sigma^2, \quad
    \sigma^2 = \mathrm{tr}(J\,\mathrm{diag}(\delta^2)\,J^\top) / 36
 
-x⊥ is the part across the curve, δ the encoders' steps, δ²/12 the variance of what is rounded to them. The reading has
-r = 1 of rounding alone and more than √2 where the stylus itself moves more than that.
+where x⊥ is the part of x across the curve, δ the encoder steps, and δ²/12 the variance of the quantisation error.
+Quantisation alone gives r = 1; r exceeds √2 where the stylus itself moves more than the quantisation error.
 """
 
 import math
@@ -22,39 +22,40 @@ from controllers.state import Array
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 
-_ROWS = 16_000  # of the recording, read at a time
-# At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; beyond the critical one it goes on.
-_SHAKEN = 0.25  # [s] of shaking without a break that is told
-_WINDOW = 0.02  # [s] of the envelope from which the growth is taken
-_CORNER = 40.0  # [Hz] above what a hand does, tremor (8 to 12 Hz) at a tenth
-_LASTING = 50  # windows of shaking in whose median a push, or a change of river, is not seen
-# The 1.5 in its middle, where J is diagonal; no place that a curve is at has 1.25 times as much.
+_ROWS = 16_000  # rows of the recording that are read at a time
+# At 0.85 of the critical gain a loop rings for up to 0.15 s at a time; above the critical gain it does not stop.
+_SHAKEN = 0.25  # [s] of uninterrupted shaking from which it is reported
+_WINDOW = 0.02  # [s] over which the envelope of the motion is averaged
+_CORNER = 40.0  # [Hz] above voluntary motion; tremor (8 to 12 Hz) is attenuated to a tenth
+_LASTING = 50  # windows of shaking in a running median: too many for a push or a change of river to affect it
+# σ of the Premium 1.5 in mid-workspace, where J is diagonal; along curves it is less than 1.25 times this.
 _ROUNDING = math.hypot(*np.multiply(PREMIUM_1_5.encoder_step, (PREMIUM_1_5.l1, PREMIUM_1_5.l1, PREMIUM_1_5.l2))) / 6.0
-_OWN = math.sqrt(2.0)  # r of a stylus that moves as much as its reading is rounded
+_OWN = math.sqrt(2.0)  # r of a stylus that moves as much as the quantisation error of its reading
 
 
 @dataclass(frozen=True)
 class OscillationSummary:
-    """Stability of a run as it was measured, by the detector that guards real devices.
+    """Measured stability of a run, by the oscillation detector that guards real devices.
 
     Attributes
     ----------
     since : float or None
-        When it began to shake for a quarter of a second or more [s]; None if it never did.
+        Start of the first shaking that lasted a quarter of a second or more [s]; None if there was none.
     share : float
-        Of the time in which it shook.
+        Share of the run's time in which the loop shook.
     frequency : float or None
-        Of the shaking, from the zeros of the fast force [Hz].
+        Frequency of the shaking, from the zero crossings of the high-passed force [Hz].
     force_rms, force_max : float
-        Force at the hand above the detector's corner, 15 Hz [N].
+        Force at the hand above the detector's corner frequency, 15 Hz [N].
     motion_rms_mm : float
-        Motion across the curve above 40 Hz.
+        RMS motion across the curve above 40 Hz.
     motion_over_rounding : float or None
-        r, in the second of shaking in which it is largest; None if it did not shake.
+        Largest r over a second of shaking; None if the loop did not shake.
     oscillates : bool
-        Whether the stylus shook, and not its rounded reading only.
+        Whether the stylus itself shook, and not only its quantised reading.
     growth : float or None
-        Fastest growth of that motion, over 60 ms up to the first second of shaking [1/s]; None if it did not shake.
+        Fastest growth rate of the motion across the curve over 60 ms, until a second after `since` [1/s]; None if the
+        loop did not shake.
     """
 
     since: float | None
@@ -68,7 +69,7 @@ class OscillationSummary:
     growth: float | None
 
     def lines(self) -> list[str]:
-        """What is to be said, if anything."""
+        """The finding in words; empty if the loop did not shake."""
         if self.since is None:
             return []
         at = "" if self.frequency is None else f" at {self.frequency:.0f} Hz"
@@ -86,7 +87,7 @@ class OscillationSummary:
 
 
 def oscillation_summary(recording: Recording) -> OscillationSummary:
-    """Measure a recording with the channels ``t``, ``force``, ``p`` and ``nearest`` of its ticks."""
+    """Measure a recording, from the channels ``t``, ``force``, ``p`` and ``nearest`` of its ticks."""
     ticks, period = recording.groups["ticks"], 1.0 / recording.rates["ticks"]
     detector, measure = OscillationDetector(period), _Fast(period)
     memory: list[float] = detector.fresh_memory().tolist()
@@ -98,7 +99,7 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
         p, nearest = ticks["p"][rows], ticks["nearest"][rows]
         measure.add(force, np.nan_to_num(p), np.nan_to_num(p - nearest), found)
         count += int(found.sum())
-        # How long it has shaken at each tick, what came before this block included.
+        # Number of ticks of uninterrupted shaking up to each tick, including the end of the previous block.
         at = np.arange(len(found))
         stopped = np.maximum.accumulate(np.where(found, -1 - unbroken, at))
         going = np.where(found, at - stopped, 0)
@@ -116,7 +117,7 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
 
 
 class _Size:
-    """Root mean square and largest size of vectors that come in blocks."""
+    """Root mean square and largest norm of vectors that are given in blocks."""
 
     def __init__(self) -> None:
         self._sum, self._count, self.largest = 0.0, 0, 0.0
@@ -132,10 +133,10 @@ class _Size:
 
 
 class _Fast:
-    """Force above the detector's corner, and motion above the hand's, in blocks."""
+    """Force above the detector's corner frequency, and motion above that of the hand, filtered block by block."""
 
     def __init__(self, period: float) -> None:
-        from scipy.signal import butter  # a run begins without it
+        from scipy.signal import butter  # imported late, as the start of a run does not need it
 
         self._period = period
         corners = (OscillationDetector(period).corner, _CORNER, _CORNER)
@@ -152,14 +153,14 @@ class _Fast:
 
         given = (force, place, away)
         if not self._states:
-            # A run begins with a force and a place, not with a step to them.
+            # The filters start settled on the first values, so that these are no step.
             self._states = [_settled(*pair) for pair in zip(self._sections, (v[0] for v in given), strict=True)]
         fast = list(given)
         for i, values in enumerate(given):
             fast[i], self._states[i] = sosfilt(self._sections[i], values, axis=0, zi=self._states[i])
         self.force.add(fast[0])
         self.motion.add(fast[2])
-        # Zeros of the component that moves most.
+        # Zero crossings of the force component with the most energy.
         axis = int(np.argmax(np.sum(fast[0] ** 2, axis=0)))
         changes = np.diff(np.signbit(fast[0][:, axis]), prepend=np.signbit(self._last[axis]))
         self._turns, self._shaken = self._turns + int(np.sum(changes & found)), self._shaken + int(found.sum())
@@ -170,7 +171,7 @@ class _Fast:
         self._moved.append(np.stack((total, across, found[:whole]), axis=1).reshape(-1, width, 3).mean(axis=1))
 
     def over_rounding(self) -> float:
-        """Largest r: the largest median over `_LASTING` windows of shaking that follow on each other."""
+        """Largest r: the largest median over `_LASTING` successive windows of shaking."""
         total, across, found = np.concatenate(self._moved).T
         ratio = np.sqrt(np.maximum(across / 2.0, total / 3.0))[found > 0.5] / _ROUNDING
         lasting = np.lib.stride_tricks.sliding_window_view(ratio, min(_LASTING, len(ratio)))
@@ -189,7 +190,7 @@ class _Fast:
 
 
 def _settled(sections: Array, value: Array) -> Array:
-    """State of the filter that has seen a constant for ever."""
+    """State of a filter that has settled on a constant input."""
     from scipy.signal import sosfilt_zi
 
     return sosfilt_zi(sections)[:, :, None] * value

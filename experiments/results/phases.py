@@ -1,4 +1,4 @@
-"""The two parts of a run on a curve that is bent: editing and performing, in numbers and in words."""
+"""Summaries of the two parts of a run on a curve that is bent: editing and performance."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,23 +10,22 @@ Doing = Literal["held", "pushed", "undo", "redo", "nothing"]
 
 @dataclass(frozen=True)
 class PressSummary:
-    """What the hand did between a press of the switch and letting go of it.
+    """What the hand did between pressing the switch and releasing it.
 
     Attributes
     ----------
     start, seconds : float
         [s]
     what : {"held", "pushed", "undo", "redo", "nothing"}
-        Whether the curve was held and dragged, or its tube was pushed from outside, or an edit was taken back or made
-        again by a click.
+        Whether the curve was held and dragged, its tube was pushed from outside, or a click undid or redid an edit.
     lap : float or None
-        Where along the curve, as a share of it: of the grabbed point φ(t_j), or the one that was pushed.
+        Phase of the grabbed point φ(t_j) or of the pushed point, as a share of the curve.
     dragged_mm : float
-        How far that point went during the press, to a tick's way.
+        Distance by which that point moved during the press, accurate to the motion of one tick.
     deviation_mm : float
-        How far it then was from where the curve has it that was given.
+        Distance of that point, at the end of the press, from the point of the same phase on the unedited curve.
     peak_force : float
-        Of the hand [N].
+        Largest force of the hand [N].
     """
 
     start: float
@@ -56,15 +55,15 @@ class EditingSummary:
     Attributes
     ----------
     seconds : float
-        How long [s]; it begins with the run.
+        Duration from the start of the run [s].
     until : float or None
-        When the curve was to be performed from [s], if it was.
+        Time from which the curve is to be performed [s]; None if it is not.
     presses : tuple of PressSummary
     pushes : tuple of PushSummary
-        Of a hand that does not reach for the curve, hold it or carry it.
-    animation : AnimationSummary
-        Against the animation of the curve that was given at the same phase.
-    figure : FigureSummary
+        Pushes, while the hand neither reaches for the curve nor holds or carries it.
+    animation : AnimationSummary or None
+        Difference from the animation at the same phase of the unedited curve.
+    figure : FigureSummary or None
     """
 
     seconds: float
@@ -104,10 +103,10 @@ class PerformanceSummary:
     start, seconds : float
         [s]
     path : PathSummary
-        Of the stylus against the bent curve.
-    animation : AnimationSummary
-        Against the animation of the curve that was given at the same phase.
-    figure : FigureSummary
+        How the stylus followed the bent curve.
+    animation : AnimationSummary or None
+        Difference from the animation at the same phase of the unedited curve.
+    figure : FigureSummary or None
     """
 
     start: float
@@ -133,10 +132,10 @@ class PerformanceSummary:
 
 
 def pushes_line(pushes: tuple[PushSummary, ...]) -> list[str]:
-    """What is said of pushes, if there were any."""
+    """The pushes in words; empty if there were none."""
     return [f"Pushes: {'; '.join(push.line() for push in pushes)}."] if pushes else []
 
 
 def _residual(figure: FigureSummary | None) -> str:
-    """What is said of the residual; falls are told of the whole run."""
+    """The residual in words; falls are reported once, for the whole run."""
     return "" if figure is None else f"; residual force {100 * figure.residual_force_rms:.1f} % of body weight RMS"

@@ -1,4 +1,4 @@
-"""Plots on a run's page that can be zoomed, with a line where the replay is; drawn by a script in the page."""
+"""Zoomable plots over time on a run's page, with a line at the time of the replay; drawn by a script in the page."""
 
 import html
 import json
@@ -12,11 +12,11 @@ from sim.body.falls import UP
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 
-POINTS = 1500  # of a line at most: of a longer run, each is the largest value of its share of the time
+POINTS = 1500  # most points of a line; in a longer run each point is the largest value of its interval
 
 
 class Line(NamedTuple):
-    """A line of a plot: its name, its colour and its values at equal steps of time."""
+    """A line of a plot: name, colour and values at equal time steps."""
 
     name: str
     color: str
@@ -32,7 +32,7 @@ class Plot(NamedTuple):
 
 
 def plots_html(recording: Recording) -> str:
-    """A section of a page with the plots of a recording; an empty text if it has none."""
+    """HTML section with the plots of a recording; empty if there is nothing to plot."""
     t = recording.channel("ticks", "t")
     plots = _plots(recording)
     if not plots:
@@ -52,7 +52,7 @@ def plots_html(recording: Recording) -> str:
         for plot in plots
     )
     script = files("experiments.results").joinpath("plots.js").read_text(encoding="utf-8")
-    # A text in a script must not end it.
+    # "</" is escaped, as "</script>" in a text would end the script.
     numbers = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return (
         f"{_STYLE}<h2>Over time</h2>{canvases}<p>Wheel or two fingers zoom, dragging moves, "
@@ -71,7 +71,7 @@ canvas.plot { width: 100%; height: 9rem; touch-action: pan-y; }
 
 
 def _plots(recording: Recording) -> list[Plot]:
-    """Distance, forces, and of a physical figure how well it follows."""
+    """Distance from the curve, forces, and residual and joint error of a physical figure."""
     ticks, frames = recording.groups["ticks"], recording.groups.get("frames", {})
     found: list[Plot] = []
     if "distance" in ticks:
@@ -89,7 +89,7 @@ def _plots(recording: Recording) -> list[Plot]:
         weight = float(recording.array("body_weight"))
         up = (
             frames["down"][:] == UP if "down" in frames else np.array(1.0)
-        )  # what sets a fallen figure back is no residual
+        )  # the wrench that sets a fallen figure back is no residual
         residual = 100.0 * _largest(up * np.linalg.norm(frames["residual"][:][:, :3], axis=1)) / weight
         error = np.rad2deg(_largest(frames["joint_error"][:]))
         found.append(Plot("residual force at the root", "% body weight", (Line("residual", CURVE, residual),)))
@@ -98,7 +98,7 @@ def _plots(recording: Recording) -> list[Plot]:
 
 
 def _largest(values: Array) -> Array:
-    """Values as they are, or of each of `POINTS` shares of a longer row the largest, so that no peak is lost."""
+    """Values unchanged, or if there are more than `POINTS`, the largest of each interval, so that no peak is lost."""
     if len(values) <= POINTS:
         return values
     return np.maximum.reduceat(values, np.linspace(0, len(values), POINTS, endpoint=False).astype(int))

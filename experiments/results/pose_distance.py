@@ -1,4 +1,4 @@
-r"""How far apart two animations are: as a distance in D = R³ × SO(3)^18, and as a person sees it."""
+r"""Distances between poses of two animations: geodesic in D = R³ × SO(3)^18, and in space as an observer sees it."""
 
 import mujoco
 import numpy as np
@@ -8,7 +8,7 @@ from models.humanoid.skeleton import BODIES, SEGMENTS
 from models.mocap import quaternions
 from models.mocap.clip import global_rotations, pose_difference
 
-METRE = 1.0  # [rad] that a metre of the root's way counts for, in the product's metric
+METRE = 1.0  # [rad/m] weight of the root's displacement in the product metric
 
 
 def geodesic_distance(poses: Array, others: Array) -> Array:
@@ -16,8 +16,8 @@ def geodesic_distance(poses: Array, others: Array) -> Array:
 
     .. math:: d(q, q')^2 = (x - x')^2 + \sum_{i=1}^{18} |\log(R_i^{-1} R_i')|^2
 
-    D = R³ × SO(3)^18 is the configuration space of the paper's figure (section 2.2): the root's place and rotation, and
-    17 joints. A product of metrics needs one length for an angle: a metre counts as a radian.
+    D = R³ × SO(3)^18 is the configuration space of the paper's figure (section 2.2): position and rotation of the root,
+    and 17 joints. A product metric needs a length for an angle: here a metre counts as a radian.
     """
     difference = pose_difference(poses, others)
     difference[:, :3] *= METRE
@@ -25,13 +25,13 @@ def geodesic_distance(poses: Array, others: Array) -> Array:
 
 
 def seen_distance(poses: Array, others: Array, figure: mujoco.MjModel) -> Array:
-    """Root mean square over the 18 segments of how far apart their origins are in space, (n, 75) → (n,) [m]."""
+    """RMS over the 18 segments of the distance between their origins in space, shapes (n, 75) → (n,) [m]."""
     apart = segment_places(poses, figure) - segment_places(others, figure)
     return np.sqrt(np.mean(np.sum(apart**2, axis=2), axis=1))
 
 
 def segment_places(poses: Array, figure: mujoco.MjModel) -> Array:
-    """Origins of the 18 segments in the world, (n, 75) → (n, 18, 3) [m]: MuJoCo's forward kinematics, all at once."""
+    """Origins of the 18 segments in W by vectorised forward kinematics, shapes (n, 75) → (n, 18, 3) [m]."""
     rotations = global_rotations(poses)
     places = np.empty((len(poses), len(SEGMENTS), 3))
     for index, segment in enumerate(SEGMENTS):

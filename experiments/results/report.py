@@ -1,4 +1,4 @@
-"""report.html: what a run did, in one file that opens from disk: its lines, its replay in 3D, its figures."""
+"""report.html, the page of a run in one self-contained file: summary in words, replay in 3D, plots and figures."""
 
 import html
 from collections.abc import Sequence
@@ -48,22 +48,22 @@ def write_report(
     path : Path
         HTML file to write.
     recording : Recording
-        What `replay_html` reads.
+        Recording with the channels that `replay_html` reads.
     model : mujoco.MjModel
         The world that was recorded.
     title : str
         Heading of the page.
     lines : sequence of str
-        What happened, a sentence each.
+        What happened, one sentence per line.
     figures : sequence of Path
-        PNG files, which are put into the page.
+        PNG files, which are embedded in the page.
     target : Target
-        What follows the animation.
+        The mechanism that follows the animation: the figure or the robot arm.
 
     Raises
     ------
     RecordingError
-        If the recording lacks what is drawn.
+        If the recording lacks a channel that is drawn.
     """
     t = recording.channel("ticks", "t")
     seconds = float(t[-1] - t[0])
@@ -88,7 +88,7 @@ def write_report(
 
 
 def _curves(recording: Recording, tube: str) -> str:
-    """The colours of the curve and of what is about it, or of each river; and where that is not all there is to it."""
+    """Legend of the replay: colours of the curve and its tube, or of each river, and a remark if the curve was bent."""
     name, drawn = recording.texts.get("tube_name", "tube"), courses(recording.arrays | recording.texts)
     if drawn[0].name:
         rivers = ", ".join(f'<b style="color:{course.line}">{html.escape(course.name)}</b>' for course in drawn)

@@ -1,4 +1,4 @@
-"""Figures and page of a run, drawn from its recording, also of a run that was cut short."""
+"""Figures and page of a run, drawn from its recording, also if the run was interrupted."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ from sim.recording.recording import Recording
 def write_report_of(folder: Path) -> None:
     """Draw the figures and the page of a run from its recording."""
     with Recording(folder / RECORDING) as recording:
-        if "frames" not in recording.groups:  # of a device: no figure was in the loop
+        if "frames" not in recording.groups:  # a hardware run, which has no figure in the loop
             write_hardware_report(folder, recording, lines_of(recording, folder))
             return
         figures = draw_figures(recording, folder / FIGURES)
@@ -32,10 +32,10 @@ def write_report_of(folder: Path) -> None:
 
 
 def lines_of(recording: Recording, folder: Path) -> list[str]:
-    """What happened in a run, in words: as its recording has it, or as was found of one that was stopped."""
+    """Summary of a run in words: from its recording, or else from summary.json, with a remark if it was interrupted."""
     if recording.summary is not None and "lines" in recording.summary:
         return [str(line) for line in cast(list[object], recording.summary["lines"])]
-    # Of a device the recorder knew the rows only: what happened lies in the folder.
+    # The recorder of a hardware run gets rows only; the summary is in the folder.
     whole = recording.summary is not None
     stopped = [] if whole else [f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."]
     try:

@@ -1,19 +1,19 @@
-"""Smoothness of a movement from its speed: spectral arc length, and log dimensionless jerk."""
+"""Smoothness of a movement from its speed: spectral arc length (SPARC) and log dimensionless jerk (LDLJ)."""
 
 import numpy as np
 
 from controllers.state import Array
 
-CUTOFF = 20.0  # [Hz] of the profile that is differentiated twice: above what a hand does, below what encoders add
-RATE = 100.0  # [Hz] at which it is taken
-_SETTLED = 2.0  # periods of the cutoff after which the filter has forgotten an end, to some 1e-4
+CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
+RATE = 100.0  # [Hz] at which the speed is sampled
+_SETTLED = 2.0  # periods of the cutoff after which the filter's response to an end has decayed, to some 1e-4
 
 
 def speed_profile(velocity: Array, rate: float) -> Array:
-    r"""Speed |v| of a sampled velocity (n, 3), low-passed without lag and taken at `RATE`.
+    r"""Speed |v| of a velocity (n, 3) sampled at `rate` [Hz], low-passed with zero phase and resampled at `RATE`.
 
-    A Butterworth filter of order 2 forwards and backwards, which lets through :math:`1/(1 + (f/f_c)^4)` of a
-    frequency; over its ends a velocity is continued by its reflection in them. A short one is left as it is.
+    The gain :math:`1/(1 + (f/f_c)^4)` is that of a second-order Butterworth filter run forwards and backwards. Beyond
+    its ends the velocity is continued by point reflection. One not longer than `_SETTLED` periods is not filtered.
     """
     margin = round(_SETTLED / CUTOFF * rate)
     smooth = velocity
@@ -40,11 +40,11 @@ def spectral_arc_length(
     Parameters
     ----------
     speed : Array
-        Shape (n,).
+        Speed samples, shape (n,).
     rate : float
-        [Hz]
+        Sampling rate [Hz].
     cutoff, threshold, padding
-        [Hz]; share of the largest; powers of two by which the spectrum is refined.
+        Highest frequency [Hz]; threshold as a share of the largest value; zero padding, in powers of two.
     """
     size = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
     spectrum, frequency = np.abs(np.fft.rfft(speed, size)), np.fft.rfftfreq(size, 1.0 / rate)
@@ -61,19 +61,19 @@ def spectral_arc_length(
 
 
 def log_dimensionless_jerk(speed: Array, rate: float) -> float:
-    r"""LDLJ: minus the logarithm of the mean square jerk without dimension; larger is smoother.
+    r"""LDLJ: minus the logarithm of the dimensionless integrated squared jerk; larger is smoother.
 
     .. math:: -\ln\left(\frac{T^3}{v_{peak}^2} \int_0^T \ddot v(t)^2\, dt\right)
 
     N. Hogan and D. Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and arrests",
-    *J. Motor Behavior* 41, 2009, of the speed as in Balasubramanian et al. 2015. NaN of a hand that rests.
+    *J. Motor Behavior* 41, 2009, computed from the speed as in Balasubramanian et al. 2015. NaN for a hand at rest.
 
     Parameters
     ----------
     speed : Array
-        Shape (n,), n ≥ 3.
+        Speed samples, shape (n,), n ≥ 3.
     rate : float
-        [Hz]
+        Sampling rate [Hz].
     """
     peak = float(np.max(speed))
     jerk = np.diff(speed, 2) * rate**2

@@ -1,4 +1,4 @@
-"""Soles over the floor, of poses that come in blocks: how low they reach, and how far they slide while they touch."""
+"""Foot skate and lowest height of the soles, measured from blocks of poses."""
 
 import mujoco
 import numpy as np
@@ -7,18 +7,18 @@ from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.scene import SceneConfig
 
-TOUCH = 0.003  # [m] a sole's point that is lower touches
+TOUCH = 0.003  # [m] height below which a point of a sole counts as in contact
 
 
 class Soles:
-    """Points of the soles of a figure; those lower than `touch` [m] touch.
+    """Contact points of the soles of a figure; a point lower than `touch` [m] counts as in contact.
 
     Attributes
     ----------
     slide : float
-        Largest distance over the floor of a point from where it began to touch [m].
+        Foot skate: largest horizontal distance of a point from where its contact began [m].
     lowest : float
-        Least height of a point [m]; infinite before the first pose.
+        Least height of a point above the floor [m]; infinite before the first pose.
     """
 
     def __init__(self, scene: SceneConfig, touch: float = TOUCH):
@@ -31,7 +31,7 @@ class Soles:
         self.slide, self.lowest = 0.0, float("inf")
 
     def add(self, poses: Array) -> None:
-        """Take poses (n, 75), in order of time."""
+        """Add poses, shape (n, 75), in order of time."""
         for pose in poses:
             self._data.qpos[:] = pose
             mujoco.mj_kinematics(self._model, self._data)

@@ -1,4 +1,4 @@
-"""The figure of a stretched run: the curve before and after, and where the stylus went."""
+"""The figure of a run in which the curve was bent: the curve before and after, and the path of the stylus."""
 
 from pathlib import Path
 
@@ -12,11 +12,11 @@ from experiments.results.figures import STYLE
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 
-POINTS = 2000  # drawn of a curve or a path
+POINTS = 2000  # most points drawn of a curve or a path
 
 
 def draw_stretch(recording: Recording, folder: Path, target: Path) -> None:
-    """Draw the figure of a stretched run, from its recording and the curve that `save_curve` wrote into its folder."""
+    """Draw the figure of a run, from its recording and the bent curve that `save_curve` wrote into its folder."""
     bent = load_curve(folder / CURVE_FILE)
     path = recording.channel("ticks", "p")
     thin = path[:: max(1, len(path) // POINTS)]
@@ -26,7 +26,7 @@ def draw_stretch(recording: Recording, folder: Path, target: Path) -> None:
 
 
 def stretch_figure(before: Array, after: Array, path: Array) -> Figure:
-    """The curve before and after, and where the stylus went, from above and from the right [mm].
+    """The curve before and after, and the path of the stylus, from above and from the right [mm].
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What happened while a curve was bent, press by press of the switch, from the recording; and how it was performed."""
+"""Measures of the editing of a curve, for each press of the switch, and of its performance, from the recording."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,9 +12,9 @@ from experiments.results.measures import Span, measured
 from experiments.results.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
 from sim.recording.recording import Channel, Recording
 
-_ROWS = 100_000  # of the recording, read at a time
+_ROWS = 100_000  # rows of the recording that are read at a time
 _CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
-_HELD = 1e-9  # [m] a held point is nearer to the stylus
+_HELD = 1e-9  # [m] distance from the stylus below which a point of the curve counts as held
 
 
 def editing_summary(
@@ -34,7 +34,7 @@ def performance_summary(
     recording: Recording, tubes: StretchyTubes, default_poses: Callable[[Array, Array, Array], Array],
     handled: tuple[Span, ...] = (),
 ) -> PerformanceSummary | None:  # fmt: skip
-    """Measure the part in which the curve is performed; None if the run ended before, or has none."""
+    """Measure the part in which the curve is performed; None if the run has no such part or ended before it."""
     last = float(recording.channel("ticks", "t")[-1])
     if last <= tubes.until:
         return None
@@ -45,18 +45,18 @@ def performance_summary(
 def press_summaries(
     recording: Recording, curve: Trajectory, epsilon: float, until: float = np.inf
 ) -> tuple[PressSummary, ...]:
-    """What was done at each press of the switch before a time [s], by the law's own rules.
+    """What was done at each press of the switch before the time `until`, by the same rules as the law's.
 
     Parameters
     ----------
     recording : Recording
-        With the channels t, p, switch, user, phase, nearest and distance in the group ``ticks``.
+        Recording with the channels t, p, switch, user, phase, nearest and distance in the group ``ticks``.
     curve : Trajectory
-        That was given.
+        The unedited curve.
     epsilon : float
         Radius of its tube [m].
     until : float
-        [s]
+        End of the editing [s].
     """
     ticks = recording.groups["ticks"]
     presses: list[PressSummary] = []
@@ -76,7 +76,7 @@ def press_summaries(
 
 
 def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]:
-    """First tick of every press, and the first after it."""
+    """First tick of every press, and the first tick after it."""
     edges: list[int] = []
     pressed = False
     for first in range(0, len(switch), _ROWS):
@@ -89,7 +89,7 @@ def _presses(switch: Channel, t: Channel, until: float) -> list[tuple[int, int]]
 
 
 def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: bool) -> PressSummary:
-    """One press, of rows of which the first is the tick before it, if there is one."""
+    """Summary of one press; if `before`, the first row is the tick before the press."""
     k = int(before)
     t, p, phase, nearest = ticks["t"][k:], ticks["p"][k:], ticks["phase"][k:], ticks["nearest"]
     seconds = float(2.0 * t[-1] - t[0] - ticks["t"][len(ticks["t"]) - 2]) if len(ticks["t"]) > 1 else 0.0
@@ -102,7 +102,7 @@ def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: b
     if what == "pushed":
         changes = np.flatnonzero(np.diff(phase))
         since = k + int(changes[-1]) if len(changes) else 0
-        # A tube that is pushed keeps its phase while its point moves; a probe that touches nothing is over φ itself.
+        # While a tube is pushed the phase stays and the point moves; if the point stays too, nothing was touched.
         if np.all(nearest[since + 1 :] == nearest[-1]):
             what = "nothing"
     if what not in ("held", "pushed"):
@@ -113,7 +113,7 @@ def _press(ticks: dict[str, Array], curve: Trajectory, epsilon: float, before: b
 
 
 def _what(p: Array, seconds: float, distance: float, epsilon: float) -> Doing:
-    """What a press may be that began at a distance [m] from the curve; a held point is at the stylus."""
+    """Kind of a press, from the stylus path, the duration [s] and the initial distance from the curve [m]."""
     if distance > epsilon:
         return "pushed"
     if np.linalg.norm(p - p[0], axis=1).max() < CLICK_DISTANCE:

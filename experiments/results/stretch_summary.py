@@ -1,4 +1,4 @@
-"""How a curve was bent in a run, from the field's memory."""
+"""Summary of how a curve was bent in a run, from the field's memory."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,11 @@ class StretchSummary:
     Attributes
     ----------
     edits : int
-        In force at the end.
+        Number of edits in force at the end, without those undone.
     largest_mm : float
-        Largest distance of a point of the bent curve from where it was.
+        Largest displacement of a point of the curve.
     changed : float
-        Share of the curve's phases at which it is not where it was.
+        Share of the curve's phases at which the curve is displaced.
     held_off_m : float
         Largest distance of a held point from the stylus.
     length_before_mm, length_after_mm : float
@@ -36,7 +36,7 @@ class StretchSummary:
     reach_mm: float
 
     def line(self) -> str:
-        """What happened, in a sentence."""
+        """Summary in a sentence."""
         if self.edits == 0:
             return "The curve was not bent."
         times = "once" if self.edits == 1 else f"{self.edits} times"
@@ -47,7 +47,7 @@ class StretchSummary:
 
 
 def stretch_summary(tubes: StretchyTubes, memory: Array) -> StretchSummary:
-    """Measure the bent curve in the memory of a run against the one before."""
+    """Compare the bent curve in the field's memory with the unedited curve."""
     bent, phases = tubes.edited(memory), np.linspace(tubes.curve.start, tubes.curve.end, 2001)
     moved = np.linalg.norm(bent.point(phases) - tubes.curve.point(phases), axis=1)
     return StretchSummary(

@@ -1,4 +1,4 @@
-"""What happened in a run, in numbers and in a few lines."""
+"""Summary of a run, as numbers and in words."""
 
 from dataclasses import dataclass
 
@@ -19,29 +19,28 @@ from experiments.results.summary_parts import (
 
 @dataclass(frozen=True)
 class RunSummary:
-    """All of it, as summary.json has it; `lines` says it in a few sentences.
+    """The whole summary of a run, as in summary.json; `lines` gives it in words.
 
     Attributes
     ----------
     path, animation, figure, tank, speed
-        Of the whole run.
-        No animation without a figure, and none of a figure that is not in the physics.
-    faults : tuple of str
-        Of the device, a sentence each.
+        Measures of the whole run. `animation` is None in a run without a figure, `figure` None without a physical one.
     warnings : dict of str to int
-        MuJoCo's, and how often.
+        Number of MuJoCo's warnings, by name.
+    faults : tuple of str
+        Faults of the device, a sentence each.
     stretch : StretchSummary or None
         How the curve was bent, in the modes that bend one.
-    editing, performance : EditingSummary, PerformanceSummary or None
-        In these modes, the part of the run in which it was bent, and the part in which it was performed.
     changes : tuple of RiverChange
-        Where rivers give the hand to one another.
+        Changes from one river to another.
     lead : LeadSummary or None
-        Where a figure was led.
+        How the figure was led, in LEADING.
+    editing, performance : EditingSummary, PerformanceSummary or None
+        In the modes that bend a curve, the part of the run in which it was bent, and that in which it was performed.
     trace : TraceSummary or None
-        Where the hand traced the curve by itself.
+        How the hand traced the curve by itself, if it did.
     oscillation : OscillationSummary or None
-        Stability of the loop as it was measured.
+        Measured stability of the loop.
     """
 
     path: PathSummary
@@ -60,7 +59,7 @@ class RunSummary:
     oscillation: OscillationSummary | None = None
 
     def lines(self) -> list[str]:
-        """What happened, a sentence each."""
+        """Summary in words, one sentence per line."""
         figure = self.figure
         warned = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
         bent = [] if self.stretch is None else [self.stretch.line()]
@@ -82,7 +81,7 @@ class RunSummary:
         ]
 
     def _of_the_hand(self) -> list[str]:
-        """How stylus and animation went: of a figure that was led, of a curve that was bent, or of neither."""
+        """Sentences on stylus and animation, by kind of run: LEADING, a bent curve, or any other."""
         if self.lead is not None:
             return self.lead.lines()
         if self.editing is not None:

@@ -1,11 +1,11 @@
-"""What is measured of a run: the stylus, the animation, the tank, the figure, the computer."""
+"""Parts of a run's summary: stylus, animation, energy tank, figure, computing speed."""
 
 from dataclasses import dataclass
 
 from sim.body.residual import Residual
 
-_TOLD = 5  # falls that are told one by one
-_TOLD_SECONDS = 0.01  # without ground force, of which figures are told
+_TOLD = 5  # falls that are listed one by one
+_TOLD_SECONDS = 0.01  # [s] without ground force from which its residual is reported
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class PushSummary:
     deviation_mm : float
         Largest distance from the curve during the push.
     along_push : float
-        Cosine between force and deviation where the deviation is largest: 1 if it followed the push.
+        Cosine between force and deviation where the deviation is largest: 1 if the stylus moved along the push.
     """
 
     start: float
@@ -37,24 +37,24 @@ class PushSummary:
 
 @dataclass(frozen=True)
 class PathSummary:
-    """How the stylus followed the curve, as it was bent if it was.
+    """How the stylus followed the curve; a bent curve as it is bent.
 
     Attributes
     ----------
     deviation_rms_mm, deviation_max_mm : float
-        Distance from the curve after the first second, while and soon after the hand does something left out; the RMS
-        is None if that leaves nothing.
+        Distance from the curve after the first second, without the times in which the hand exerts a force and the
+        second after them; the RMS is None if nothing is left.
     laps : float
-        Laps of a closed curve, or times its length.
+        Phase travelled over the duration of the curve: laps, if the curve is closed.
     lap_seconds : float or None
-        Mean time of a lap; None before the first.
+        Mean time of a lap; None if there was no whole lap.
     pushes : tuple of PushSummary
-        A hand that grabs, traces or leads does not push.
+        Pushes of the hand; grabbing, tracing and leading are none.
     stopped_at : float or None
-        From when on the stylus stood still within a millimetre until the end, if that was a second or more [s]: on an
-        open curve it stays at its end.
+        Time from which the stylus stood still within a millimetre until the end, if that was a second or more [s], as
+        it does at the end of an open curve.
     pace : float or None
-        At which the clips were played while it moved, as a share of their own; None where a lap plays none.
+        Pace at which the clips were played while the stylus moved, relative to their own; None if a lap plays no clip.
     """
 
     deviation_rms_mm: float | None
@@ -66,7 +66,7 @@ class PathSummary:
     pace: float | None = None
 
     def line(self) -> str | None:
-        """When it stopped, and at what pace it went, in a sentence, if there is anything to say."""
+        """When the stylus stopped and at what pace the clips were played, in words; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
         paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their own pace."
         return " ".join(part for part in (stopped, paced) if part) or None
@@ -84,13 +84,13 @@ class AnimationSummary:
     Attributes
     ----------
     pushed_deg, unpushed_deg : float
-        Largest difference of a joint's rotation between h(p) and h at the curve's nearest point, while the hand does
-        something (and until the stylus is back) and otherwise; the first second left out. Of a curve that is bent, h at
-        the same phase of the curve that was given.
+        Largest difference of a joint's rotation between h(p) and h at the curve's nearest point, while the hand exerts
+        a force and for a second after, and otherwise; the first second is left out. If the curve is bent, the
+        comparison is with h at the same phase of the unedited curve.
     lowest_sole_cm : float
-        Least height of a point of the soles over the floor.
+        Least height of a point of the soles above the floor.
     foot_skate_cm : float
-        Largest way over the floor of a point of the soles while it is within 3 mm of the floor.
+        Largest distance that a point of the soles slides while it is within 3 mm of the floor.
     """
 
     pushed_deg: float
@@ -99,14 +99,14 @@ class AnimationSummary:
     foot_skate_cm: float = 0.0
 
     def soles(self) -> str:
-        """Of its soles, in a sentence."""
+        """Height and skate of the soles, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
         return f"Its lowest sole is at {lowest:+.1f} cm, and its feet skate {self.foot_skate_cm:.1f} cm at most."
 
 
 @dataclass(frozen=True)
 class TraceSummary:
-    """A hand that traces the curve by itself.
+    """How a hand traced the curve by itself.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class TraceSummary:
     peak_force: float
 
     def line(self) -> str:
-        """What happened, in a sentence."""
+        """Summary in a sentence."""
         return (
             f"The hand traced the curve by itself, within {self.deviation_rms_mm:.2f} mm RMS and with up to "
             f"{self.peak_force:.1f} N."
@@ -129,14 +129,14 @@ class TraceSummary:
 
 @dataclass(frozen=True)
 class TankSummary:
-    """How much of its budget of energy the field needed.
+    """How much of its energy budget the field needed.
 
     Attributes
     ----------
     least_mj : float
-        Energy that the tank held at least [mJ].
+        Least energy in the tank [mJ].
     scaled_ticks : int
-        Ticks at which it let less than the whole force through.
+        Number of ticks at which the tank scaled the force down.
     """
 
     least_mj: float
@@ -150,28 +150,28 @@ class FigureSummary:
     Attributes
     ----------
     falls : tuple of float
-        When it fell [s].
+        Times of its falls [s].
     fell_at : float or None
-        The first of them.
+        Time of the first fall [s].
     seconds, up_seconds : float
-        How long it was looked at [s], and for how much of that it was up: neither lying after a fall nor being set back
-        onto the animation. What follows is of that time.
+        Time measured [s], and the part of it in which the figure was up: neither lying after a fall nor being set back
+        onto the animation. All measures below are over that part.
     joint_error_rms_deg, root_error_rms_cm, root_error_max_cm : float
     residual_force_rms : float
-        Of `stance`: residual force while the reference stands, as a share of body weight.
+        RMS residual force while the reference is in stance, as a share of body weight; that of `stance`.
     stance, flight, without_ground_force : Residual
-        Residual while a foot of the reference stands, while it flies, and while the ground does not bear the figure,
+        Residual while the reference is in stance, while it is in flight, and while there is no ground reaction force,
         whatever the reference does.
     residual_in_flight_max : float
-        Largest share in `flight`; zero by construction.
+        Largest residual in `flight`, force or moment; zero by construction.
     flight_seconds, lost_contact_seconds : float
-        For how long the reference flies [s], and for how long the ground bears nothing though a foot of it stands.
+        Time in which the reference is in flight [s], and time without ground reaction force though it is in stance.
     saturated : float
-        Share of the motors' time at their limit.
+        Mean share of the joint motors that are at their limit.
     grounded : float
-        Share of the time in which the reference stands that the ground bears the figure.
+        Share of the stance of the reference in which the ground bears the figure.
     ground_force_mean : float
-        Mean vertical ground force as a share of body weight.
+        Mean vertical ground reaction force as a share of body weight.
     """
 
     falls: tuple[float, ...]
@@ -193,7 +193,7 @@ class FigureSummary:
     ground_force_mean: float
 
     def fall_line(self) -> str | None:
-        """When it fell, and what its figures are of, in a sentence, if it did."""
+        """When the figure fell, and over which time it is measured, in a sentence; None if it did not fall."""
         if not self.falls:
             return None
         when = ", ".join(f"{at:.1f}" for at in self.falls[:_TOLD]) + (", …" if len(self.falls) > _TOLD else "")
@@ -204,7 +204,7 @@ class FigureSummary:
         )
 
     def lines(self) -> list[str]:
-        """How it followed, a sentence or two."""
+        """Tracking and residual in words, one sentence per line."""
         stance, lost = self.stance, self.without_ground_force
         airborne = f"In {lost.seconds:.2f} s without ground force the residual is {lost.brief()}."
         return [
@@ -218,7 +218,7 @@ class FigureSummary:
 
 @dataclass(frozen=True)
 class SpeedSummary:
-    """What the run cost: simulated over real time, seconds until the first tick, and peak memory [MB]."""
+    """Cost of the run: simulated over real time, time until the first tick [s], peak memory [MB]."""
 
     real_time_factor: float
     first_tick_seconds: float

@@ -1,4 +1,4 @@
-"""Figures of speed: each with what it has to keep to, whether it does, in words and as JSON."""
+"""Benchmark results: measured values with their bounds, printed in words or as JSON."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -16,9 +16,9 @@ class Figure:
         What was measured.
     value : float
     unit : str
-        Of what, such as ``mj_steps`` or ``×``.
+        Unit of the value, such as ``mj_steps`` or ``×``.
     at_most, at_least : float or None
-        What it has to keep to; neither of one that is only told.
+        Bounds that it must keep; None for both if it is only reported.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Figure:
 
     @property
     def passes(self) -> bool | None:
-        """Whether it keeps to that; None where it is only told. What is not a number passes nothing."""
+        """Whether the value keeps its bounds; None if it has none. NaN does not pass."""
         if self.at_most is None and self.at_least is None:
             return None
         return (self.at_most is None or self.value <= self.at_most) and (
@@ -46,7 +46,7 @@ class Figure:
 
 
 def tell(figures: Iterable[Figure], as_json: bool, check: bool) -> int:
-    """Print figures as they come, or all as JSON; returns the exit code, 1 if `check` and one fails."""
+    """Print figures as they are measured, or all as JSON; returns the exit code, 1 if `check` is set and one fails."""
     told: list[Figure] = []
     for figure in figures:
         told.append(figure)

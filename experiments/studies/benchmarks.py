@@ -1,4 +1,4 @@
-"""Speed, as ratios measured within one run: ``make bench``."""
+"""Benchmarks of speed, as ratios measured within one run: ``make bench``."""
 
 import json
 import statistics
@@ -51,18 +51,18 @@ IntArray = npt.NDArray[np.int64]
 
 ROUNDS = 7
 _START = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
-"""What a program of these libraries cannot do without before its first tick."""
+"""Imports that any program of these libraries needs before its first tick."""
 
 
 def bench(as_json: bool = False, check: bool = False) -> int:
-    """Measure all figures and tell them; see `experiments.studies.bench_figures.tell` for what is returned."""
+    """Measure and print all figures; see `experiments.studies.bench_figures.tell` for the arguments and the result."""
     return tell(figures(), as_json, check)
 
 
 def figures() -> Iterator[Figure]:
-    """Every figure with what it has to keep to, as it is measured; bounds are ratios within one run.
+    """Yield every figure with its bounds as it is measured; bounds are ratios within one run.
 
-    What is bounded in units of a step, `mj_steps`, is so many times a bare step of the demo's world on this machine.
+    The unit `mj_steps` is the time of a bare `mj_step` of the demo's world on this machine.
     """
     costs = {name: tick_cost(make()) for name, make in MODES.items()}
     step = costs["follow"].step
@@ -119,7 +119,7 @@ def figures() -> Iterator[Figure]:
 
 
 def libraries_seconds() -> float:
-    """Seconds that a new process takes to import the libraries that a run needs, the best of three."""
+    """Time in which a new process imports the libraries that a run needs, the best of three [s]."""
     times: list[float] = []
     for _ in range(3):
         begin = time.perf_counter()
@@ -129,7 +129,7 @@ def libraries_seconds() -> float:
 
 
 def thread_scaling(make: Callable[[], Session]) -> float:
-    """Throughput of two threads, a session each, over twice that of one."""
+    """Throughput of two threads with a session each, over twice that of one thread."""
     ratios: list[float] = []
     for _ in range(ROUNDS):
         alone, pair = prepared(make), [prepared(make) for _ in range(2)]
@@ -150,7 +150,7 @@ def thread_scaling(make: Callable[[], Session]) -> float:
 
 
 def second_start_seconds() -> float:
-    """Seconds from the start of a new process to its first tick, with the code already compiled by one before."""
+    """Time from the start of a new process to its first tick, with the code already compiled [s]."""
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(2):
             _seconds_of("run", "--seconds", "0.1", "--overwrite", "--out", folder)
@@ -159,14 +159,14 @@ def second_start_seconds() -> float:
 
 
 def certificate_seconds() -> tuple[float, float]:
-    """Seconds that new processes take to certify the demo's field, and to verify that."""
+    """Times in which new processes certify the demo's field, and verify the certificate [s]."""
     with tempfile.TemporaryDirectory() as folder:
         made = _seconds_of("certify", "--out", folder)
         return made, _seconds_of("certify", "--verify", str(Path(folder) / CERTIFICATE))
 
 
 def lifting_seconds() -> float:
-    """Seconds that a new process takes to lift ten clips of 10 s at 60 frames a second, and to report on the map."""
+    """Time in which a new process lifts ten clips of 10 s at 60 frames a second, and reports on the map [s]."""
     times = np.arange(601) / 60.0
     with tempfile.TemporaryDirectory() as folder:
         files = [Path(folder) / f"{k}.bvh" for k in range(10)]
@@ -193,7 +193,7 @@ def _closest_many(blob: Array, points: Array, phase: float) -> float:
 
 
 def closest_point_microseconds(pieces: int) -> float:
-    """Mean time of a closest-point query of a hand that moves along a knotted curve of so many pieces [µs]."""
+    """Mean time of a closest-point query for a hand that moves along a knotted curve of `pieces` pieces [µs]."""
     t = np.linspace(0.0, 1.0, pieces + 1)
     angle = 2.0 * np.pi * t
     points = np.stack(

@@ -1,8 +1,7 @@
-"""The experiment that could refute what is certified: random rivers whose loop is certified, let go in MuJoCo.
+"""Experiment that could refute stability certificates: hands released in MuJoCo in random rivers that are certified.
 
-Each river has a place, a curve, gains, a clock and an interval of hands of its own; from each, hands inside the
-interval are let go with offsets and velocities of their own. ``python -m experiments.studies.certified_trials`` draws
-1000.
+Place, curve, gains, clock and interval of hands of each river are random; in each river, random hands of the interval
+are released with random offsets and velocities. ``python -m experiments.studies.certified_trials`` draws 1000.
 """
 
 from pathlib import Path
@@ -22,17 +21,17 @@ from experiments.certify.trial_simulation import LAP, Conditions, Trial, draw_tr
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
 
-FORCE = 3.0  # [N] that the law asks for at most at the start: the motors give it anywhere, and the limiter too
-LAP_SECONDS = 4.0  # of the rivers; the hands are let go where the curve stands still
-LEFT = 0.2  # share of the slowest mode that is left at the end of a simulation, unless that takes too long
-LONGEST = 2000  # ticks
-COUNTS = 5e-5  # [m] by which readings of a hand at rest change: a count or two
+FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
+LAP_SECONDS = 4.0  # duration of a lap of the rivers; hands are released with the curve standing still
+LEFT = 0.2  # remaining share of the slowest mode at the end of a simulation, unless that takes too long
+LONGEST = 2000  # [ticks] longest simulation
+COUNTS = 5e-5  # [m] by which readings of a hand at rest change: one or two encoder counts
 ASSUMED = Conditions(16)
 EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 
 
 class Certified(NamedTuple):
-    """A certified river, its curve standing still, the intervals of its hands, and its largest spectral radius."""
+    """A certified river whose curve stands still, the intervals of its hands, and its largest spectral radius."""
 
     river: River
     still: Trajectory
@@ -41,9 +40,9 @@ class Certified(NamedTuple):
 
 
 class Let(NamedTuple):
-    """A hand that was let go: its largest distance from the curve in the first nine tenths of the time, and after [m].
+    """Largest distance of a released hand from the curve, in the first nine tenths of the time and after them [m].
 
-    Both are infinite if it went 5 cm away. Where encoders round, a hand that friction holds moves by `slack` [m].
+    Both are infinite if it went 5 cm away. With quantised encoders a hand held by friction moves by `slack` [m].
     """
 
     before: float
@@ -52,12 +51,12 @@ class Let(NamedTuple):
 
     @property
     def diverges(self) -> bool:
-        """Whether it ends farther from the curve than it ever was."""
+        """Whether the hand ends farther from the curve than it was before."""
         return not self.after < self.before + self.slack
 
 
 def draw_certified(rng: np.random.Generator) -> Certified:
-    """A random river that is certified with a random interval of hands, its k_r up to 0.9 of what is critical."""
+    """A random river that is certified with a random interval of hands, with k_r up to 0.9 of the critical one."""
     while True:
         trial = draw_trial(rng)
         k_r = float(rng.uniform(0.05, 0.9)) * predicted(trial)
@@ -68,14 +67,14 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
         try:
             verdict = stability(river, hands.hands())
-        except SimError:  # somewhere between the points that were looked at it is out of the workspace: another one
+        except SimError:  # the curve leaves the workspace between the points that were checked: draw another one
             continue
         if verdict.verdict == "certified":
             return Certified(river, trial.curve, hands, float(str(verdict.figures["radius_bound"])))
 
 
 def _about(number: float, rng: np.random.Generator) -> tuple[float, float]:
-    """An interval about a number, of up to a half of it to either side."""
+    """A random interval about a number, of up to half the number to either side."""
     return float(number * rng.uniform(0.5, 1.0)), float(number * rng.uniform(1.0, 1.5))
 
 
@@ -93,7 +92,7 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
         velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
         try:
             theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
-        except SimError:  # beyond a stop of the Phantom: another one
+        except SimError:  # beyond a joint stop of the Phantom: draw another state
             continue
         break
     rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
@@ -111,16 +110,16 @@ def let_go(drawn: Certified, conditions: Conditions, rng: np.random.Generator) -
 def certified_trials(
     out: Path = Path("runs/certified_trials"), rivers: int = 50, hands: int = 20, seed: int = 1
 ) -> None:
-    """Let hands go in certified rivers, inside the assumptions and with friction and rounding; write ``certified.md``.
+    """Release hands in certified rivers, under the assumptions and with friction and rounding; write ``certified.md``.
 
     Parameters
     ----------
     out : Path
         Folder.
     rivers, hands : int
-        How many rivers, and hands in each.
+        Number of rivers, and of hands in each.
     seed : int
-        Of what is drawn.
+        Seed of all random draws.
     """
     rng = np.random.default_rng(seed)
     found: dict[str, list[Let]] = {"inside the assumptions": [], "with Coulomb friction and rounding": []}

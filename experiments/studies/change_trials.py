@@ -1,9 +1,8 @@
-"""Changes of river and stops at random moments: how far feet slide, how high they fly, how much velocities leap.
+"""Changes of river and stops at random moments: foot skate, height of the soles, and jumps of velocities.
 
-``python -m experiments.studies.change_trials CLIP CLIP CLIP...`` lets rivers play embedded clips, and prints the
-worst of many
-changes from one to another, and of as many hands that are thrown off. It is the animation that is measured, update by
-update; a leap is what a velocity changes by from one to the next, 8 ms later.
+``python -m experiments.studies.change_trials CLIP CLIP CLIP...`` lets rivers play embedded clips, and prints the worst
+of many changes from one river to another, and of as many hands that are thrown off. The animation is measured at every
+update; a jump is the change of a velocity from one update to the next, 8 ms later.
 """
 
 import sys
@@ -25,24 +24,24 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
 
-PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] between updates, of a lap, and the least for a change
+PERIOD, LAP, BLEND = 8e-3, 3.4, 0.4  # [s] update period, duration of a lap, shortest change
 _TUBE = 0.015  # [m]
-_GLIDE, _AFTER = 0.3, 0.8  # [s] in which a hand goes over, and that is watched from the moment on
-_THROWN = np.array([0.1, 0.0, 0.1])  # [m] in as long
-_FIRST, _SPREAD = 1.2, 3.0  # [s] of the moments
+_GLIDE, _AFTER = 0.3, 0.8  # [s] duration of the hand's change, and time measured from its beginning on
+_THROWN = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
+_FIRST, _SPREAD = 1.2, 3.0  # [s] earliest moment, and range of the moments
 _COUNT, _SEED = 200, 11
 _SLID = 0.03  # [m]
 
 
 class Change(NamedTuple):
-    """What is worst in a change of river, or in a stop.
+    """Worst values in a change of river, or in a stop.
 
     Attributes
     ----------
     slide, height, depth : float
-        How far a point of a sole goes on the floor, how high the lowest one is, and how deep below the floor [m].
+        Foot skate of a point of a sole, height of the lowest point, and its depth below the floor [m].
     over, up, joint : float
-        Leaps of the root's velocity over the ground and up [m/s], and of a joint's [rad/s].
+        Jumps of the root's horizontal and vertical velocity [m/s], and of a joint's velocity [rad/s].
     """
 
     slide: float
@@ -54,7 +53,7 @@ class Change(NamedTuple):
 
 
 def measured_change(poses: Array, period: float = PERIOD) -> Change:
-    """Measure a change in its poses, one each period [s], shape (n, 75)."""
+    """Measure a change from its poses, shape (n, 75), one per period [s]."""
     points = soles(poses)
     leaps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / period, axis=0))
     return Change(
@@ -76,7 +75,7 @@ def rivers_that_play(names: tuple[str, ...]) -> RiverClips:
 
 
 def played_change(rivers: RiverClips, first: int, second: int | None, moment: float, period: float = PERIOD) -> Array:
-    """Poses from the moment [s] at which a hand on one river is had by another, or by none and is thrown off."""
+    """Poses from the moment [s] at which the hand changes to the second river, or, if it is None, is thrown off."""
     figure = figure_model()
     t = np.arange(round((moment + _AFTER) / period)) * period
     s = np.clip((t - moment) / _GLIDE + (0.0 if second is None else 0.5), 0.0, 1.0)[:, None]
@@ -85,7 +84,7 @@ def played_change(rivers: RiverClips, first: int, second: int | None, moment: fl
     away = _THROWN if second is None else rivers.curves[second].point(t % LAP) - there
     traces = np.zeros((len(t), TRACE_SIZE))
     traces[:, TRACE_PHASE] = t % LAP
-    # A run that begins on another river than the first goes over at once, long before the moment.
+    # A run that does not begin on the first river changes to its own at once, long before the moment.
     traces[:, TRACE_RIVER] = np.where(t < moment, first, -1.0 if second is None else second)
     reference = make_reference(figure, rivers.compiled(), period, 6.0, BLEND, packed_legs(figure))
     poses = np.empty((len(t), figure.nq))
@@ -94,7 +93,7 @@ def played_change(rivers: RiverClips, first: int, second: int | None, moment: fl
 
 
 def drawn_changes(rivers: RiverClips, count: int, rng: np.random.Generator, stops: bool) -> list[Change]:
-    """Measure changes, or stops, between rivers and at moments drawn by lot."""
+    """Measure changes, or stops, between random rivers and at random moments."""
     changes = []
     for _ in range(count):
         first, second = rng.permutation(len(rivers.curves))[:2]

@@ -1,4 +1,4 @@
-"""Hands at crossings of two rivers, on the simulated Phantom: who stays, who changes over, who is thrown out.
+"""Hands at crossings of two rivers, on the simulated Phantom: which stay, which change over, which are thrown out.
 
 ``python -m experiments.studies.crossings`` prints the table of `docs/validation/crossing-rivers.md`.
 """
@@ -45,21 +45,21 @@ CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
 
 GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]
 HARDER = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
-BEFORE = (-0.1, 0.0, 0.1)  # [s] before the crossing, when a push begins
-LASTING = (0.2, 0.4)  # [s]
+BEFORE = (-0.1, 0.0, 0.1)  # [s] by which a push begins before the crossing
+LASTING = (0.2, 0.4)  # [s] duration of a push
 
 
 class Passage(NamedTuple):
-    """A hand's way through a crossing, tick by tick.
+    """A hand's passage through a crossing, tick by tick.
 
     Attributes
     ----------
     p : Array
-        Where it was in H [m], shape (n, 3).
+        Position in H [m], shape (n, 3).
     force : Array
-        Of the field, limited [N], shape (n, 3).
+        Limited force of the field [N], shape (n, 3).
     river : Array
-        Which river had it, −1 for none, shape (n,).
+        River that has the hand, −1 for none, shape (n,).
     """
 
     p: Array
@@ -84,18 +84,18 @@ def _pass(
 
 
 def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...] = ()) -> Passage:
-    """Let the simulated Phantom, in the hand of a relaxed user who pushes, go in a field from rest.
+    """Release the simulated Phantom from rest in a field, in the hand of a relaxed user who pushes.
 
     Parameters
     ----------
     program : Program
         The field.
     start : array_like, shape (3,)
-        In H [m].
+        Start position in H [m].
     seconds : float
-        How long [s].
+        Simulated time [s].
     pushes : tuple of Push
-        What the hand does.
+        Pushes of the hand.
     """
     scene = SceneConfig()
     substeps = scene.substeps()
@@ -133,7 +133,7 @@ def crossing_field(second: River, form: Form, alone: bool = False) -> Program:
 
 
 def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
-    """Through the origin along x, pushed in the plane across the first river, towards the second, on the way."""
+    """Passage through the origin along x, with a push in the plane across the first river, towards the second."""
     pushes = (Push(0.0, PUSH_SECONDS, newtons, (0.0, 1.0, 0.0), (-0.0075, 0.0, 0.0), 0.004),) if newtons else ()
     return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), SECONDS, pushes)
 
@@ -160,9 +160,9 @@ def crossing_passages() -> str:
 
 
 def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
-    """How many hands on the level river go over into another one, and are thrown out, and how many there are.
+    """Numbers of hands on the level river that change to another one, that are thrown out, and of all hands.
 
-    They are pushed up where the wave rises through it, or down where it falls.
+    They are pushed up where the wave rises through the level river, or down where it falls.
     """
     curve = Trajectory.circle(Circle().radius, Circle().lap)
     program, changed, out = law_of(mode, default_choice(mode, curve, Cylindrical().reach)).program(), 0, 0

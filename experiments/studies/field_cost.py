@@ -1,4 +1,4 @@
-"""What a tick of the heaviest field costs: ten rivers that all come near."""
+"""Cost of a tick of the heaviest field: ten rivers that are all near the hand."""
 
 import time
 
@@ -26,7 +26,7 @@ def _ticks(compiled: Compiled, memory: Array, limits: Array, limiter: Array, han
 
 
 def heaviest_field() -> tuple[Program, Array]:
-    """Ten rivers that all come near, smooth, of higher order, limited; and a lap of hands that feel them."""
+    """A limited smooth field of higher order of ten rivers that are all near; and a lap of hands in it."""
     lap = Trajectory.circle(0.05, 4.0)
     times = np.linspace(0.0, 4.0, 129)
     angle = 0.5 * np.pi * times

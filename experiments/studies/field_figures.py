@@ -36,20 +36,20 @@ _STYLE: dict[Any, Any] = {
 
 
 class Crossing(NamedTuple):
-    """Force of river 2 on a hand that follows river 1, where they cross, and on its way through.
+    """Force of river 2 on a hand that follows river 1, at their crossing and while it passes.
 
     Attributes
     ----------
     angle : float
-        Between the rivers [degrees].
+        Angle between the rivers [degrees].
     both : float
-        In the static sum [N].
+        Force in the static sum [N].
     smooth, discrete : float
-        In the fields of higher order; in the discrete one river 1 has the hand [N].
+        Force in the fields of higher order; in the discrete one river 1 has the hand [N].
     alone : float
-        In the discrete field without river 1: whether river 2 takes a hand that moves like this [N].
+        Force in the discrete field without river 1: whether river 2 takes a hand that moves like this [N].
     both_passing, smooth_passing, discrete_passing : float
-        The greatest on the way from 30 mm before the crossing to 30 mm behind it [N].
+        Largest force from 30 mm before the crossing to 30 mm behind it [N].
     """
 
     angle: float
@@ -76,7 +76,7 @@ def crossing(degrees: float) -> Crossing:
     scale = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
     smooth = HigherOrder(pair, ADMISSION * SPEED, SIGMA["smooth"] * SPEED)
     discrete = HigherOrder(pair, *scale, "discrete")
-    # River 1 gives no force to a hand on it at its own speed: all that is felt comes from river 2.
+    # River 1 exerts no force on a hand that follows it at its own speed: all force comes from river 2.
     way = np.linspace(-0.03, 0.03, 121)
     alone = _felt(HigherOrder(second, *scale, "discrete"), np.zeros(1))
     a, b, c = (_felt(field, way) for field in (pair, smooth, discrete))
@@ -111,7 +111,7 @@ def crossing_table() -> str:
 
 
 def _newtons(force: float) -> str:
-    # A force that rounding leaves of nothing is shown as nothing.
+    # A force that is only rounding error is shown as zero.
     return f"{force:.4f}" if force >= 5e-5 else (f"{force:.0e}" if force > 1e-12 else "0")
 
 
@@ -158,7 +158,7 @@ def force_figure(field: Law, curves: list[Trajectory], epsilon: float, t: float)
     forces = np.array([field.wrench(HandState.at([a, b, 0.0], t=t)).force for a, b in zip(x.flat, y.flat, strict=True)])
     size = np.linalg.norm(forces, axis=1)
     felt = size > 1e-3 * size.max()
-    # Lengths as roots, or the weak ones could not be seen.
+    # Arrow lengths are square roots of the forces, so that weak ones can be seen.
     arrows = forces / np.sqrt(np.maximum(size, 1e-12))[:, None]
     ax.quiver(1e3 * x.ravel()[felt], 1e3 * y.ravel()[felt], arrows[felt, 0], arrows[felt, 1], color=FIELD, width=0.003)
     ax.set_title(f"force on a hand at rest, up to {size.max():.1f} N", loc="left", fontsize=9)

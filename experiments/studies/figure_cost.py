@@ -1,4 +1,4 @@
-"""What a tick costs with the figure in the physics, only shown, and without one, beside a bare `mj_step`."""
+"""Cost of a tick with a physical figure, a kinematic one and none, relative to a bare `mj_step`."""
 
 import time
 from typing import NamedTuple, get_args
@@ -25,7 +25,7 @@ class FigureCost(NamedTuple):
 
 
 def figure_cost() -> FigureCost:
-    """Measure the kinds in turn, the best of some blocks after a first one."""
+    """Measure the kinds in turn; each is the best of several blocks after a warm-up block."""
     sessions = {kind: wire(run_config(figure=kind)) for kind in get_args(FigureKind)}
     logs = {kind: make_logs(session.servo, _TICKS) for kind, session in sessions.items()}
     model, cost = sessions["none"].world.model, dict.fromkeys((*sessions, "bare_step"), np.inf)

@@ -1,8 +1,8 @@
-"""The experiment that could refute LEADING's certificate: where its springs make the linkage in MuJoCo unstable.
+"""Experiment that could refute LEADING's certificate: at which gain its springs make the linkage in MuJoCo unstable.
 
-Each trial stands in one regime of the force, with a figure that hardly accelerates, so that the walker is frozen; a
-hand holds on with a constant force where the regime asks for one. ``python -m experiments.studies.leading_trials``
-writes the table of the docs.
+Each trial is in one regime of the force, with a figure that hardly accelerates, so that the walker is frozen; the hand
+exerts a constant force where the regime needs one. ``python -m experiments.studies.leading_trials`` writes the table of
+the docs.
 """
 
 from collections.abc import Mapping
@@ -28,20 +28,20 @@ from experiments.setups.lead import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.arm import Arm
 
-SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials: so that what the walker moves is nothing
-EXCESS = 1e-4  # [m] of the stylus on the side of an edge where the spring acts
-_SOFT = 1e-4  # [N/m] of an arm so soft, and so far away, that its force is constant
+SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials, with which the walker's motion is negligible
+EXCESS = 1e-4  # [m] distance of the stylus from the edge, on the side where the spring acts
+_SOFT = 1e-4  # [N/m] stiffness of an arm so soft, with a target so far away, that its force is constant
 _GAIT = Gait(1.4, 1.25, np.array([2, 2]), 0.45)
 
 
 @dataclass(frozen=True)
 class LeadingTrial(Trial):
-    """A trial of LEADING: its stiffness is k_l, and k_z is in proportion.
+    """A trial of LEADING, whose stiffness is k_l with k_z in proportion.
 
     Attributes
     ----------
     regime : Regime
-        Which springs act.
+        The springs that act.
     """
 
     regime: Regime
@@ -58,13 +58,13 @@ class LeadingTrial(Trial):
         return self.field(k_r).program()
 
     def user(self, k_r: float) -> Arm:
-        """A hand that answers the field's force with one that is constant."""
+        """A hand that balances the field's force with a constant force."""
         place = self.curve.point(self.phase)
         force = -np.asarray(self.field(k_r).wrench(HandState.at(place)).force)
         return Arm(_SOFT, self.hand.damping, (place + force / _SOFT)[None])
 
     def field(self, k_l: float) -> Leading:
-        """The executed law, its figure so that the trial's place lies in the regime."""
+        """The executed law, with the figure placed such that the trial's position lies in the regime."""
         c, s = (float(x) for x in self.regime.tangent(self.curve.velocity(self.phase)))
         plain = Leading(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=RATE)
         lead = 2.0 * _GAIT.speed / plain.rate

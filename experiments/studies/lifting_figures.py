@@ -1,4 +1,4 @@
-"""The lifted map beside a hand-made one: ``python -m experiments.studies.lifting_figures docs/pictures``."""
+"""Comparison of a lifted map with a hand-made one: ``python -m experiments.studies.lifting_figures docs/pictures``."""
 
 import sys
 from pathlib import Path
@@ -21,7 +21,7 @@ _COLOURS = (CURVE, FIELD, USER, TUBE)
 
 
 def cylinder(lifted: LiftedClips, room: Room) -> Layout:
-    """The same four clips at the corners of the same rectangle, in the order in which they were given."""
+    """Hand-made layout: the same four clips at the corners of the same rectangle, in the given order."""
     motions = [(clip.poses, clip.fps) for clip in lifted.clips]
     haptic_map = Cylindrical(motions, room.r_range, room.z_range, figure_legs(figure_model()))
     corners = np.array([(r, z) for z in room.z_range for r in room.r_range])
@@ -31,7 +31,7 @@ def cylinder(lifted: LiftedClips, room: Room) -> Layout:
 
 
 def comparison_table(lifted: MapQuality, hand_made: MapQuality) -> str:
-    """What both maps are like, as Markdown."""
+    """Table of the quality of both maps, as Markdown."""
     rows = [
         ("least distance of two curves [mm]", *(f"{1e3 * q.separation:.1f}" for q in (hand_made, lifted))),
         *_spreads("condition number of h_* along the curves", hand_made.conditioning, lifted.conditioning, 1.0),
@@ -72,7 +72,7 @@ def curves_figure(lifted: LiftedClips, hand_made: Layout) -> Figure:
     for meeting in lifted.lifting.after.meetings:
         i, j = meeting.transition.first, meeting.transition.second
         apart = 1e3 * np.linalg.norm(layout.sites[:, i] - layout.sites[:, j], axis=1)
-        # Of two curves: a line of the one's colour, dashed with the other's.
+        # For each pair of curves: a line in the colour of one, dashed with the colour of the other.
         lap.plot(angle, apart, color=_COLOURS[i], lw=2.2)
         lap.plot(angle, apart, color=_COLOURS[j], lw=2.2, ls=(0, (4, 4)))
         lap.plot(

@@ -1,4 +1,7 @@
-"""The stylus turned, and what the figure does: ``python -m experiments.studies.orientation_figures docs/pictures``."""
+"""Pictures of gaze and lean by turning the stylus: ``python -m experiments.studies.orientation_figures docs/pictures``.
+
+A run with turns of the stylus is made, and the response of the figure is drawn from its recording.
+"""
 
 import sys
 import tempfile
@@ -30,19 +33,19 @@ CONFIG = run_config(
     clips=("cheer",), expressive=True, user="turn", seconds=16.0, orientation_stiffness=0.05, orientation_damping=5e-4
 )
 BASE_COLOUR, PHYSICAL_COLOUR = "#a8adb8", "#23272f"
-SIZE = (300, 420)  # of one picture of the figure
-DISTANCE, AZIMUTH, ELEVATION = 3.0, 205.0, -8.0  # of the camera, from ahead of the figure [m], [deg], [deg]
+SIZE = (300, 420)  # of one picture of the figure [pixels]
+DISTANCE, AZIMUTH, ELEVATION = 3.0, 205.0, -8.0  # camera in front of the figure [m], [deg], [deg]
 
 
 class Bearing(NamedTuple):
-    """How the figure holds its upper body, seen from its pelvis [rad], shape (n,) each.
+    """Orientation of the figure's upper body relative to its pelvis [rad], shape (n,) each.
 
     Attributes
     ----------
     yaw, pitch : Array
-        Of the gaze, the head's x axis: to the left, and down.
+        Angles of the gaze, the head's x axis: to the left, and down.
     lean : Array
-        Of the chest, over to the right.
+        Lean of the chest to the right.
     """
 
     yaw: Array
@@ -83,13 +86,13 @@ def turning_figure(recording: Recording) -> Figure:
     axes[0].set(title="turn of the stylus, measured [°]")
     axes[4].set(title="moment of the field, recorded and not given [mN m]", xlabel="time [s]")
     for ax in axes:
-        # In the row of the title, where no curve is.
+        # In the row of the title, where it covers no curve.
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3)
     return figure
 
 
 def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
-    """The physical figure as the stylus is upright, and at the end of each of its turns, one beside the other."""
+    """Pictures of the physical figure side by side: with the stylus upright, and in each of its turns."""
     config = config_of(recording)
     lap = recording.array("curve_span")[1]
     moments = [0.95 * lap, *(lap * (1.25 + 0.5 * k) for k in range(6))]
@@ -116,7 +119,7 @@ def _figure_poses(recording: Recording) -> Array:
 
 
 def _base_poses(recording: Recording) -> Array:
-    """The animation at the same places of the stylus, held upright."""
+    """Poses of the animation at the same positions of the stylus with the stylus upright."""
     config = config_of(recording)
     kind, params, memory = wire(config, clips_of(recording)).haptic_map.compiled()
     points = recording.channel("ticks", "p")[:: config.figure.figure_ticks]

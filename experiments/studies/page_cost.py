@@ -1,4 +1,4 @@
-"""What a picture of the live page costs its process: poses and arrows of a moment, made into messages."""
+"""Cost of a picture of the live page for its process: poses and arrows of a moment, turned into messages."""
 
 import contextlib
 import io
@@ -18,7 +18,7 @@ PICTURES, WARM = 200, 20
 
 
 def picture_microseconds(session: Session) -> float:
-    """Processor time of a picture in which every body has moved [µs]; nobody watches."""
+    """Processor time of a picture in which every body has moved [µs], without connected browsers."""
     model, data = session.world.full_model(), session.world.data
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)

@@ -1,7 +1,7 @@
-"""What preparation makes of captures: each is prepared, and the physical figure follows it before and after.
+"""Effect of preparation on captures: each is prepared, and the physical figure follows it before and after.
 
 ``python -m experiments.studies.prepared_captures FILE...`` prints the table of `docs/validation/prepared-captures.md`,
-a row a file as it is done.
+a row per file as it is completed.
 """
 
 import sys
@@ -15,7 +15,7 @@ from models.mocap.library import embedded
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
-SECONDS = 20.0  # followed
+SECONDS = 20.0  # [s] for which the figure follows each clip
 HEAD = (
     "| file | part, pace | residual before % | after % | if not: | motion lacks % | soles in stance mm | tilt ° "
     "| skate mm | stand out | ends rad/s | flights m/s² | joints beyond ° | joints, root moved RMS | most "
@@ -58,7 +58,7 @@ def _soles(measures: WellFormed) -> str:
 def main(paths: list[str]) -> None:
     """Print the table."""
     print(HEAD)
-    followed(embedded("walk"), SECONDS)  # what is compiled once costs no clip anything
+    followed(embedded("walk"), SECONDS)  # compiles the units first, so that no clip's time includes that
     for path in map(Path, paths):
         name = f"{path.parent.name}/{path.name}"
         try:

@@ -48,16 +48,16 @@ JUDGING = (
     "deepmimic/humanoid3d_kick.txt", "deepmimic/humanoid3d_spin.txt", "snu/cart.bvh", "snu/pirouette.bvh",
     "xia/dme_example.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/scaled_131_03.bvh",
 )  # fmt: skip
-"""Halves of the captures, as in `docs/validation/prepared-captures.md`, without one that is a copy."""
+"""The two halves of the captures of `docs/validation/prepared-captures.md`, without one that is a copy."""
 
 SECONDS = 20.0
-MOST_ALONE = 0.15  # [body weights] RMS: what is followed worse alone is no well-formed clip
-_WITHIN = np.deg2rad(1.0)  # beyond a joint's range: what an Euler angle and a rotation vector differ by near limits
-_EVERY = 5  # frames of the animation that are not looked at between two that are: 100 a second
+MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
+_WITHIN = np.deg2rad(1.0)  # tolerance beyond a joint's range: difference of Euler angles and rotation vectors there
+_EVERY = 5  # every fifth frame of the animation is measured: 100 a second
 
 
 class Captured(NamedTuple):
-    """A file, prepared, and whether it can be drawn.
+    """A prepared file, and whether it can be part of a set.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Captured(NamedTuple):
     alone : float
         Residual of the figure that follows it alone [body weights].
     fell : float or None
-        When it then fell [s].
+        Time at which the figure then fell [s].
     """
 
     name: str
@@ -94,7 +94,7 @@ def _named(clip: Clip, name: str) -> Clip:
 
 
 def _other(clip: Clip) -> Clip:
-    """Some other clip, so that one that cannot be blended with any is told."""
+    """Some other clip, with which it is tested whether a clip can be blended at all."""
     return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
 
 
@@ -140,7 +140,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
 
 
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
-    """Of the animation: lowest sole, way of a point in a stance (95 %, largest) [cm], joints beyond limits [°]."""
+    """Lowest sole [cm], foot skate in a stance (95 %, largest) [cm], and joints beyond limits [°] of the animation."""
     motion = motion_of(poses, fps, dynamics=False)
     excess = float(beyond_ranges(poses).max()) - _WITHIN
     return {
@@ -150,14 +150,14 @@ def animation_measures(poses: Array, fps: float) -> dict[str, float]:
 
 
 def drawn(clips: Sequence[Clip], size: int, seed: int) -> Any:
-    """Sets of different clips by lot, without end."""
+    """Random sets of different clips, without end."""
     rng = np.random.default_rng(seed)
     while True:
         yield tuple(clips[i] for i in rng.choice(len(clips), size=min(size, len(clips)), replace=False))
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of the table, a map each: how many sets stand, with Wilson's interval (1927), and keep the other bounds."""
+    """Lines of the table, one per map: sets that stand, with Wilson's interval (1927), and that keep other bounds."""
     from statsmodels.stats.proportion import proportion_confint
 
     lines = [

@@ -35,15 +35,15 @@ from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
 from sim.world.phantom_port import sense_in_motion
 
-DRAG, TUBE = 8.0, 0.015  # of governor and river [N s/m], [m]
+DRAG, TUBE = 8.0, 0.015  # drag of governor and river [N s/m], radius of the tube [m]
 SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]
-REACH = 0.03  # [m] before and behind the place where a straight way touches the curve: within tube and flight
-STEP = 0.005  # [s] of a way
-RUN_UP, SLOWING = 0.4, 0.6  # [s] before the flight, and the share of it in which a hand slows down
+REACH = 0.03  # [m] length of a straight path before and behind its point of contact: within tube and flight
+STEP = 0.005  # [s] between the points of a path
+RUN_UP, SLOWING = 0.4, 0.6  # [s] before the flight, and the share of the flight in which a hand slows down
 
 
 class Passage(NamedTuple):
-    """What a hand met that was led along the curve.
+    """Passage of a hand that is led along the curve.
 
     Attributes
     ----------
@@ -64,12 +64,12 @@ class Passage(NamedTuple):
 
 
 class Bench:
-    """The backflip under a circle of the hand: its curve, its admissible speeds, and a hand that is led along it.
+    """The backflip on a circle of the hand: its curve, its admissible speeds, and a hand that is led along it.
 
     Attributes
     ----------
     curve : Trajectory
-        φ, as the map has it: no field that makes up for friction leads along it.
+        The map's curve φ, without compensation of the Phantom's friction.
     speeds : Array
         Least and greatest speed [m/s] at equal steps of the phase, shape (m, 2).
     flight : tuple of two floats
@@ -95,20 +95,20 @@ class Bench:
         return Governor(self.curve, self.speeds, DRAG, TUBE).program()
 
     def gate(self) -> Program:
-        """The backflip's river, which takes a hand at the speeds that its flight admits."""
+        """The backflip's river, which takes a hand at the admissible speeds of its flight."""
         pace = self.curve.length / self.curve.duration
         bundle = RiverBundle((River(self.curve, TUBE, speeds=self.speeds),), ("backflip",))
         return HigherOrder(bundle, GATE * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace, "discrete").program()
 
     def past(self, speed: float) -> Array:
-        """A straight way at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""
+        """A straight path at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""
         middle = 0.5 * sum(self.flight)
         there, along = self.curve.point(middle), self.curve.velocity(middle)
         steps = np.arange(-REACH, REACH, speed * STEP)
         return there + np.outer(steps, along / np.linalg.norm(along))
 
     def slowing(self, speed: float) -> Array:
-        """A way along the curve at its own pace that slows down to a speed [m/s] in mid-flight, shape (n, 3)."""
+        """A path along the curve at its own pace that slows down to a speed [m/s] in mid-flight, shape (n, 3) [m]."""
         first, last = self.flight
         pace = self.curve.length / self.curve.duration
         phase, phases = first - RUN_UP, [first - RUN_UP]
@@ -119,13 +119,13 @@ class Bench:
         return self.curve.point(np.array(phases))
 
     def led(self, program: Program, way: Array) -> Passage:
-        """Lead a hand along a way, in steps of `STEP`, in a field."""
+        """Lead a hand along a path, in steps of `STEP`, in a field."""
         session = self._session()
         session.world.reset(way[0], rest_pose())
         field = session.servo.field.of(program)
         phantom = session.servo.device
         assert isinstance(phantom, SimulatedPhantom)
-        sense_in_motion(phantom.port)  # which is none: the way begins at rest
+        sense_in_motion(phantom.port)  # at zero velocity, as the path begins at rest
         device = phantom.held_by(Arm(400.0, 10.0, way, STEP))
         servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
@@ -148,14 +148,14 @@ class Bench:
         return float(passage.speed[near].mean()), float(passage.along[near].mean())
 
     def taken(self, speed: float) -> tuple[float, float]:
-        """Mean speed [m/s] of a hand in the tube of the backflip's river, and the share of the time that it has it."""
+        """Mean speed [m/s] of a hand in the tube of the backflip's river, and the share of time it is taken."""
         passage = self.led(self.gate(), self.past(speed))
         inside = passage.distance < 0.9 * TUBE
         return float(passage.speed[inside].mean()), float(np.mean(passage.river[inside] == 0.0))
 
 
 def draw(bench: Bench) -> Figure:
-    """Force and gate over the speed in mid-flight, and what a hand feels that slows down there."""
+    """Force and gate over the speed in mid-flight, and the force on a hand that slows down there."""
     figure = Figure(figsize=(9.6, 3.0), layout="constrained")
     force_ax, gate_ax, slow_ax = figure.subplots(1, 3)
     middle = len(bench.speeds) * 0.5 * sum(bench.flight) / bench.curve.duration

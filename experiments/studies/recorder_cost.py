@@ -1,4 +1,4 @@
-"""What recording costs beside the run that is recorded, and whether memory grows with a run."""
+"""Cost of recording relative to the recorded run, and growth of memory with the length of a run."""
 
 import tempfile
 import time
@@ -16,7 +16,7 @@ _SECONDS, _LONG = 2.0, 20.0
 
 
 class RecorderCost(NamedTuple):
-    """Processor time with a recorder over that without, and memory after a run ten times as long over that before."""
+    """Ratio of processor times with and without recorder, and of memory after and before a run ten times as long."""
 
     ratio: float
     grown: float

@@ -1,7 +1,8 @@
-"""The experiment that could refute a region: the linkage in MuJoCo from random states at its edge, inside and outside.
+"""Experiment that could refute a region of attraction: MuJoCo simulations from random states at and outside its edge.
 
-Phase, hand and direction are drawn; the state is scaled to where V has the value wanted. Coulomb friction acts,
-encoders round, the river moves along its curve. Certified: no distance beyond the region's, and in the end the ball.
+Phase, hand and direction are random; the state is scaled such that V has the wanted value. Coulomb friction acts, the
+encoders quantise, the river moves along its curve. The certificate claims that the distance never exceeds the region's,
+and ends within the ball.
 """
 
 from collections.abc import Mapping
@@ -45,7 +46,7 @@ def certified_region(config: RunConfig = CONFIG, hands: HandRange = HANDS) -> tu
 def simulate_from(
     river: River, figures: Mapping[str, object], hands: HandRange, times: float, rng: np.random.Generator
 ) -> Outcome:
-    """Simulate from a random state with √V some times that of the region's edge."""
+    """Simulate from a random state at which √V is `times` its value at the region's edge."""
     curve, device = river.curve, river.device
     hand = HandImpedance(*(float(rng.uniform(*getattr(hands, name))) for name in ("mass", "damping", "stiffness")))
     phase = float(rng.uniform(curve.start, curve.end))
@@ -60,7 +61,7 @@ def simulate_from(
     edge = times * (float(str(figures["level"])) - float(str(figures["shift"])))
 
     def form(size: float) -> tuple[float, Array, Array]:
-        """√V of the state scaled by a size, its joint angles and J."""
+        """√V of the state scaled by `size`, its joint angles and its Jacobian J."""
         theta = np.array(device.angles(curve.point(phase) + size * away))
         jacobian = np.array(kinematics_function(device)(theta, 0.0)[0])
         still = np.zeros(3)
@@ -97,9 +98,9 @@ def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, out
     out : Path
         Folder.
     count, outside : int
-        Simulations from the edge, and from each place outside.
+        Number of simulations from the edge, and from each distance outside.
     seed : int
-        Of what is drawn.
+        Seed of all random draws.
     """
     river, verdict = certified_region()
     print(verdict.reason)

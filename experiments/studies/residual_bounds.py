@@ -1,9 +1,9 @@
-"""How little help the physical figure needs: clips and runs at smaller and smaller bounds on the residual wrench.
+"""The least residual wrench that the physical figure needs: clips and runs at decreasing bounds.
 
 ``python -m experiments.studies.residual_bounds [CLIP or FILE...]`` prints the first table of
-`docs/validation/residual-bounds.md`, a row a clip as it is done, and ``--runs`` the second, of runs in which the
+`docs/validation/residual-bounds.md`, a row per clip as it is completed, and ``--runs`` the second, of runs in which the
 animation is led, blended, pushed or played at another pace. Runs of a figure with contacts are chaotic, so each is
-repeated at speeds of the clip, or weights of the figure, that differ in the sixth digit, and falls are counted.
+repeated with speeds of the clip, or weights of the figure, that differ in the sixth digit, and falls are counted.
 """
 
 import sys
@@ -26,7 +26,7 @@ from sim.body.tracking import TrackingConfig, track
 from sim.loop.loop import Loop
 
 BOUNDS = ((1.0, 0.2), (0.5, 0.1), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01))
-"""Force as a share of body weight, moment as one of body weight × stature."""
+"""Bounds of the force as a share of body weight, and of the moment as a share of body weight × stature."""
 
 SECONDS, NUDGES = 8.0, (0.0, 1e-6, -1e-6)
 RUNS: Mapping[str, tuple[float, Mapping[str, Any]]] = {
@@ -41,11 +41,11 @@ RUNS: Mapping[str, tuple[float, Mapping[str, Any]]] = {
     "a walk played too fast": (6.0, {"clips": ("walk",) * 4, "user": "trace", "lap": 2.2}),
     "a jump, pushed": (10.0, {"clips": ("jump",), "user": "push"}),
 }
-"""Seconds and words of runs, named for people."""
+"""Duration [s] and words of each run, by its name in the table."""
 
 
 def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> str:
-    """Runs that fell of all, and the median residual [% of body weight] of what is up."""
+    """Number of falls out of all runs, and median residual of the runs that stand [% of body weight]."""
     config = TrackingConfig(gains=FigureGains(force_bound=force, moment_bound=moment))
     reports = [track(Clip(clip.poses, clip.fps * (1.0 + nudge), clip.name), seconds, config) for nudge in NUDGES]
     fell, residual = sum(bool(one.falls) for one in reports), np.median([one.residual_force for one in reports])
@@ -53,7 +53,7 @@ def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> s
 
 
 def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: float) -> str:
-    """Runs that fell of all; median residual, and the most that one took of force and moment [% of its measure]."""
+    """Number of falls out of all runs; median residual, and largest force and moment of a run [% of their measures]."""
     fell, residuals, most = 0, list[float](), np.zeros(2)
     for nudge in NUDGES:
         config = run_config(

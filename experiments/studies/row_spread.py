@@ -1,9 +1,9 @@
-"""How far apart runs of README's rows end: the residual from other starts, of other weights, by other kernels.
+"""Spread of the residuals in README's table: over start positions, weights of the figure, and OpenBLAS kernels.
 
-``python -m experiments.studies.row_spread [CORE...]`` runs each row of README's table that says a residual, thrice by
-each of the kernels that OpenBLAS is told to pick (``OPENBLAS_CORETYPE``: Haswell, SkylakeX, Zen; without a word those
-of this processor), and prints the table of `docs/validation/residual-bounds.md`. A figure with contacts is chaotic: a
-seed draws where the hand lets go of the stylus, and weights differ in the sixth digit.
+``python -m experiments.studies.row_spread [CORE...]`` runs each row of README's table that states a residual three
+times with each of the given OpenBLAS kernels (``OPENBLAS_CORETYPE``: Haswell, SkylakeX, Zen; by default those of this
+processor), and prints the table of `docs/validation/residual-bounds.md`. A figure with contacts is chaotic: the runs
+differ in the seed, which sets where the hand lets go of the stylus, and in the sixth digit of the figure's weight.
 """
 
 import json
@@ -20,20 +20,20 @@ from models.humanoid.skeleton import DEFAULT_MASS
 
 README = Path(__file__).parents[2] / "README.md"
 NUDGES = ((0, 0.0), (1, 1e-6), (2, -1e-6))
-"""Seed, and by what share the figure is heavier."""
+"""Seed, and relative change of the figure's weight, of each repetition."""
 
 _ROW = re.compile(r"^\| [^|]+ \| `(hvf (?:run|lift) [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
 _RESIDUAL = re.compile(r"residual ([\d.]+)(?: to ([\d.]+))? %")
 
 
 def said(page: str) -> dict[str, tuple[float, float]]:
-    """Commands of a page's rows, and from and to what residual [%] each says of its run."""
+    """Commands in the rows of a page, with the lowest and highest residual [%] that each row states."""
     found = ((shlex.join(shlex.split(line)), _RESIDUAL.search(measured)) for line, measured in _ROW.findall(page))
     return {line: (float(says[1]), float(says[2] or says[1])) for line, says in found if says is not None}
 
 
 def measured(line: str, folder: Path, core: str) -> tuple[float, bool]:
-    """Residual [%] of a command's run in a folder by a kernel, and whether its figure fell."""
+    """Run a command in a folder with a kernel; returns its residual [%], and whether its figure fell."""
     words = shlex.split(line)
     _typed(words, folder, core)
     summary = json.loads((folder / words[words.index("--out") + 1] / "summary.json").read_text(encoding="utf-8"))

@@ -1,9 +1,9 @@
-"""The experiment that could refute the stability certificates: where MuJoCo goes unstable, and where it should.
+"""Experiment that could refute the stability certificates: predicted and observed onset of instability in MuJoCo.
 
-Each trial draws a place on a curve, a curve, a damping, a clock and a hand. Its critical stiffness is predicted from
-the linear loop, and found again in simulations that know nothing of it: onset is where the growth rate of the slowest
-mode, identified from the motion across the curve, changes its sign. With Coulomb friction the onset depends on the
-amplitude; the prediction is then a describing function's, and onset is where a swing neither grows nor decays.
+Each trial draws a curve, a place on it, a damping, a clock and a hand. The critical stiffness is predicted from the
+linear loop, and found independently in simulations: the onset is where the growth rate of the slowest mode, identified
+from the motion across the curve, changes its sign. With Coulomb friction the onset depends on the amplitude; the
+prediction then uses a describing function, and the onset is where an oscillation neither grows nor decays.
 """
 
 import json
@@ -23,24 +23,24 @@ _WORLDS_OWN = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
 FINER = Conditions(substeps=128)
 OWN_FINE, OWN_COARSE = Conditions(64, _WORLDS_OWN), Conditions(8, _WORLDS_OWN)
-COARSE = 1e-4  # [m] a few counts of the encoders: a smaller swing is mostly rounding
+COARSE = 1e-4  # [m] a few encoder counts: a smaller oscillation is mostly quantisation
 RUBBING, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
 
 @dataclass(frozen=True)
 class Row:
-    """One trial: what was drawn, and critical k_r [N/m], predicted and observed; NaN where no onset was found.
+    """One trial: the random parameters, and critical k_r [N/m], predicted and observed; NaN if no onset was found.
 
     Attributes
     ----------
     period, delay, cutoff, b_d, mass, damping, stiffness : float
-        T [s], delay [s], filter [Hz], b_d [N s/m], and the hand.
+        T [s], delay [s], filter [Hz], b_d [N s/m], and the hand's mass [kg], damping [N s/m] and stiffness [N/m].
     predicted, observed : float
-        Linear loop; simulation without Coulomb friction and rounding, by Runge and Kutta's method.
+        Linear loop; simulation without Coulomb friction and rounding, by a Runge-Kutta method.
     own_fine, own_coarse : float
-        The same with the world's own integrator at 64 and at 8 steps a period.
+        Simulation with the world's own integrator at 64 and at 8 steps a period.
     amplitude, friction_predicted, friction_observed, rounded_observed : float
-        With Coulomb friction at an amplitude [m]; and with encoders that round.
+        Amplitude [m], and k_r with Coulomb friction at this amplitude; the last one also with quantised encoders.
     """
 
     period: float
@@ -61,7 +61,7 @@ class Row:
 
 
 def swing_amplitude(trial: Trial, k_r: float) -> float:
-    """Amplitude [m] at which the river asks for 3 N, which the motors give anywhere, but at most 1 mm."""
+    """Amplitude [m] at which the river commands 3 N, which the motors can give anywhere, but at most 1 mm."""
     loop = trial.loop()
     mode = slowest_mode(loop, k_r, trial.b_d, 0, swings=True)[1]
     return min(1e-3, 3.0 / float(np.linalg.norm(loop.force(k_r, trial.b_d)[0] @ mode)))
@@ -83,16 +83,16 @@ def run_trial(trial: Trial) -> Row:
 
 
 def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44, seed: int = 1) -> None:
-    """Run random trials and write ``trials.json``, ``trials.md`` and ``trials.png``; the worst one again, finer.
+    """Run random trials and write ``trials.json``, ``trials.md`` and ``trials.png``; repeat the worst with finer steps.
 
     Parameters
     ----------
     out : Path
         Folder.
     count : int
-        Trials.
+        Number of trials.
     seed : int
-        Of what is drawn.
+        Seed of all random draws.
     """
     rng = np.random.default_rng(seed)
     trials = [draw_trial(rng) for _ in range(count)]

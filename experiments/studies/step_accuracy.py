@@ -1,11 +1,11 @@
-"""What the step of the physics changes: runs at a step and at an eighth of it, mode by mode.
+"""Effect of the physics step: runs at a step compared with runs at an eighth of it, mode by mode.
 
 ``python -m experiments.studies.step_accuracy [--modes NAME,...] [STEP...]`` prints the table of
 `docs/validation/physics-step.md`.
 
-The force of a tick depends on when a count of the encoders comes, which a step of any size moves by a tick: so forces
-are compared below `BAND` as well, that of a hand's own motion, and not tick by tick alone. Counts that come otherwise
-also let a hand go along its curve a little sooner or later, so its path is compared beside where it is at an instant.
+The force of a tick depends on the tick in which an encoder count arrives, and any change of step shifts that by a tick.
+So forces are compared not only tick by tick but also below `BAND`, the band of a hand's own motion. Shifted counts also
+move a hand along its curve a little sooner or later, so its path is compared as well as its position at each instant.
 """
 
 import sys
@@ -32,7 +32,7 @@ from sim.loop.loop import Loop, pose_errors, tick_channels
 from sim.loop.servo import FrameLog, TickLog
 
 SECONDS, FINER = 8.0, 8
-BAND = 8.0  # [Hz]: a hand at 8 cm/s feels what is a centimetre long
+BAND = 8.0  # [Hz]; for a hand at 8 cm/s this is a wavelength of a centimetre
 MODES: Mapping[str, RunConfig | ArmConfig] = {
     "follow": run_config(),
     "follow pushed": run_config(user="push"),
@@ -52,20 +52,20 @@ HEAD = (
 
 
 class Course(NamedTuple):
-    """A run as it went.
+    """Course of a run.
 
     Attributes
     ----------
     period : float
-        Of the servo [s].
+        Period of the servo [s].
     p, force : Array
         Stylus [m] and commanded force [N], shape (n, 3).
     poses, reference : Array
-        Of the figure, shape (m, 75), or of the arm, (m, 7).
+        Simulated and desired poses of the figure, shape (m, 75), or of the arm, (m, 7).
     gap : float
-        Largest distance by which the linkage was open [m].
+        Largest error of the linkage's loop closure [m].
     falls : int
-        How often the figure fell.
+        Number of falls of the figure.
     """
 
     period: float
@@ -124,17 +124,17 @@ def row(name: str, step: float, coarse: Course, fine: Course) -> str:
 
 
 def off_path(p: Array, other: Array) -> Array:
-    r"""From another course to this, both at the same instants, across the other's way: :math:`(1 - t t^T)(p - p')`.
+    r"""Difference of two paths at the same instants, perpendicular to the other one: :math:`(1 - t t^T)(p - p')`.
 
     Parameters
     ----------
     p, other : Array
-        Places [m], shape (n, 3), so near each other that the way between them is straight.
+        Positions [m], shape (n, 3), so near each other that the path between them is straight.
 
     Returns
     -------
     Array
-        Shape (n, 3) [m]. Where the other stands still, all that is between them.
+        Shape (n, 3) [m]; the whole difference where the other path stands still.
     """
     way, apart = np.gradient(other, axis=0), p - other
     speed = np.linalg.norm(way, axis=1, keepdims=True)

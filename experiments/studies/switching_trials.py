@@ -1,4 +1,4 @@
-"""Hands in crossing rivers on the MuJoCo Phantom, from any state and with any push; certificates against them.
+"""Hands in crossing rivers on the MuJoCo Phantom, with any state and any push, compared with the certificates.
 
 ``python -m experiments.studies.switching_trials 40`` draws rivers and compares what is certified with what happens;
 ``python -m experiments.studies.switching_trials docs/pictures`` draws the picture of the docs.
@@ -27,14 +27,14 @@ from experiments.results.figures import STYLE
 from experiments.setups.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
 
-PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] that are tried on every crossing, to 4 N
-NONE, NEVER = 0.025, 5.7  # [N] where the picture has what is not certified, and who is never lost
+PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] pushes that are tried on every crossing, up to 4 N
+NONE, NEVER = 0.025, 5.7  # [N] coordinates in the picture of crossings not certified, and of hands that are never lost
 
 
 def straight_pair(
     degrees: float, form: str, hysteresis: float, drag: float = 4.0, admission: float = ADMISSION
 ) -> HigherOrder:
-    """Two straight rivers that cross in the origin of H; h and r as shares of their speed, σ of the discrete mode."""
+    """Two straight rivers that cross at the origin of H; h, r as shares of their speed, σ that of the discrete mode."""
     rivers = tuple(replace(straight_river(angle), drag=drag) for angle in (0.0, degrees))
     scale = (admission * SPEED, SIGMA["discrete"] * SPEED, hysteresis * SPEED)
     return HigherOrder(RiverBundle(rivers, ("1", "2")), *scale, form)  # pyright: ignore[reportArgumentType]
@@ -50,13 +50,13 @@ class Crossing(NamedTuple):
     sampling : Sampling
         The clock.
     degrees : float
-        Between them.
+        Angle between them.
     allowed : float
-        Force that is certified [N]; negative if there is none.
+        Certified force [N]; negative if there is none.
     direction : Array, shape (3,)
-        Of the push.
+        Direction of the push.
     start, duration : float
-        Of the push [s].
+        Start and duration of the push [s].
     """
 
     field: HigherOrder
@@ -68,7 +68,7 @@ class Crossing(NamedTuple):
     duration: float
 
     def kept(self, force: float) -> bool:
-        """Whether the first river keeps a hand in MuJoCo that is pushed with a force [N]."""
+        """Whether, in MuJoCo, the first river keeps a hand that is pushed with a force [N]."""
         curve = self.field.bundle.rivers[0].curve
         x, y, z = (force * self.direction).tolist()
         push = Push((x, y, z), self.start, self.duration)
@@ -92,20 +92,20 @@ def draw_crossing(rng: np.random.Generator) -> Crossing:
 
 
 def trial(rng: np.random.Generator) -> tuple[bool, bool]:
-    """Random rivers and a push as strong as is certified, else 1 N: whether certified, and whether the hand is kept."""
+    """Random rivers with the certified push, else 1 N; returns whether it is certified, and the hand is kept."""
     crossing = draw_crossing(rng)
     certified = crossing.allowed > 0.0
     return certified, crossing.kept(crossing.allowed if certified else 1.0)
 
 
 def trials(number: int, seed: int = 1) -> Counter[tuple[bool, bool]]:
-    """How many of some trials were (certified, kept)."""
+    """Counts of the outcomes (certified, kept) of `number` trials."""
     rng = np.random.default_rng(seed)
     return Counter(trial(rng) for _ in range(number))
 
 
 def outcomes_figure(number: int, seed: int = 1) -> Figure:
-    """The force that is certified against the least of some that loses the hand in MuJoCo, for random crossings."""
+    """Certified force against the least of `PUSHES` that loses the hand in MuJoCo, for random crossings."""
     rng = np.random.default_rng(seed)
     crossings = [draw_crossing(rng) for _ in range(number)]
     lost = [next((force for force in PUSHES if not it.kept(force)), NEVER) for it in crossings]
@@ -126,7 +126,7 @@ def outcomes_figure(number: int, seed: int = 1) -> Figure:
 
 
 def main(arguments: list[str]) -> None:
-    """Count outcomes of as many trials as is said, or draw them into a folder."""
+    """Count the outcomes of a given number of trials, or draw them into a given folder."""
     if not arguments[0].isdecimal():
         with mpl.rc_context(STYLE):
             outcomes_figure(40).savefig(Path(arguments[0]) / "switching-trials.png", dpi=130)

@@ -1,7 +1,7 @@
-"""What a closed-loop tick costs in units of one bare `mj_step` of the same world, mode by mode.
+"""Cost of a closed-loop tick in units of one bare `mj_step` of the same world, mode by mode.
 
 The bare steps are those of the same run: its recorded controls are replayed through the same compiled loop, in which
-nothing but `mj_step` then costs time. So contacts and constraints are the same, at every tick.
+then only `mj_step` takes time. So contacts and constraints are the same at every tick.
 """
 
 import statistics
@@ -16,7 +16,7 @@ from experiments.setups.wiring import wire
 from sim.loop.loop import make_logs
 from sim.loop.servo import FrameLog, TickLog, run_block
 
-STEP = 1e-3  # [s] of the physics: one to a servo tick, the fewest there can be
+STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
 SECONDS, ROUNDS = 1.0, 3
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
@@ -31,7 +31,7 @@ MODES: Mapping[str, Callable[[], RunConfig]] = {
     "soft walls": lambda: run_config(walls=True, physics_step=STEP),
     "a simulated person": lambda: run_config(person="median", user="trace", physics_step=STEP),
 }
-"""Every kind of law, map and hand, the heavy ones too; the figure is updated every other tick, at 500 Hz."""
+"""All kinds of laws, maps and hands, also the expensive ones; the figure is updated every other tick, at 500 Hz."""
 
 
 class TickCost(NamedTuple):
@@ -57,7 +57,7 @@ def tick_cost(config: RunConfig) -> TickCost:
 
 
 def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
-    """A session that has not begun, logs for `SECONDS` of it, and how many ticks that is."""
+    """A session that has not been run, logs for `SECONDS` of it, and the number of ticks."""
     session = make()
     n = round(SECONDS / session.servo.plant.period)
     return session, *make_logs(session.servo, n), n

@@ -1,6 +1,6 @@
-"""What a study costs beside its trials: overhead, threads, memory, and how soon a batch begins.
+"""Costs of a study besides its trials: overhead, scaling over threads, memory, and start-up time.
 
-``python -m experiments.studies.trial_cost 10000`` prints the overhead, and how memory grows over so many short trials.
+``python -m experiments.studies.trial_cost 10000`` prints the overhead, and how memory grows over 10000 short trials.
 """
 
 import subprocess
@@ -22,7 +22,7 @@ from experiments.trials.run_trial import SHELF, Row, Task
 from experiments.trials.study_config import StudyConfig, study_from
 from experiments.trials.threads import Threads
 
-_THREADS, _SHORT, _MANY = 2, 0.02, 2_000  # trials at a time; [s] of a short trial, and how many of them
+_THREADS, _SHORT, _MANY = 2, 0.02, 2_000  # simultaneous trials; duration of a short trial [s]; number of short trials
 
 
 class TrialCost(NamedTuple):
@@ -33,11 +33,11 @@ class TrialCost(NamedTuple):
     overhead : float
         Processor time of planning, driving and database over that of the trials.
     scaling : float
-        Trials a second of two threads over twice those of one.
+        Trials per second of two threads, over twice those of one.
     grown : float
         Memory after 2000 short trials, over that after the first 400.
     start : float
-        From the start of a process to its first row, with the code compiled before [s].
+        Time from the start of a process to its first row, with the code already compiled [s].
     """
 
     overhead: float
@@ -47,7 +47,7 @@ class TrialCost(NamedTuple):
 
 
 def trial_cost() -> TrialCost:
-    """Measure; wall-clock times, so for a machine that does nothing else."""
+    """Measure all ratios; needs an idle machine, as some times are wall-clock times."""
     quiet = Console(stderr=True, quiet=True)
     more, one = overhead(6, 5.0, quiet)
     _, two = _run(_study(6, 5.0), Threads(_THREADS), quiet)
@@ -55,7 +55,7 @@ def trial_cost() -> TrialCost:
 
 
 def overhead(users: int, seconds: float, console: Console) -> tuple[float, float]:
-    """Processor time of planning, driving and database over that of the trials, and the time of all of it [s]."""
+    """Processor time of planning, driving and database over that of the trials, and the total time [s]."""
     warm([trial.config for trial in planned(_study(1, 0.1))[:1]], SHELF, console)
     begin = time.process_time()
     own, whole = _run(_study(users, seconds), Threads(1), console)
@@ -63,14 +63,14 @@ def overhead(users: int, seconds: float, console: Console) -> tuple[float, float
 
 
 def grown(trials: int, console: Console) -> float:
-    """Memory of this process after so many short trials of a study, over that after a fifth of them."""
+    """Memory of this process after a number of short trials of a study, over that after a fifth of them."""
     watched = _Watched(trials // 5)
     _run(_study(trials // 4, _SHORT), watched, console)
     return psutil.Process().memory_info().rss / watched.then
 
 
 class _Watched(Threads):
-    """One thread, whose process's memory is noted after a number of trials."""
+    """An executor with one thread that notes the memory of the process after a number of trials."""
 
     def __init__(self, after: int):
         super().__init__(1)
@@ -84,7 +84,7 @@ class _Watched(Threads):
 
 
 def start_seconds() -> float:
-    """Seconds from the start of a new process to the first row of its study."""
+    """Time from the start of a new process to the first row of its study [s]."""
     code, begin = "from experiments.studies.trial_cost import first_row; first_row()", time.perf_counter()
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

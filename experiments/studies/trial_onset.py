@@ -1,4 +1,4 @@
-"""Where a trial's loop becomes unstable: predicted from the linear loop, and observed in its simulation."""
+"""Onset of instability of a trial's loop: predicted from the linear loop, and observed in its simulation."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +13,7 @@ from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import Conditions, Trial, simulate
 
-LARGEST = 20.0  # times as far off as at the start, a motion is no longer taken for linear
+LARGEST = 20.0  # ratio to the initial distance beyond which a motion is no longer taken to be linear
 
 
 def predicted(trial: Trial) -> float:
@@ -27,7 +27,7 @@ def growth(path: Array) -> float:
     Parameters
     ----------
     path : Array
-        Samples, shape (n, 3); modes that make less than 1e-4 of the strongest one's part of it are taken for noise.
+        Samples, shape (n, 3); modes that contribute less than 1e-4 of the strongest one are taken for noise.
     """
     stride = max(1, len(path) // 200)
     samples = path[::stride]
@@ -52,13 +52,13 @@ def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
     size = np.linalg.norm(path, axis=1)
     beyond = np.flatnonzero(size > LARGEST * conditions.start)
     end = int(beyond[0]) if len(beyond) else len(path)
-    # What decays at once tells nothing of the slowest mode; what the compensated weight leaves is a constant offset and
-    # no mode, so differences are taken.
+    # The first quarter is left out, as fast modes decay in it. Differences are taken, as the error of the weight
+    # compensation leaves a constant offset, which is not a mode.
     return float(np.log(growth(np.diff(path[end // 4 : end], axis=0)))) / period
 
 
 def observed(trial: Trial, guess: float, conditions: Conditions) -> float:
-    """Critical k_r [N/m] of the simulation, between a half and twice a guess; NaN if the onset is not there."""
+    """Critical k_r [N/m] of the simulation, between half and twice a guess; NaN if the onset is not in this range."""
 
     def rate(log_k: float) -> float:
         return observed_growth(trial, float(np.exp(log_k)), conditions)
@@ -67,7 +67,7 @@ def observed(trial: Trial, guess: float, conditions: Conditions) -> float:
 
 
 def _root(rate: Callable[[float], float], guess: float) -> float:
-    """Where a rate changes its sign upwards, as a function of the logarithm of a gain, near a guess."""
+    """Gain near a guess at which a rate, given as a function of the gain's logarithm, changes its sign upwards."""
     for width in (1.1, 1.4, 2.0):
         low, high = float(np.log(guess / width)), float(np.log(guess * width))
         if rate(low) < 0.0 < rate(high):
@@ -76,17 +76,17 @@ def _root(rate: Callable[[float], float], guess: float) -> float:
 
 
 class Rubbing(NamedTuple):
-    """Critical k_r [N/m] predicted with Coulomb friction, and the loop with the damping that stands for it."""
+    """Critical k_r [N/m] predicted with Coulomb friction, and the loop with the equivalent damping."""
 
     k_r: float
     loop: SampledLoop
 
 
 def with_friction(trial: Trial, amplitude: float) -> Rubbing:
-    """Onset predicted with Coulomb friction, for a motion of some amplitude across the curve [m].
+    """Onset predicted with Coulomb friction, for a motion of a given amplitude across the curve [m].
 
-    Describing function: friction f_c on a joint that swings with rate amplitude Ω is the damping 4 f_c/(π Ω). The
-    mode's own rates at the boundary give Ω; a few rounds agree.
+    Describing function: friction f_c on a joint that oscillates with rate amplitude Ω is equivalent to the damping
+    4 f_c/(π Ω). Ω follows from the mode at the boundary; a few iterations converge.
     """
     bare, device = trial.loop(), phantom_device()
     loop, k_r = bare, predicted(trial)
@@ -100,9 +100,9 @@ def with_friction(trial: Trial, amplitude: float) -> Rubbing:
 
 
 def observed_with_friction(trial: Trial, guess: Rubbing, amplitude: float, conditions: Conditions) -> float:
-    """Critical k_r [N/m] of the simulation for a motion of some amplitude [m]: where it neither grows nor decays.
+    """Critical k_r [N/m] of the simulation for a motion of a given amplitude [m], which neither grows nor decays.
 
-    Each simulation begins in the slowest mode at that amplitude; its first two swings are compared.
+    Each simulation begins in the slowest mode at that amplitude; its first two oscillations are compared.
     """
 
     def rate(log_k: float) -> float:
@@ -112,7 +112,7 @@ def observed_with_friction(trial: Trial, guess: Rubbing, amplitude: float, condi
         path = simulate(trial, k_r, 2 * swing, conditions, amplitude * mode.real)
         if len(path) < 2 * swing:
             return 1.0
-        # At rest on the curve the second swing may be nothing at all.
+        # The second oscillation may vanish, if the hand comes to rest on the curve.
         return float(np.log(max(np.linalg.norm(path[swing:]), 1e-12) / np.linalg.norm(path[:swing])))
 
     return _root(rate, guess.k_r)

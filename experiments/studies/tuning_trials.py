@@ -1,7 +1,7 @@
-"""Tuning against its baselines, repeated: the gain on held-back users, with a new search and new people every time.
+"""Replications of a tuning and its baselines: the gain on held-back users, with a new search and new people each time.
 
 ``python -m experiments.studies.tuning_trials examples/studies/tune.toml runs/tunings 8 17`` runs replications 8 to 17
-of the tuning, each in a folder of its own, and goes on where it was stopped.
+of the tuning, each in its own folder, and continues where it was interrupted.
 """
 
 import sys
@@ -19,9 +19,9 @@ LEVEL = 0.95
 
 
 def replication(config: TuneConfig, number: int) -> TuneConfig:
-    """The same tuning with another seed of search and trials, and with people that no other replication has.
+    """The same tuning with another seed of search and trials, and with people of its own.
 
-    The first one has the people of the file; panels and held-back users of all are different populations.
+    The first replication has the people of the file; all panels and held-back users are different populations.
     """
     further = 2 * (number - 1)
     panel, held_back = (replace(users, seed=users.seed + further) for users in (config.users, config.held_back))
@@ -29,13 +29,13 @@ def replication(config: TuneConfig, number: int) -> TuneConfig:
 
 
 def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned]:
-    """Run the replications of these numbers of a tuning's file."""
+    """Run the replications with these numbers of a tuning file."""
     config = read_tuning(tuning)
     return [run_tuning(replication(config, number), out / f"{number}") for number in numbers]
 
 
 def told(found: Sequence[Tuned]) -> list[str]:
-    """What was chosen each time, and for each contender and objective the gain, with its mean over replications."""
+    """Chosen values of each replication, and for each contender and objective the gains with their mean, in words."""
     lines = [_chosen(one) for one in found]
     for first in found[0].comparisons:
         name = (first.contender, first.objective)
@@ -52,7 +52,7 @@ def told(found: Sequence[Tuned]) -> list[str]:
 
 
 def t_interval(values: Array) -> tuple[float, float]:
-    """Student's interval of a mean: of a handful of replications a bootstrap's is too narrow; NaN of less than two."""
+    """Student's interval of a mean, as a bootstrap's is too narrow for a few replications; NaN for fewer than two."""
     from scipy.stats import t
 
     if len(values) < 2:

@@ -1,10 +1,10 @@
-"""Turns, starts and stops that friction cannot give, tried in MuJoCo by a body that has nothing to do but to follow.
+"""Experiment that could refute the verdict `turns`: an ideal body tries turns, starts and stops beyond friction.
 
-``python -m experiments.studies.turn_trials CLIP...`` plays clips (embedded, or files) faster than the floor lets
-them, and prints what is certified of them beside what happens.
+``python -m experiments.studies.turn_trials CLIP...`` plays clips (embedded, or files) faster than floor friction
+allows, and prints the certified bounds beside what happens in MuJoCo.
 
-The body is a mass on a foot that neither tips nor tires: motors between the two push it along the way of a centre of
-mass as they like, so that only the floor can refuse. What it cannot do, no figure can.
+The body is a mass on a foot that cannot tip: unlimited motors between the two push it along the path of a centre of
+mass, so that only the floor limits it. What this body cannot do, no figure can.
 """
 
 import sys
@@ -25,22 +25,22 @@ from models.mocap.clip import Clip
 
 _STEP = 5e-5  # of the simulation [s]
 _FOOT = 1.0  # mass of the foot [kg], radius of its sole 0.1 m
-_STIFF = 60.0  # natural frequency of the mass on its way [rad/s], critically damped
-_LEAN = 2.0  # most that the leg pushes sideways, of what it pushes down: more than any friction holds
-_FOLLOWED = 5e-4  # what is followed is missed by less [m]
-_FASTER = 1.35  # times the certified rate, at which a clip is played that is certified
-_SETTLING = 0.1  # [s] of rest before, in which the contact comes to bear
+_STIFF = 60.0  # natural frequency of the mass about its path [rad/s], critically damped
+_LEAN = 2.0  # largest ratio of sideways to downward push of the leg, more than any friction holds
+_FOLLOWED = 5e-4  # largest distance at which a path counts as followed [m]
+_FASTER = 1.35  # multiple of the certified rate at which certified clips are played
+_SETTLING = 0.1  # [s] of rest before the motion, in which the contact settles
 
 
 class Followed(NamedTuple):
-    """What became of a mass that was to follow a way.
+    """How the mass followed a path.
 
     Attributes
     ----------
     miss : float
-        Largest distance from the way, at its samples [m].
+        Largest distance from the path, at its samples [m].
     slid : float
-        Largest distance of the foot from where it stood [m].
+        Largest distance by which the foot slid [m].
     """
 
     miss: float
@@ -64,16 +64,16 @@ def _body(friction: float) -> mujoco.MjModel:
 
 
 def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed:
-    """Let the mass follow a way from its first point, at a velocity.
+    """Let the mass follow a path from its first point, with an initial velocity.
 
     Parameters
     ----------
     way : array, shape (n, 3)
-        Of a centre of mass [m].
+        Path of a centre of mass [m].
     fps : float
-        Points a second [1/s].
+        Points per second [1/s].
     velocity : array, shape (3,)
-        With which it begins [m/s].
+        Initial velocity [m/s].
     friction : float
         μ between foot and floor.
     """
@@ -84,7 +84,7 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
 
     def push(error: Array, slower: Array, wanted: Array) -> None:
         leg = DEFAULT_MASS * (wanted + _STIFF**2 * error + 2.0 * _STIFF * slower)
-        leg[2] = max(leg[2] + DEFAULT_MASS * GRAVITY, 0.0)  # it does not pull its foot up
+        leg[2] = max(leg[2] + DEFAULT_MASS * GRAVITY, 0.0)  # the leg does not pull its foot up
         data.ctrl[:2] = leg[:2] * min(1.0, _LEAN * leg[2] / max(np.linalg.norm(leg[:2]), 1e-12))
         data.ctrl[2] = leg[2]
         mujoco.mj_step(model, data)
@@ -104,20 +104,20 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
 
 
 def _of_all(values: Array) -> Array:
-    """Of the centre of mass of foot and mass: its place from positions of the joints, its velocity from theirs."""
+    """Centre of mass of foot and mass: its position from joint positions, or its velocity from joint velocities."""
     return values[:3] + values[3:] * (1.0 - _FOOT / DEFAULT_MASS)
 
 
 class TurnTrial(NamedTuple):
-    """What a counterexample of ``turns`` says of a window of frames, and what happens in MuJoCo.
+    """Claim of a counterexample of ``turns`` about a window of frames, and what happens in MuJoCo.
 
     Attributes
     ----------
     rate, onset : float
-        Share of its speed at which the floor can give the window's mean acceleration: certified, and that from which
-        the mass no longer follows it.
+        Rate up to which the floor can give the window's mean acceleration: certified, and observed with the mass.
     bound, miss, miss_of_mean : float
-        Distance from the window that no body undercuts, and that of the mass from it and from its best parabola [m].
+        Certified least distance of any body from the window, and distances of the mass from the window and from its
+        best parabola [m].
     """
 
     rate: float
@@ -128,14 +128,14 @@ class TurnTrial(NamedTuple):
 
 
 def parabola(acceleration: Array, seconds: float, friction: float, rate: float) -> Followed:
-    """Let the mass follow a constant acceleration [m/s²] of some seconds, played at a rate."""
+    """Let the mass follow a constant acceleration [m/s²] for `seconds` [s], played at a rate."""
     fps = 100.0 * rate / seconds
     t = np.arange(101.0)[:, None] / fps
     return follow(0.5 * rate**2 * acceleration * t**2, fps, np.zeros(3), friction)
 
 
 def onset(acceleration: Array, seconds: float, friction: float) -> float:
-    """Rate at which the mass begins to miss a constant acceleration, within 0.1 %, between 0.3 and 1.2."""
+    """Rate from which the mass misses a constant acceleration, to 0.1 %, between 0.3 and 1.2."""
     low, high = 0.3, 1.2
     while high - low > 1e-3 * low:
         middle = 0.5 * (low + high)
@@ -145,7 +145,7 @@ def onset(acceleration: Array, seconds: float, friction: float) -> float:
 
 
 def trial(motion: BodyMotion, example: Mapping[str, Any], friction: float) -> TurnTrial:
-    """Try in MuJoCo what a counterexample of the verdict ``turns`` says."""
+    """Test the claim of a counterexample of the verdict ``turns`` in MuJoCo."""
     way = motion.com[example["start"] : example["end"] + 1]
     seconds, acceleration = (len(way) - 1) / motion.fps, np.asarray(example["acceleration"])
     return TurnTrial(

@@ -1,4 +1,4 @@
-"""Hands with and without a soft wall, in a picture: ``python -m experiments.studies.wall_trials docs/pictures``."""
+"""Picture of hands with and without a soft wall: ``python -m experiments.studies.wall_trials docs/pictures``."""
 
 import sys
 from pathlib import Path
@@ -20,7 +20,7 @@ from sim.loop.servo import FrameLog, TickLog
 from sim.users.intent import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
-BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a turn of it that it cannot do
+BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -30,7 +30,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def impossible(clip: Clip) -> Clip:
-    """A clip whose left elbow bends the wrong way."""
+    """The clip with its left elbow bent the wrong way."""
     poses = clip.poses.copy()
     column = N_POSE - 4 * (len(JOINTS) - JOINTS.index(BENT))
     turn = exponential(*BEND)
@@ -39,14 +39,14 @@ def impossible(clip: Clip) -> Clip:
 
 
 def excess(poses: Array) -> Array:
-    """How far the worst joint of each pose (n, 75) is beyond its limit [rad], shape (n,); negative within all."""
+    """Excess of the worst joint of each pose (n, 75) beyond its limit [rad], shape (n,); negative within all limits."""
     limits = joint_range()
     turns = np.array([[logarithm(*q) for q in pose[-4 * len(JOINTS) :].reshape(-1, 4)] for pose in poses])
     return np.maximum(turns - limits[..., 1], limits[..., 0] - turns).max(axis=(1, 2))
 
 
 class Meeting(NamedTuple):
-    """A hand that pushes towards a clip that cannot be done: time [s], radius of the stylus [m], excess [rad]."""
+    """A hand that pushes towards an impossible clip: time [s], radius of the stylus [m], excess [rad]."""
 
     t: Array
     radius: Array
@@ -54,7 +54,7 @@ class Meeting(NamedTuple):
 
 
 def meet(walls: bool, seconds: float = 6.0) -> Meeting:
-    """Let a hand push outwards, where the clip of the broken elbow is, for the second half of a lap."""
+    """Let a hand push outwards, towards the clip with the wrong elbow, in the second half of a lap."""
     inside = embedded("squat_dance")
     config = run_config(seconds=seconds, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
     session = wire(config, (inside, impossible(inside)))

@@ -1,1 +1,1 @@
-"""Studies: simulated people at the stylus, trial by trial, from one core to a cluster."""
+"""User studies with simulated people: design, trials on one core to a cluster, database, analysis."""

@@ -1,4 +1,4 @@
-"""Trials on a Dask cluster: processes of this machine, or workers anywhere; the same tasks, the same rows."""
+"""Executor of trials on a Dask cluster: local processes or the workers of any scheduler."""
 
 import logging
 import socket
@@ -12,36 +12,36 @@ from experiments.trials.errors import StudyError
 from experiments.trials.plan import key_of
 from experiments.trials.run_trial import Row, Task, perform
 
-AHEAD = 3  # tasks that wait for each thread of a worker: one more than a thread's, for the way there and back
-DEATHS = 50  # of workers with the same trial on them, after which the trial is taken to be the cause
-STARTS = 5  # of a local cluster, of which a worker may be killed before it is there
-_BUSY = "120s"  # for what is on this machine: one that does much else may leave it waiting
-_WAIT = "30s"  # for a scheduler, and for a first worker
+AHEAD = 3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
+DEATHS = 50  # workers that die while they run the same trial before the trial is taken to be the cause
+STARTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
+_BUSY = "120s"  # timeout of local connections: on a busy machine processes may have to wait
+_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker
 
 
 class Cluster:
-    """Runs trials on the workers of a scheduler, those that come later included.
+    """Runs trials on the workers of a scheduler, including workers that join later.
 
-    A worker that is killed costs the trials that were on it, which Dask gives to another one.
+    If a worker is killed, Dask gives its trials to another one.
 
     Parameters
     ----------
     client : distributed.Client
-        Of the scheduler.
+        Client of the scheduler.
     where : str
-        The scheduler, for messages.
+        Name of the scheduler in messages.
     """
 
     def __init__(self, client: Any, where: str):
         self._client, self._where = client, where
 
     def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
-        """Rows of tasks, as they are done; tasks are asked for as they are needed.
+        """Yield rows of tasks as they are completed; tasks are drawn from the iterable as they are needed.
 
         Raises
         ------
         StudyError
-            If the scheduler is lost, or a worker has other code or other files.
+            If the scheduler is lost, or the code or files of a worker differ from the driver's.
         """
         from distributed import as_completed
 
@@ -54,7 +54,7 @@ class Cluster:
                 running.add(self._submit(task))
 
     def _submit(self, task: Task) -> Any:
-        # A trial is a function of its task, but not a pure one to Dask: a future that is gone may be asked for again.
+        # pure=False: a task may be submitted again after its future was released.
         return self._client.submit(perform_on_worker, task, key=f"trial-{task.key}", pure=False)
 
     def _row(self, future: Any) -> Row:
@@ -69,7 +69,7 @@ class Cluster:
             return Row(key, "failed", f"every one of {DEATHS} workers that ran it died", {}, 0.0, "", "")
         except (OSError, TimeoutError, RuntimeError) as error:
             raise self._lost(error) from None
-        except Exception as error:  # what a worker cannot import or unpack, Dask raises here as it is
+        except Exception as error:  # Dask raises here whatever a worker could not import or unpickle
             if future.status in ("cancelled", "lost"):
                 raise self._lost(error) from None
             raise StudyError(
@@ -94,7 +94,7 @@ class Cluster:
 
 @contextmanager
 def local_cluster(workers: int) -> Generator[Cluster]:
-    """A cluster of so many processes of this machine, a trial at a time each; it ends with the block.
+    """A cluster of `workers` local processes, each of which runs one trial at a time; it ends with the block.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def local_cluster(workers: int) -> Generator[Cluster]:
 
 
 def _processes(distributed: Any, workers: int) -> Any:
-    """Dask's local cluster: of one whose worker dies while it starts, Dask gives up all, and so it is started again."""
+    """Dask's local cluster; Dask gives up if a worker dies while it starts, so that several attempts are made."""
     said = ""
     for _ in range(STARTS):
         try:
@@ -131,12 +131,12 @@ def _processes(distributed: Any, workers: int) -> Any:
 
 @contextmanager
 def cluster_at(address: str) -> Generator[Cluster]:
-    """The cluster of a scheduler that runs, such as ``tcp://host:8786``.
+    """The cluster of a running scheduler, given by its address such as ``tcp://host:8786``.
 
     Raises
     ------
     StudyError
-        If nobody answers there, or it has no workers.
+        If no scheduler answers, or it has no workers.
     """
     distributed = _distributed()
     try:
@@ -174,12 +174,12 @@ def _distributed() -> Any:
 
 
 def perform_on_worker(task: Task) -> Row:
-    """`perform`, on a worker whose code and files are those of the driver.
+    """Run `perform` on a worker, after checking that its code and files are those of the driver.
 
     Raises
     ------
     StudyError
-        If they are not.
+        If they differ.
     """
     config = from_json(RunConfig, task.config, "a trial's configuration")
     try:

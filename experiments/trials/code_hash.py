@@ -1,4 +1,4 @@
-"""Hash of the code that a trial's numbers depend on, so that a row says what it was made with."""
+"""Hash of the code that determines a trial's measures; part of the key of a trial."""
 
 import hashlib
 import sys
@@ -17,9 +17,9 @@ _LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "llvmlite")
 
 @cache
 def code_hash() -> str:
-    """Hash of the sources that a run and its measures are made of, and of the libraries' versions, 16 hex digits.
+    """Hash of the sources of runs and measures, and of the versions of Python and the libraries, 16 hex digits.
 
-    What draws and tells of results is no part of it; nor is the processor, which a row names besides.
+    Analysis and plots of a study are not included; nor is the processor, which a row names separately.
     """
     digest = hashlib.sha256(f"{sys.version_info[:2]} {[version(name) for name in _LIBRARIES]}".encode())
     files = [path for folder in _SOURCES for path in sorted((_ROOT / folder).rglob("*.py"))]

@@ -1,4 +1,4 @@
-"""The database of a study: one SQLite file, a row a trial, that survives a kill at any moment."""
+"""The database of a study: one SQLite file with a row per trial, which survives a kill at any moment."""
 
 import fcntl
 import json
@@ -16,7 +16,7 @@ from experiments.trials.errors import StudyError
 from experiments.trials.run_trial import Row
 
 SCHEMA = 1
-_MARK = 0x48564654  # "HVFT": application id of the file, by which SQLite and `file` know it
+_MARK = 0x48564654  # "HVFT": application id, by which SQLite and `file` identify the file
 _TABLES = """
 CREATE TABLE study (identity TEXT NOT NULL, name TEXT NOT NULL, text TEXT NOT NULL);
 CREATE TABLE trials (
@@ -27,23 +27,23 @@ CREATE TABLE trials (
 
 
 class Database:
-    """Rows of a study's trials by key; one driver at a time writes, anybody reads.
+    """Rows of a study's trials by key; one driver at a time may write, any process may read.
 
-    Use as a context manager. Every row is a transaction in SQLite's write-ahead log: a kill loses none that was added.
+    Use as a context manager. Every row is a transaction in SQLite's write-ahead log: a kill loses no row already added.
 
     Parameters
     ----------
     path : Path
-        File; made with its folder when it is missing.
+        File; created with its folder if it is missing.
     identity : str
-        Hash of what the study is, whatever its numbers of users and repetitions.
+        Hash of the study without its numbers of users and repetitions.
     name, text : str
-        Of the study, and its file, as a reader of the database finds them.
+        Name of the study and text of its file, for readers of the database.
 
     Raises
     ------
     StudyError
-        If the file is of another study or another version, no such database, or has a driver already.
+        If the file is no such database, belongs to another study or version, or is being written by another driver.
     """
 
     def __init__(self, path: Path, identity: str, name: str, text: str):
@@ -60,7 +60,7 @@ class Database:
 
     def _begin(self, identity: str, name: str, text: str) -> None:
         if not self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-            self._db.execute("PRAGMA journal_mode = WAL")  # kept in the file
+            self._db.execute("PRAGMA journal_mode = WAL")  # a persistent setting of the file
             self._db.executescript(
                 f"BEGIN; {_TABLES} PRAGMA application_id = {_MARK}; PRAGMA user_version = {SCHEMA}; COMMIT;"
             )
@@ -87,7 +87,7 @@ class Database:
             )
 
     def add(self, row: Row, what: Mapping[str, object]) -> None:
-        """Keep a row; `what` says which trial it is, for a reader of the database.
+        """Store a row; `what` describes the trial for readers of the database.
 
         Raises
         ------
@@ -112,18 +112,18 @@ class Database:
                 yield Row(key, state, reason, read, *rest)
 
     def keys(self) -> set[str]:
-        """Of all rows."""
+        """Keys of all rows."""
         with self._told():
             return {key for (key,) in self._db.execute("SELECT key FROM trials")}
 
     def close(self) -> None:
-        """Close the file, and let other drivers at it."""
+        """Close the file and release its lock for other drivers."""
         self._db.close()
         os.close(self._lock)
 
     @contextmanager
     def _told(self) -> Generator[None]:
-        """What SQLite says, in a line."""
+        """Turn SQLite's errors into a `StudyError` of one line."""
         try:
             yield
         except sqlite3.Error as error:
@@ -145,7 +145,7 @@ class Database:
 
 
 def _locked(path: Path, database: Path) -> int:
-    """A lock that the system lets go of when the process ends, however it does."""
+    """Acquire a lock file, which the system releases when the process ends in any way; returns its descriptor."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""Design of a study: its conditions, who meets which, and in what order."""
+"""Experimental design of a study: its conditions, their assignment to users, and their counterbalanced order."""
 
 import itertools
 from collections.abc import Iterable
@@ -12,14 +12,14 @@ _TAKEN = ("key", "user", "repetition", "position", "seed", "state", "reason", *M
 
 
 class Condition(NamedTuple):
-    """A level of every factor.
+    """A combination of one level of every factor.
 
     Attributes
     ----------
     levels : dict
         Name of the level by name of the factor.
     words : Words
-        What they set, in the words of a run.
+        Parameters of a run that the levels set.
     """
 
     levels: dict[str, str]
@@ -27,16 +27,16 @@ class Condition(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """A user meets a condition.
+    """A trial of the design: a user in a condition.
 
     Attributes
     ----------
     user, repetition, position : int
-        Which user; for which time; as which trial of that user.
+        Number of the user, of the repetition of the condition, and of the trial in the user's sequence.
     number : int
-        Of the condition among all `conditions`.
+        Index of the condition among all `conditions`.
     condition : Condition
-        What it is.
+        The condition.
     """
 
     user: int
@@ -47,7 +47,7 @@ class Meeting(NamedTuple):
 
 
 def conditions(study: StudyConfig) -> tuple[Condition, ...]:
-    """All combinations of levels, the last factor's changing fastest.
+    """All combinations of levels; the level of the last factor changes fastest.
 
     Raises
     ------
@@ -67,10 +67,10 @@ def conditions(study: StudyConfig) -> tuple[Condition, ...]:
 
 
 def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
-    """Every trial of a study, in the order of users, and of each user's time.
+    """Every trial of a study, by user and then in the order of time.
 
-    Users are dealt to the groups of factors between users in turn. Within a group, the users take the rows of a
-    balanced Latin square in turn.
+    Users are assigned in turn to the groups of the between-subject factors. Within a group, the users take the rows of
+    a balanced Latin square in turn, or all the fixed order.
 
     Raises
     ------
@@ -99,11 +99,11 @@ def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
 
 
 def balanced_rows(n: int) -> tuple[tuple[int, ...], ...]:
-    """Orders of n conditions in which each stands in every place, and follows every other one, equally often.
+    """Orders of n conditions in which each is in every position, and follows every other one, equally often.
 
     A Latin square for even n, two of them for odd n (E. J. Williams, "Experimental designs balanced for the estimation
-    of residual effects of treatments", *Australian Journal of Scientific Research* A 2, 1949): 0, 1, n−1, 2, n−2, …,
-    each next row one more modulo n, and for odd n the same rows backwards.
+    of residual effects of treatments", *Australian Journal of Scientific Research* A 2, 1949): the first row is 0, 1,
+    n−1, 2, n−2, …, each further row adds one modulo n, and for odd n the same rows are added in reverse.
     """
     first = [(k + 1) // 2 if k % 2 else (n - k // 2) % n for k in range(n)]
     rows = [tuple((k + shift) % n for k in first) for shift in range(n)]

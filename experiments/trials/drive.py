@@ -1,4 +1,4 @@
-"""The driver of trials: what is not in the database yet is run, and every row is kept as it comes."""
+"""The driver of trials: runs the trials that are not in the database yet, and stores every row as it arrives."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
@@ -17,28 +17,28 @@ from experiments.trials.run_trial import Row, Shelf, Task
 
 
 class Executor(Protocol):
-    """What runs tasks: threads of this process, or a cluster."""
+    """Runs tasks: on threads of this process or on a cluster."""
 
     def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
-        """Rows of tasks, as they are done."""
+        """Yield rows of tasks as they are completed."""
         ...
 
 
 class _Rate(ProgressColumn):
-    """Trials a minute."""
+    """Column of the progress bar with the trials per minute."""
 
     def render(self, task: BarTask) -> Text:
         return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
 
 
 def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
-    """Compile what trials need, once for each kind of run, and make their maps."""
+    """Compile the units that trials need, once for each kind of run, and make their maps."""
     for config in {_shape(config): config for config in configs}.values():
         shelf.session(config, lambda units: compile_once(console, units))
 
 
 def _shape(config: RunConfig) -> object:
-    """What decides which code a run needs, and which map."""
+    """Key of the settings that determine which compiled units and which map a run needs."""
     added = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
     return config.mode.kind, added, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
 
@@ -52,22 +52,22 @@ def run_missing(
     Parameters
     ----------
     trials : sequence of Trial
-        All of the study.
+        All trials of the study.
     database : Database
-        That rows are kept in.
+        Database in which rows are stored.
     executor : Executor
-        What runs them.
+        Runs the trials.
     recordings : str
         Folder or URL of recordings; empty for none.
     console : Console
         Where progress is shown.
     what : mapping
-        By key, what a reader of the database is told of a trial.
+        Descriptions of the trials for readers of the database, by key.
 
     Raises
     ------
     StudyError, OSError
-        If the study cannot go on; what was done is kept.
+        If the study cannot go on; completed trials are kept.
     """
     kept = database.keys()
     missing = [trial for trial in trials if trial.key not in kept]
@@ -84,7 +84,7 @@ def run_missing(
         console.print(f"{before} trials ran before; only those that run now are recorded for certain")
     with Progress(*columns, console=console, speed_estimate_period=60.0) as progress:
         bar = progress.add_task("", total=len(trials), completed=before, failed="none failed")
-        progress.advance(bar, 0)  # the first sample of its time, from which a rate is told
+        progress.advance(bar, 0)  # first sample of time, from which the rate is estimated
         for row in rows:
             database.add(row, what[row.key])
             failed += row.state == "failed"

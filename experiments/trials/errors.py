@@ -1,7 +1,7 @@
-"""What goes wrong with a study as a whole; what goes wrong in one of its trials is a row of its table."""
+"""Error of a study as a whole; a failure of a single trial is a row of the table instead."""
 
 from sim.errors import SimError
 
 
 class StudyError(SimError):
-    """A study that cannot be planned, run, continued or read: says which and what to do."""
+    """A study that cannot be planned, run, continued or read; the message names it and says what to do."""

@@ -1,4 +1,4 @@
-"""What runs trials: threads, processes of this machine, or a cluster, as is asked for."""
+"""Choice of the executor of trials: threads, local processes, or a cluster."""
 
 import os
 from collections.abc import Generator
@@ -11,12 +11,12 @@ from experiments.trials.where import Where
 
 @contextmanager
 def executor(where: Where) -> Generator[Executor]:
-    """Threads of this process, processes of this machine, or a scheduler's workers.
+    """The executor on threads of this process, local processes, or a scheduler's workers.
 
     Raises
     ------
     StudyError
-        If there is no such cluster.
+        If the cluster cannot be reached or started.
     """
     if where.workers is None and where.cluster is None:
         yield Threads(where.threads or os.cpu_count() or 1)

@@ -1,6 +1,6 @@
-"""Measures of a trial: how well, how smoothly and with how much effort the hand did it, and what the figure made of it.
+"""Measures of a trial: accuracy, smoothness and effort of the hand, and their effect on the figure.
 
-All begin `SETTLING` after the start of the trial, or in the middle of a shorter one.
+Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that.
 """
 
 import math
@@ -22,26 +22,26 @@ from experiments.setups.session import Session
 from experiments.trials.trial_log import TrialLog
 from sim.body.falls import UP
 
-SEEN_RATE = 25.0  # [Hz] at which animations are compared: what an eye tells apart
+SEEN_RATE = 25.0  # [Hz] at which animations are compared: about what the eye resolves
 _NAN = float("nan")
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A number that a trial is told by.
+    """A measure of a trial.
 
     Attributes
     ----------
     name : str
-        As tables have it.
+        Name in tables.
     unit : str
-        Empty for a bare number.
+        Unit; empty for a dimensionless number.
     better : {"less", "more"}
-        Which is better for the one who has the task.
+        Which direction is better for the user.
     says : str
-        What it is.
+        Description.
     figure : {"none", "kinematic", "physical"}
-        The least figure that has it.
+        The simplest kind of figure for which the measure exists.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Measure:
 
     @property
     def label(self) -> str:
-        """Name and unit, for a person."""
+        """Name and unit, for display."""
         return self.name.replace("_", " ") + (f" [{self.unit}]" if self.unit else "")
 
 
@@ -83,18 +83,18 @@ MEASURES: dict[str, Measure] = {
         Measure("margin_used", "", "less", "k_r over the critical k_r of the stability certificate, 1 at the boundary"),
     )
 }  # fmt: skip
-"""All measures by name; `margin_used` is of a condition, not of a trial, and joins the table when it is analysed."""
+"""All measures by name; `margin_used` belongs to a condition, not a trial, and is added in the analysis."""
 OF_CONDITIONS = ("margin_used",)
 _KINDS = ("none", "kinematic", "physical")
 
 
 def measures_of(figure: str) -> tuple[str, ...]:
-    """Names of the measures that a kind of figure has."""
+    """Names of the measures that exist for a kind of figure."""
     return tuple(name for name, measure in MEASURES.items() if _KINDS.index(measure.figure) <= _KINDS.index(figure))
 
 
 def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
-    """All measures of a trial that has run, by name; NaN where there is nothing to measure."""
+    """All measures of a completed trial, by name; NaN where there is nothing to measure."""
     ticks, frames = log.ticks, log.frames
     since = min(SETTLING, 0.5 * float(ticks["t"][-1]))
     meant = meant_to_leave(config, ticks["t"])
@@ -111,7 +111,10 @@ def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[s
 
 
 def meant_to_leave(config: RunConfig, t: Array) -> npt.NDArray[np.bool_]:
-    """When the hand means to leave the curve: all the time by its intent, or while it pushes and until it is back."""
+    """Whether the hand intends to leave the curve at times t [s]: throughout for a person's intent, else about pushes.
+
+    A push counts from its start until `SETTLING` after its end.
+    """
     if config.user.does in PERSONAL:
         return np.ones(len(t), dtype=bool)
     spans = [(push.at, push.at + push.seconds + SETTLING) for push in config.user.pushes]
@@ -138,7 +141,7 @@ def _of_hand(ticks: Mapping[str, Array], meant: npt.NDArray[np.bool_], session: 
 
 
 def _per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
-    """SPARC and log dimensionless jerk of every whole lap's time on average, of all of it if there is none."""
+    """Mean SPARC and log dimensionless jerk over windows of a lap's duration, or of all if it is shorter than a lap."""
     speed = speed_profile(velocity, rate)
     size = round(lap * RATE)
     laps = [speed[k : k + size] for k in range(0, len(speed) - size + 1, size)] or [speed]
@@ -165,7 +168,7 @@ def _of_animation(session: Session, log: TrialLog, stride: int, since: float, co
 
 
 def _of_figure(frames: Mapping[str, Array], weight: float) -> dict[str, float]:
-    """Of the physical figure, until it fell if it did."""
+    """Measures of the physical figure, until its first fall."""
     fallen = frames["down"] != UP
     until = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
     flight = frames["flight"][:until] > 0.0

@@ -1,4 +1,4 @@
-"""Who takes part in a study: people drawn from a population."""
+"""Participants of a study: people drawn from a population."""
 
 from experiments.trials.study_config import Users
 from sim.users.person import Person
@@ -6,5 +6,5 @@ from sim.users.population import population
 
 
 def participants(users: Users) -> tuple[Person, ...]:
-    """The people of a study, who depend on the seed of the population alone: more of them begin with the same ones."""
+    """The people of a study; they depend on the population's seed alone, and a larger number only adds people."""
     return population(users.number, users.seed)

@@ -1,4 +1,4 @@
-"""What a study runs: a configuration and a key for every trial."""
+"""The plan of a study: a configuration and a key for every trial."""
 
 import hashlib
 from collections.abc import Mapping
@@ -25,16 +25,16 @@ from sim.users.person import Person
 
 
 class Trial(NamedTuple):
-    """A trial as it is planned.
+    """A planned trial.
 
     Attributes
     ----------
     key : str
-        Hash of configuration, seed and code.
+        Hash of configuration, seed, files and code.
     meeting : Meeting
-        Who meets what, and when.
+        User, condition and position in the design.
     config : RunConfig
-        What runs.
+        Configuration of the run.
     """
 
     key: str
@@ -48,7 +48,7 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
     Raises
     ------
     ControllerError, SimError, ModelError
-        If the design contradicts itself, a level sets what a run has not, or there is no such clip.
+        If the design contradicts itself, a level sets a parameter that a run does not have, or a clip does not exist.
     """
     people = participants(study.users)
     bases = {number: _base(study, people[0], condition) for number, condition in enumerate(conditions(study))}
@@ -63,7 +63,7 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
 
 
 def trial_seed(seed: int, meeting: Meeting) -> int:
-    """Seed of a trial: independent of that of every other one, and of how many users and repetitions there are."""
+    """Seed of a trial, independent of other trials' seeds and of the numbers of users and repetitions."""
     entropy = (seed, meeting.user, meeting.number, meeting.repetition)
     return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
 
@@ -74,7 +74,7 @@ def key_of(config: RunConfig) -> str:
     Raises
     ------
     StudyError
-        If a file that it names is not there.
+        If a file that it names does not exist.
     """
     told = to_json(resolved(config))
     files = [f"{name} {file_digest(name)}" for name in files_of(config)]
@@ -95,7 +95,7 @@ def file_digest(name: str) -> str:
     Raises
     ------
     StudyError
-        If it is not there.
+        If it does not exist.
     """
     try:
         return hashlib.sha256(Path(name).read_bytes()).hexdigest()
@@ -108,7 +108,7 @@ def file_digest(name: str) -> str:
 
 def _base(study: StudyConfig, person: Person, condition: Condition) -> RunConfig:
     words: Words = {"person": person, "seconds": study.seconds} | study.run | condition.words
-    if words.get("mode") != "lead":  # where the hand does nothing else
+    if words.get("mode") != "lead":  # in LEADING the hand does nothing but lead
         words.setdefault("user", study.users.does)
     try:
         return run_config(**words)

@@ -1,4 +1,4 @@
-"""Where recordings of trials are kept: tried before the first trial, so that no trial fails for it."""
+"""Check, before the first trial, that recordings of trials can be written to their folder or URL."""
 
 from experiments.trials.errors import StudyError
 
@@ -6,7 +6,7 @@ _TRIED = ".hvf"
 
 
 def check_place(url: str) -> None:
-    """Write an empty file to a folder or URL, and take it away again.
+    """Write an empty file to a folder or URL, and remove it again.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def check_place(url: str) -> None:
         system.makedirs(path, exist_ok=True)
         system.pipe_file(f"{path}/{_TRIED}", b"")
         system.rm_file(f"{path}/{_TRIED}")
-    except Exception as error:  # every store has exceptions of its own
+    except Exception as error:  # every storage backend has its own exceptions
         reason = " ".join(str(error).split()) or type(error).__name__
         raise StudyError(
             f"recordings = {url!r}: {reason}; expected a folder, or a URL that fsspec can write to"

@@ -1,4 +1,4 @@
-"""A trial, from its configuration to its row; the same on a thread, in a process, and on another machine."""
+"""Runs a trial, from its configuration to its row; the same on threads, in processes and on a cluster."""
 
 import os
 import platform
@@ -30,16 +30,16 @@ State = Literal["done", "failed"]
 
 
 class Task(NamedTuple):
-    """What a worker is given.
+    """A trial as it is given to a worker.
 
     Attributes
     ----------
     key : str
-        Of the trial.
+        Key of the trial.
     config : str
-        Its configuration, as JSON.
+        Configuration of the trial, as JSON.
     recordings : str
-        Folder or URL that keeps its recording; empty for none.
+        Folder or URL for its recording; empty for none.
     """
 
     key: str
@@ -48,22 +48,22 @@ class Task(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What a worker gives back.
+    """The result of a trial, as a worker returns it.
 
     Attributes
     ----------
     key : str
-        Of the trial.
+        Key of the trial.
     state : {"done", "failed"}
-        Whether it came to its end.
+        Whether the trial was completed.
     reason : str
-        Why not.
+        Why it failed; empty if it did not.
     measures : dict of str to float
         See `experiments.trials.measures`.
     seconds : float
-        Processor time that it took [s].
+        Processor time of the trial [s].
     worker, processor : str
-        Who ran it, on what.
+        Host and process that ran it, and model of the processor.
     """
 
     key: str
@@ -76,7 +76,7 @@ class Row(NamedTuple):
 
 
 class Shelf:
-    """Maps that have been made, for the runs on them that follow: they are read, never written.
+    """Cache of haptic maps that several runs share; a cached map is only read.
 
     Clips, alignment and blends of a map take ten times as long as the rest of a trial's set-up.
     """
@@ -87,7 +87,7 @@ class Shelf:
         self._lock = threading.Lock()
 
     def session(self, config: RunConfig, ready: Ready = lambda units: None) -> Session:
-        """A run that is wired up, on a map from the shelf."""
+        """Put a run together on a map from the cache, which is made first if it is missing."""
         key = _shared(config)
         with self._lock:
             lock = self._locks.setdefault(key, threading.Lock())
@@ -95,7 +95,7 @@ class Shelf:
             with lock:
                 if key not in self._made:
                     session = wire(config, ready=ready)
-                    # It was refined when the session was assembled.
+                    # The map was already refined when this session was assembled.
                     self._made[key] = replace(session.parts.maps, refined=None)
         return wire(config, ready=ready, maps_of=self._maps_of(key))
 
@@ -104,7 +104,7 @@ class Shelf:
 
 
 def _shared(config: RunConfig) -> object:
-    """What a map's parts depend on: of a map about a circle not the mode, of another one all but the hand."""
+    """Key of the settings on which a map depends: for a map about a circle not the mode, else all but seed and hand."""
     figure = (config.figure.kind == "none", config.figure.stature, config.figure.mass)
     if isinstance(config.map, Cylindrical | Composite):
         return config.map, figure
@@ -112,13 +112,13 @@ def _shared(config: RunConfig) -> object:
 
 
 SHELF = Shelf()
-"""Of this process."""
+"""The cache of this process."""
 
 
 def perform(task: Task, shelf: Shelf = SHELF) -> Row:
-    """Run a trial and measure it; one that raises is a row with its reason.
+    """Run a trial and measure it; an error in the trial gives a row with its reason.
 
-    What is wrong with the machine, not with the trial, is raised: it is no row, and another try may do better.
+    Errors of the machine rather than the trial are raised, so that the trial can be tried again.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _simulated(config: RunConfig, session: Session, log: TrialLog) -> dict[str, 
 
 
 def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -> dict[str, float]:
-    """Run a trial, recording it into a folder that is there, and measure it."""
+    """Run a trial, record it into an existing folder, and measure it."""
     servo, laws = session.servo, session.parts.program.python_laws
     static = session.static()
     with Recorder(folder / RECORDING, to_dict(config), config.seed, groups(servo), static) as recorder:
@@ -172,7 +172,7 @@ def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -
 
 
 def _keep(file: Path, url: str) -> None:
-    import fsspec  # an extra, that only whoever keeps recordings needs
+    import fsspec  # an optional dependency, needed for recordings only
 
     with fsspec.open(url, "wb") as target:
         target.write(file.read_bytes())  # pyright: ignore[reportAttributeAccessIssue]

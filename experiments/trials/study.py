@@ -1,4 +1,4 @@
-"""A study that is run: planned, continued where it was left, analysed."""
+"""Runs a study: plans its trials, continues where it was interrupted, and analyses the results."""
 
 import hashlib
 import platform
@@ -31,20 +31,20 @@ DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found.
+    """Results of a study.
 
     Attributes
     ----------
     folder : Path
-        That holds database, tables and report.
+        Folder of database, tables and report.
     table : pandas.DataFrame
-        A row a trial, in the order of the plan.
+        Table with a row per trial, in the order of the plan.
     found : Statistics
         All contrasts.
     sentences : tuple of str
-        What a skimming reader should know.
+        Main results, for a skimming reader.
     ran, failed : int
-        Trials that this call ran, and those of all that failed.
+        Number of trials that this call ran, and number of failed trials in the whole study.
     """
 
     folder: Path
@@ -58,7 +58,7 @@ class StudyResult:
         return "\n".join(self.sentences)
 
     def to_json(self) -> str:
-        """Sentences, counts and contrasts."""
+        """Sentences, counts, contrasts and interactions as JSON."""
         contrasts = [asdict(contrast) for contrast in self.found.contrasts]
         told = {"sentences": self.sentences, "trials": len(self.table), "ran": self.ran, "failed": self.failed}
         return json_text(told | {"contrasts": contrasts, "interactions": self.found.interactions})
@@ -66,14 +66,14 @@ class StudyResult:
 
 @dataclass(frozen=True)
 class Study:
-    """Simulated people under the conditions of a design: who does what, how often, and what is measured.
+    """A user study with simulated people: who does what under which conditions, how often, and what is measured.
 
     Parameters
     ----------
     config : StudyConfig
         The design.
     text : str
-        Its file, as the report shows it; by default the design as JSON.
+        Text of its file, as the report shows it; by default the design as JSON.
     """
 
     config: StudyConfig
@@ -86,7 +86,7 @@ class Study:
         Raises
         ------
         SimError, ControllerError
-            If it cannot be read, or says what a study has not.
+            If it cannot be read, or contains an unknown entry.
         """
         file = Path(path)
         config = study_from(read_toml(file, "a study"), str(file))
@@ -94,12 +94,12 @@ class Study:
 
     @staticmethod
     def of(**values: object) -> "Study":
-        """The study of what its file would say, as keywords.
+        """The study given by the entries of its file as keywords.
 
         Raises
         ------
         ControllerError
-            If it says what a study has not.
+            If there is an unknown entry.
         """
         return Study(study_from(values, "study"))
 
@@ -109,32 +109,32 @@ class Study:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """All trials, as they are planned; see `experiments.trials.plan.planned`."""
+        """All planned trials; see `experiments.trials.plan.planned`."""
         return planned(self.config)
 
     def run(
         self, out: str | Path, threads: int | None = None, workers: int | None = None, cluster: str | None = None,
         console: Console | None = None,
     ) -> StudyResult:  # fmt: skip
-        """Run what of the study has not run yet, and analyse it.
+        """Run the trials that have not been run yet, and analyse the study.
 
         Parameters
         ----------
         out : path
-            Folder of database, tables and report. One that holds this study is continued.
+            Folder of database, tables and report; if it holds this study, the study is continued.
         threads : int, optional
-            Of this process; by default as many as there are processors.
+            Number of threads of this process; by default the number of processors.
         workers : int, optional
-            Instead, processes of a local Dask cluster.
+            Run on this number of processes of a local Dask cluster instead.
         cluster : str, optional
-            Instead, the address of a Dask scheduler.
+            Run on the workers of the Dask scheduler at this address instead.
         console : Console, optional
             Where progress is shown; by default stderr.
 
         Raises
         ------
         ModelError, ControllerError, SimError, OSError
-            If the study contradicts itself, or cannot go on; what was done is kept.
+            If the study contradicts itself, or cannot go on; completed trials are kept.
         """
         console, folder, where = (
             console or Console(stderr=True),
@@ -168,7 +168,7 @@ class Study:
         return self.text or to_json(self.config)
 
     def _identity(self) -> str:
-        """Hash of what a study is, whatever its numbers of users and repetitions, and what is said of it."""
+        """Hash of the study without its numbers of users and repetitions, name, question, measures and recordings."""
         users = replace(self.config.users, number=1)
         same = replace(
             self.config, users=users, repetitions=1, name="", question="", measures=(), recordings="",
@@ -180,7 +180,7 @@ class Study:
         config = self.config
         kinds = {trial.config.figure.kind for trial in planned(replace(config, repetitions=1))}
         there = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
-        unasked = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure need not have the defaults
+        unasked = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # defaults may be missing for the figure
         for word, name in (("ease", config.ease), ("cost", config.cost)):
             if name in OF_CONDITIONS:
                 raise StudyError(f"study {config.name!r}: {word} = {name!r} is of a condition; expected one of a trial")
@@ -197,17 +197,17 @@ class Study:
         )
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
-        """What of the stability margin each condition uses."""
+        """Share of the stability margin that each condition uses, by number of the condition."""
         return {trial.meeting.number: kept_stability(trial.config).used for trial in _one_each(trials)}
 
 
 def _one_each(trials: Sequence[Trial]) -> list[Trial]:
-    """A trial of each condition."""
+    """One trial of each condition."""
     return list({trial.meeting.number: trial for trial in trials}.values())
 
 
 def _told(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
-    """What a reader of the database is told of each trial."""
+    """Descriptions of the trials for readers of the database, by key."""
     told: dict[str, dict[str, object]] = {}
     for key, met, config in trials:
         place: dict[str, object] = {"user": met.user, "repetition": met.repetition, "position": met.position}

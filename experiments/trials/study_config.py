@@ -1,4 +1,4 @@
-"""A study as it is written: one TOML file, or the same in Python."""
+"""Configuration of a study, read from a TOML file or given in Python."""
 
 import tomllib
 from collections.abc import Mapping
@@ -12,22 +12,21 @@ from experiments.config.part import above, from_dict, part, whole
 from experiments.trials.errors import StudyError
 
 Words = dict[str, Any]
-"""A run in words, as `experiments.config.words.run_config` takes them."""
+"""Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
 
 
 @part
 class Users:
-    """Who takes part.
+    """Participants of a study.
 
     Parameters
     ----------
     number : int
-        How many simulated people.
+        Number of simulated people.
     seed : int
-        Of the population that they are drawn from.
+        Seed of the population from which they are drawn.
     does : str
-        What they mean to do, as ``hvf run --user`` has it, unless a factor sets the word "user"; they lead in the mode
-        "lead".
+        Their task, as in ``hvf run --user``, unless a factor sets the word "user"; in the mode "lead" they lead.
     """
 
     number: int = whole(1, default=12)
@@ -42,31 +41,31 @@ class StudyConfig:
     Parameters
     ----------
     name : str
-        What heads the report.
+        Title of the report.
     factors : mapping
-        By name of a factor its levels, by name of a level what it sets, in the words of a run.
+        Levels by name of the factor; each level has a name and the words of a run that it sets.
     question : str
-        What it is to answer.
+        Question that the study is to answer.
     run : mapping
-        What all conditions share, in the words of a run.
+        Words of a run that all conditions share.
     between : tuple of str
-        Factors of which a user meets one level only; of the others every user meets every level.
+        Between-subject factors, of which a user meets one level only; all others are within-subject.
     users : Users
-        Who takes part.
+        The participants.
     repetitions : int
-        Of every condition by every user.
+        Number of repetitions of every condition by every user.
     order : {"latin-square", "fixed"}
-        Of the conditions of a user: each as often in every place and after every other one, or as they are written.
+        Order of a user's conditions: counterbalanced by a balanced Latin square, or as written.
     measures : tuple of str
-        By default all that the figure has (see `experiments.trials.measures`).
+        Measures; by default all that exist for the figure (see `experiments.trials.measures`).
     ease, cost : str
-        The two measures that the report begins with: how hard the task was, and what that costs.
+        The two measures with which the report begins: how hard the task was, and what that costs.
     seconds : float
         Simulated time of a trial [s].
     seed : int
-        Of all that is random in the trials beside who the users are.
+        Seed of everything random in the trials except the choice of users.
     recordings : str
-        Folder, or URL that fsspec knows, that keeps a recording of every trial; none by default.
+        Folder, or URL supported by fsspec, for a recording of every trial; none by default.
     """
 
     name: str
@@ -91,14 +90,14 @@ class StudyConfig:
 
 
 def study_from(values: Mapping[str, object], where: str) -> StudyConfig:
-    """A study from what its file says; a factor may be written as a list of values of the word that it is named after.
+    """A study from the entries of its file; a factor may be a list of values of the word after which it is named.
 
     Raises
     ------
     ParameterError
-        If it says something that a study has not, or leaves out what it must have.
+        If there is an unknown entry, or a required one is missing.
     StudyError
-        If a factor has no levels, or one of them twice.
+        If a factor is neither a list nor a table, or has a level twice.
     """
     given = dict(values)
     factors = given.get("factors", {})
@@ -122,7 +121,7 @@ def _levels(name: str, levels: object) -> object:
 
 
 def read_toml(path: Path, what: str) -> dict[str, object]:
-    """What a TOML file says.
+    """Content of a TOML file.
 
     Raises
     ------

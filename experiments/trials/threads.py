@@ -1,27 +1,27 @@
-"""Trials on the threads of one process: the compiled loop holds no lock, and what is made once is shared."""
+"""Executor of trials on the threads of one process: the compiled loop releases the GIL, and maps are shared."""
 
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 from experiments.trials.run_trial import Row, Task, perform
 
-AHEAD = 2  # tasks that wait for each thread, so that none is idle; more would only be memory
+AHEAD = 2  # tasks queued for each thread, so that none is idle; more would only take memory
 
 
 class Threads:
-    """Runs trials side by side.
+    """Runs trials in parallel.
 
     Parameters
     ----------
     number : int
-        How many at a time.
+        Number of simultaneous trials.
     """
 
     def __init__(self, number: int):
         self._number = number
 
     def rows(self, tasks: Iterable[Task]) -> Iterator[Row]:
-        """Rows of tasks, as they are done; tasks are asked for as they are needed.
+        """Yield rows of tasks as they are completed; tasks are drawn from the iterable as they are needed.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What of a trial is kept in memory until it is measured."""
+"""The channels of a trial that are kept in memory until the trial is measured."""
 
 import numpy as np
 
@@ -17,8 +17,8 @@ class TrialLog:
     Attributes
     ----------
     ticks, frames : dict of str to Array
-        By channel, as `sim.loop.loop.groups` names them; frames without a figure have no reference, and of one that is
-        only shown no errors and forces.
+        Data by channel, with the names of `sim.loop.loop.groups`; without a figure `frames` is empty, and for a
+        kinematic figure it has no errors and forces.
     """
 
     def __init__(self, servo: Servo, world: World):
@@ -28,7 +28,7 @@ class TrialLog:
         self._frames: dict[str, list[Array]] = {}
 
     def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
-        """Take a block."""
+        """Add a block."""
         channels = tick_channels(ticks, n)
         for name, blocks in self._ticks.items():
             blocks.append(channels[name].copy())
@@ -44,10 +44,10 @@ class TrialLog:
 
     @property
     def ticks(self) -> dict[str, Array]:
-        """Channels at the servo's rate."""
+        """Channels at the rate of the servo."""
         return {name: np.concatenate(blocks) for name, blocks in self._ticks.items()}
 
     @property
     def frames(self) -> dict[str, Array]:
-        """Channels at the figure's rate; none without a figure."""
+        """Channels at the rate of the figure's control; none without a figure."""
         return {name: np.concatenate(blocks) for name, blocks in self._frames.items()}

@@ -1,1 +1,1 @@
-"""Tuning: any numbers of a configuration, by what people at the stylus make of them, within what is certified."""
+"""Tuning of any parameters of a run, by how simulated people perform with them, among certified values only."""

@@ -1,4 +1,4 @@
-"""What tuning is held against, and how all of them do with people who took no part in it."""
+"""Comparison of the tuned values with baselines, on held-back users who took no part in the tuning."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -18,24 +18,24 @@ from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
 from experiments.tuning.tune_config import TuneConfig
 
-HALF = 0.5  # of the critical gain: J. G. Ziegler and N. B. Nichols, "Optimum settings for automatic controllers", 1942
+HALF = 0.5  # share of the critical gain: Ziegler and Nichols, "Optimum settings for automatic controllers", 1942
 RESAMPLES = 4999
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A configuration, judged on the held-back users.
+    """A configuration, evaluated on the held-back users.
 
     Attributes
     ----------
     name : str
-        What made it.
+        Method that made it.
     values : dict of str to float
-        What it sets.
+        Values that it sets, by word of a run.
     config : RunConfig
-        All of it, with nobody at the stylus.
+        The whole configuration, without a person at the stylus.
     stability : Stability
-        What is certain of it.
+        Its stability certificate.
     by_user : Array
         Objectives of each held-back user, shape (users, objectives).
     """
@@ -48,7 +48,7 @@ class Contender:
 
     @property
     def means(self) -> Array:
-        """Over the users, shape (objectives,)."""
+        """Mean objectives over the users, shape (objectives,)."""
         return np.mean(self.by_user, axis=0)
 
 
@@ -62,11 +62,11 @@ def contenders(
     config : TuneConfig
         The tuning.
     tuned : Candidate
-        What it chose.
+        The candidate chosen by the tuning.
     searched : mapping of str to Candidate
-        By name, what others chose.
+        The candidates chosen by other searches, by name.
     panel : Panel
-        That tries them.
+        Runs the trials.
     """
     values: dict[str, dict[str, float]] = {"tuned": tuned.values, "defaults": {}}
     values |= {name: candidate.values for name, candidate in searched.items() if candidate is not None}
@@ -77,10 +77,10 @@ def contenders(
 
 
 def half_critical(config: TuneConfig) -> dict[str, float] | None:
-    """Ziegler and Nichols's proportional rule: half the gain at which the loop is on the verge, at the default damping.
+    """Ziegler and Nichols's rule for proportional control: half the critical gain, at the default damping.
 
-    The verge is the certificate's, with the least favourable hand; the other numbers are the defaults. None where the
-    stiffness is not tuned, or there is no certificate.
+    The critical gain is the certificate's, for the least favourable hand; all other parameters have their defaults.
+    None if the stiffness is not tuned, or there is no certificate.
     """
     if "stiffness" not in config.space:
         return None
@@ -103,18 +103,18 @@ def _judged(config: TuneConfig, name: str, values: dict[str, float], panel: Pane
 
 
 def interval(differences: Array, seed: int) -> tuple[float, float]:
-    """95 % BCa bootstrap interval of a mean of paired differences; NaN where they do not spread."""
+    """95 % BCa bootstrap interval of a mean of paired differences; NaN if they are equal, infinite or fewer than 3."""
     from scipy.stats import bootstrap
 
     if len(differences) < 3 or not np.all(np.isfinite(differences)) or np.ptp(differences) == 0.0:
         return float("nan"), float("nan")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a degenerate sample, whose interval is then NaN
+        warnings.simplefilter("ignore")  # warned: a degenerate sample; its interval is NaN
         found = bootstrap((differences,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(seed))
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def wins(contender: Contender, tuned: Contender, directions: Sequence[str]) -> Array:
-    """Differences of a contender from what was tuned, by user, positive where the tuned one is better."""
+    """Differences between a contender and the tuned one by user and objective, positive where the tuned is better."""
     signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
     return signs * (contender.by_user - tuned.by_user)

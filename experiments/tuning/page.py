@@ -1,4 +1,4 @@
-"""report.html of a tuning: what was chosen, what it gains, in one file that opens from disk."""
+"""report.html of a tuning: the chosen values and what they gain, in one self-contained file."""
 
 import html
 import math
@@ -31,7 +31,7 @@ def tuning_page(
     config: TuneConfig, text: str, said: Sequence[str], judged: Sequence[Contender], comparisons: Sequence[Any],
     importances: Mapping[str, Mapping[str, float]], plots: Sequence[Figure | None], verdicts: Mapping[str, str],
 ) -> str:  # fmt: skip
-    """The page; comparisons are of `experiments.tuning.tuning.Comparison`, verdicts are reasons by name."""
+    """HTML of the page; comparisons are `experiments.tuning.tuning.Comparison`, verdicts are reasons by certificate."""
     body = _BODY.format(
         sentences=sentences(said),
         plots="".join(image(plot, "plot") for plot in plots if plot is not None),

@@ -1,4 +1,4 @@
-"""What a panel of users makes of a candidate: trials that are run once, and kept."""
+"""Evaluation of candidates by a panel of simulated users; every trial is run once and stored."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ from experiments.tuning.tune_config import MARGIN, TuneConfig
 
 
 def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[list[RunConfig]]:
-    """Runs of a candidate by user, with the same seeds for every candidate: what differs between them is theirs."""
+    """Runs of a candidate by user, with the same seeds for every candidate, so that differences are the candidates'."""
     runs: list[list[RunConfig]] = []
     for number, person in enumerate(participants(users)):
         own: list[RunConfig] = []
@@ -34,14 +34,14 @@ def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[l
 
 
 class Panel:
-    """Runs trials of candidates, each once: what the database has is not run again.
+    """Runs trials of candidates; trials that are in the database are not run again.
 
     Parameters
     ----------
     database : Database
-        That keeps their rows.
+        Stores the rows of the trials.
     executor : Executor
-        That runs them.
+        Runs the trials.
     """
 
     def __init__(self, database: Database, executor: Executor):
@@ -51,12 +51,12 @@ class Panel:
     def objectives(self, config: TuneConfig, runs: Sequence[Sequence[RunConfig]], margin: float | None) -> Array:
         """Objectives by user, shape (users, objectives): the mean over a user's trials that have the measure.
 
-        Infinite if one of the user's trials failed: what is better with some of them is no candidate.
+        Infinite if one of the user's trials failed, which excludes the candidate.
 
         Raises
         ------
         StudyError
-            If no trial has a measure.
+            If no trial has one of the measures.
         """
         keys = [[key_of(run) for run in own] for own in runs]
         wanted = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}

@@ -1,4 +1,4 @@
-"""Plots of a tuning: the objectives, and the gains with the certificate's boundary."""
+"""Plots of a tuning: candidates by their objectives, and by their gains with the certificate's stability boundary."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,7 +16,7 @@ _TRIED, _FRONT, _CHOSEN, _REFUSED = "#7f8ea3", "#1f5fbf", "#d9542b", "#b04040"
 
 
 def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate) -> Figure:
-    """Candidates by two objectives, their front joined; of one objective, how the best of them came down."""
+    """Candidates by the first two objectives with their Pareto front; for one objective, the best value over time."""
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     axis = figure.subplots()
     tried = [c for c in candidates if c.objectives is not None]
@@ -44,7 +44,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
 
 
 def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
-    """Places of the front of the first two objectives, whatever the others are, by the first one, shape (n, 2)."""
+    """Pareto front of the first two objectives alone, sorted by the first, shape (n, 2)."""
     two = [c._replace(objectives=c.objectives[:2]) for c in tried if c.objectives is not None]
     return np.array(sorted(c.objectives for c in front(two, config.directions[:2]) if c.objectives is not None))
 
@@ -52,9 +52,9 @@ def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
 def gains_figure(
     config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate, others: Mapping[str, Mapping[str, float]]
 ) -> Figure | None:
-    """Candidates in the plane of stiffness and damping, with the boundary of the certificate; None without both.
+    """Candidates in the plane of stiffness and damping, with the stability boundary; None if one of them is not tuned.
 
-    The boundary is the least over all hands of the certificate's range.
+    The boundary is the least over all hands of the certificate's range; None also if there is no certificate.
     """
     if not {"stiffness", "damping"} <= set(config.space):
         return None

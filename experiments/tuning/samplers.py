@@ -1,17 +1,17 @@
-"""Who proposes candidates: optuna's samplers, made anew for each candidate."""
+"""Samplers that propose candidates: those of optuna, made anew for each candidate."""
 
 from collections.abc import Callable
 
 import numpy as np
 import optuna
 
-STARTUP = 10  # candidates drawn at random before a sampler that learns begins to
+STARTUP = 10  # candidates drawn at random before a sampler begins to learn from results
 
 
 def sampler_of(name: str, seed: int, number: int) -> optuna.samplers.BaseSampler:
-    """A sampler for the candidate of a number alone: so a search that was stopped goes on as it would have.
+    """The sampler of the candidate with a number; a search that was interrupted continues as it would have.
 
-    What it learns from is in the study; what else it draws from is its seed.
+    A sampler's state is the study's results, which are stored, and its seed, which depends on the number.
     """
     mixed = int(np.random.SeedSequence((seed, *name.encode(), number)).generate_state(1, np.uint32)[0])
     makers: dict[str, Callable[[], optuna.samplers.BaseSampler]] = {

@@ -1,4 +1,4 @@
-"""The search: candidates are proposed, certified, and only then tried on the panel; all of it is kept as it goes."""
+"""The search of a tuning: candidates are proposed, certified and only then tried on the panel; each step is stored."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -13,24 +13,24 @@ from experiments.tuning.samplers import STARTUP, sampler_of
 from experiments.tuning.tune_config import TuneConfig
 
 _TOLD = (TrialState.COMPLETE, TrialState.PRUNED)
-REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
+REFUSED_MOST = 30  # proposals per candidate to simulate; a space that needs more has hardly a certified point
 
 
 class Candidate(NamedTuple):
-    """A candidate that was proposed.
+    """A proposed candidate.
 
     Attributes
     ----------
     values : dict of str to float
-        By word of a run.
+        Values by word of a run.
     objectives : tuple of float or None
-        In the order of the tuning; None of one that was not tried, or given up.
+        Objectives in the order of the tuning; None if the candidate was refused or given up.
     verdict : str
-        Of its stability.
+        Verdict of the stability certificate.
     margin : float or None
-        Of its stability.
+        Margin of the stability certificate.
     state : {"tried", "given up", "refused"}
-        What became of it.
+        Whether it was tried on the panel, given up, or refused by the certificate.
     """
 
     values: dict[str, float]
@@ -48,20 +48,20 @@ def search(
     sampler: str,
     progress: Callable[[int], None],
 ) -> list[Candidate]:
-    """Search until enough candidates have been simulated, going on with what the storage has.
+    """Search until enough candidates have been simulated, continuing from the candidates in the storage.
 
     Parameters
     ----------
     config : TuneConfig
-        What is tuned.
+        The tuning.
     storage : optuna.storages.BaseStorage
-        That keeps the search; see `experiments.tuning.storage`.
+        Storage of the search; see `experiments.tuning.storage`.
     identity : str
-        Of the tuning, by which the storage knows it.
+        Hash of the tuning, its name in the storage.
     panel : Panel
-        That tries candidates.
+        Tries the candidates.
     sampler : str
-        Who proposes; see `TuneConfig`.
+        Sampler that proposes candidates; see `TuneConfig`.
     progress : callable
         Called with the number of simulated candidates.
     """
@@ -75,7 +75,7 @@ def search(
         for word, span in config.space.items()
     }
     for begun in study.get_trials(states=(TrialState.RUNNING,)):
-        study.tell(begun.number, state=TrialState.FAIL)  # it was under way when the search was stopped: asked for again
+        study.tell(begun.number, state=TrialState.FAIL)  # interrupted with the search: it is proposed again
     while True:
         simulated, all_of_them = _simulated(study), len(study.get_trials(deepcopy=False, states=_TOLD))
         progress(simulated)
@@ -109,7 +109,7 @@ def _try(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Pa
 
 
 def violation_of(config: TuneConfig, stability: Stability) -> float:
-    """How far a candidate is from what may be tried: 0 or less of one that may."""
+    """How far a candidate violates the constraint of the certificate; 0 if it may be tried."""
     if stability.verdict == "refuted":
         return 1.0 - min(0.0, stability.margin or 0.0)
     if stability.verdict == "unknown" and not config.allow_unknown:
@@ -118,7 +118,7 @@ def violation_of(config: TuneConfig, stability: Stability) -> float:
 
 
 def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability: Stability) -> list[float] | None:
-    """Means over the panel; None of a candidate that is given up after part of it."""
+    """Mean objectives over the panel; None if the candidate is given up after part of the panel."""
     by_user = panel_runs(config, config.config(trial.params), config.users)
     third = max(1, len(by_user) // 3)
     parts = [by_user[:third], by_user[third:]] if config.prune and len(config.objectives) == 1 else [by_user]
@@ -133,11 +133,11 @@ def _objectives(config: TuneConfig, trial: optuna.Trial, panel: Panel, stability
 
 
 def candidates_of(study: optuna.Study) -> list[Candidate]:
-    """All that were proposed, in their order."""
+    """All proposed candidates, in their order."""
     made: list[Candidate] = []
     for t in study.get_trials(deepcopy=False, states=_TOLD):
         attributes: dict[str, Any] = t.user_attrs
-        complete = t.state == TrialState.COMPLETE  # one that is given up has the value of part of the panel
+        complete = t.state == TrialState.COMPLETE  # a candidate that is given up has values of part of the panel only
         state = "refused" if attributes["violation"] > 0.0 else "tried" if complete else "given up"
         values = tuple(t.values) if complete else None
         made.append(Candidate(dict(t.params), values, attributes["verdict"], attributes["margin"], state))
@@ -145,7 +145,7 @@ def candidates_of(study: optuna.Study) -> list[Candidate]:
 
 
 def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
-    """Those that no other one is better than in one objective without being worse in another."""
+    """The Pareto front: candidates that no other one dominates."""
     tried = [candidate for candidate in candidates if candidate.objectives is not None]
     signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
     costs = np.array([signs * np.array(c.objectives) for c in tried]).reshape(len(tried), len(signs))
@@ -156,7 +156,10 @@ def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Ca
 
 
 def chosen(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
-    """Of one objective the best; of more the one of the front nearest to the best of each, scaled."""
+    """The best candidate of one objective; of several the one of the front nearest to the ideal point.
+
+    Objectives are scaled to their range on the front. None if no candidate was tried.
+    """
     best = front(candidates, directions)
     if not best:
         return None

@@ -1,4 +1,4 @@
-"""Where a search is kept, so that it goes on where it was stopped: a journal file, or a database of SQLAlchemy."""
+"""Storage of a search, from which it can be continued: a journal file, or a database by SQLAlchemy."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from experiments.trials.errors import StudyError
 
 
 def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
-    """Optuna's storage at a place.
+    """Optuna's storage in a file or at a URL.
 
     Parameters
     ----------
@@ -19,13 +19,13 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
     Raises
     ------
     StudyError
-        If nothing answers there.
+        If the database cannot be reached.
     """
     if "://" not in str(where):
         return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
     try:
         return optuna.storages.RDBStorage(str(where))
-    except Exception as error:  # of SQLAlchemy, of a driver that is not installed, of a server that does not answer
+    except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer
         said = str(error).strip().splitlines()[0]
         raise StudyError(
             f"{where}: no storage for a search ({said}); expected a URL of SQLAlchemy such as sqlite:///tune.db"

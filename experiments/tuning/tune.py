@@ -1,4 +1,4 @@
-"""Tuning of a simulation from Python: any of its numbers, by any cost, within what is certified."""
+"""Tuning of a simulation from Python: any of its parameters, by any cost, among certified candidates only."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,29 +17,29 @@ from experiments.simulation import Simulation, User
 from experiments.sweep import with_values
 
 Cost = Callable[[Run], float | Sequence[float]]
-REFUSED_MOST = 30  # times the candidates that are simulated: beyond that the space has hardly a certified point
+REFUSED_MOST = 30  # proposals per candidate to simulate; a space that needs more has hardly a certified point
 
 
 @dataclass(frozen=True)
 class Search:
-    """How a search goes.
+    """Settings of a search.
 
     Parameters
     ----------
     candidates : int
-        How many are simulated.
+        Number of candidates to simulate.
     sampler : {"tpe", "cma-es", "nsga-ii", "random"}
-        Who proposes them.
+        Sampler that proposes them.
     costs : int
-        How many numbers the cost gives; of more than one a front is sought.
+        Number of values that the cost returns; if more than one, a Pareto front is sought.
     threads : int
-        Runs at a time.
+        Number of simultaneous runs.
     allow_unknown : bool
-        Try candidates of which nothing is certain, too; what is refuted is never tried.
+        Also try candidates whose stability is unknown; refuted ones are never tried.
     journal : path or URL, optional
-        What keeps the search, so that it goes on where it was stopped: a file, or a database as of ``sqlite:///``.
+        Storage from which the search can be continued: a file, or a database such as ``sqlite:///``.
     seed : int
-        Of what is random in it.
+        Seed of the search.
     """
 
     candidates: int = 30
@@ -53,20 +53,20 @@ class Search:
 
 @dataclass(frozen=True)
 class TunedSimulation:
-    """What tuning a simulation found.
+    """Result of tuning a simulation.
 
     Attributes
     ----------
     sim : Simulation
-        With the best values set; of several costs, with those of the front that have the least of the first.
+        The simulation with the best values set; for several costs, those on the front with the least first cost.
     values : dict of str to float
-        What was set, by path.
+        These values, by path.
     costs : tuple of float
-        Means over the panel.
+        Their costs, means over the panel.
     front : tuple of (dict, tuple)
-        Values and costs of all that nothing else beats.
+        Values and costs of all candidates on the Pareto front.
     tried, refused : int
-        Candidates that were simulated, and those that the certificate refused.
+        Number of candidates that were simulated, and number that the certificate refused.
     """
 
     sim: Simulation
@@ -81,32 +81,32 @@ def tune(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, panel: Sequence[User] = (),
     seconds: float = 6.0, search: Search | None = None,
 ) -> TunedSimulation:  # fmt: skip
-    """Find the numbers of a simulation at which a cost is least; what the certificate refutes is never tried.
+    """Find the parameters of a simulation that minimise a cost; candidates that the certificate refutes are not tried.
 
     Parameters
     ----------
     sim : Simulation
-        As it is else.
+        Simulation with the values of all other parameters.
     space : mapping of str to (float, float)
-        Lowest and highest, by path as `hvf.sweep` has it: ``{"field.k_r": (50, 2000)}``.
+        Lowest and highest value by path of the parameter, as in `hvf.sweep`: ``{"field.k_r": (50, 2000)}``.
     cost : callable
-        From a run to what is to be small: a number, or several of which the front is sought.
+        Function of a run that returns the cost to minimise, or several costs whose Pareto front is sought.
     panel : sequence of User
-        Who tries each candidate; costs are means over them. By default the simulation's own user.
+        Users who try each candidate; costs are means over them. By default the simulation's own user.
     seconds : float
         Simulated time of each run [s].
     search : Search, optional
-        How the search goes.
+        Settings of the search.
 
     Raises
     ------
     ParameterError
-        If the space has no such number, or none of its candidates may be tried.
+        If the space has an unknown parameter, or none of its candidates may be tried.
     """
-    import optuna  # an extra, that takes half a second to import
+    import optuna  # an optional dependency, which takes half a second to import
 
     search, users = search or Search(), tuple(panel) or (sim.user,)
-    # What there is not is told, and what has to be compiled is, before anything runs.
+    # A session in the middle of the space: reports unknown parameters and compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _study(search, _name(sim, space, cost, len(users), seconds, search))
     complete, ranges = (optuna.trial.TrialState.COMPLETE,), _ranges(space)
@@ -140,7 +140,7 @@ def _ranges(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
 def _name(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: int, seconds: float, search: Search
 ) -> str:
-    """Of a search in its journal: one of another simulation, space or cost does not go on with its numbers."""
+    """Name of a search in its journal; it differs for another simulation, space or cost, so that none is mixed up."""
     code = getattr(cost, "__code__", None)
     does = (
         (code.co_code, code.co_names, [str(value) for value in code.co_consts if not isinstance(value, CodeType)])
@@ -170,7 +170,7 @@ def _asked(study: Any, search: Search, ranges: Mapping[str, Any], number: int) -
 
 
 def _means(candidate: Simulation, users: Sequence[User], cost: Cost, seconds: float, threads: int) -> list[float]:
-    """Costs of a candidate, over its users."""
+    """Costs of a candidate, means over the users."""
 
     def run(user: User) -> Run:
         return replace(candidate, user=user).run(seconds)

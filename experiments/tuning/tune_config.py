@@ -1,4 +1,4 @@
-"""A tuning as it is written: one TOML file."""
+"""Configuration of a tuning, read from a TOML file."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,19 +16,19 @@ from experiments.trials.participants import participants
 from experiments.trials.study_config import Users, Words, read_toml
 
 MARGIN = "margin"
-"""Objective that is no measure: (critical k_r)/k_r − 1 of the certificate, the more the better."""
+"""Objective that is not a measure of trials: the certificate's margin (critical k_r)/k_r − 1, to be maximised."""
 
 
 @part
 class Range:
-    """Numbers that a word of a run may take.
+    """Range of a parameter.
 
     Parameters
     ----------
     low, high : float
-        Inclusive.
+        Bounds, inclusive.
     log : bool
-        Whether their logarithm is drawn.
+        Whether it is sampled on a logarithmic scale.
     """
 
     low: float
@@ -38,45 +38,45 @@ class Range:
 
 @part
 class TuneConfig:
-    """A tuning: which numbers, for whom, by what, and how long.
+    """A tuning: search space, objectives, users and budget.
 
     Parameters
     ----------
     name : str
-        What heads the report.
+        Title of the report.
     space : mapping
-        By word of a run, the range it is drawn from.
+        Range of each tuned parameter, by word of a run.
     objectives : tuple of str
-        Measures of trials (see `experiments.trials.measures`), each the mean over the panel, or "margin"; of more than
-        one, what is best is a front.
+        Measures of trials (see `experiments.trials.measures`), each the mean over the panel, or "margin"; for more than
+        one a Pareto front is sought.
     run : mapping
-        What all candidates share, in the words of a run; what the space leaves out, and where tuning begins.
+        Words of a run that all candidates share.
     users : Users
         The panel.
     held_back : Users
-        Whom the result is judged on; of another seed.
+        Users on whom the result is evaluated, of another seed than the panel.
     tasks : tuple of str
-        What every user does in turn, as ``hvf run --user`` has it, where one task does not have all objectives: who
-        traces expresses nothing. By default what `users` and `held_back` say.
+        Tasks of every user in turn, as in ``hvf run --user``, for objectives that no single task has: tracing, for
+        example, has no expressiveness. By default the tasks of `users` and `held_back`.
     repetitions : int
         Trials of a candidate with every user and task.
     seconds : float
         Simulated time of a trial [s].
     candidates : int
-        How many are simulated.
+        Number of candidates to simulate.
     sampler : {"tpe", "cma-es", "nsga-ii", "random"}
-        Who proposes them.
+        Sampler that proposes them.
     prune : bool
-        Give up a candidate that is worse than the median after part of the panel; of one objective only.
+        Give up a candidate that is worse than the median after part of the panel; with one objective only.
     least_margin : float
-        Of the stability certificate, below which a candidate is not tried.
+        Margin of the stability certificate below which a candidate is not tried.
     allow_unknown : bool
-        Try candidates of which nothing is certain, too; what is refuted is never tried.
+        Also try candidates whose stability is unknown; refuted ones are never tried.
     seed : int
-        Of the search and of the trials.
+        Seed of the search and of the trials.
     storage : str
-        URL of a database that SQLAlchemy knows and that keeps the search, such as ``sqlite:///tune.db``, or another
-        file for its journal than the one in the folder.
+        URL of a database for SQLAlchemy, such as ``sqlite:///tune.db``, or file of a journal, in which the search is
+        stored; by default a journal in the folder.
     """
 
     name: str
@@ -98,11 +98,11 @@ class TuneConfig:
 
     @property
     def directions(self) -> tuple[Literal["minimize", "maximize"], ...]:
-        """Of the objectives."""
+        """Directions of the objectives."""
         return tuple("maximize" if more_is_better(name) else "minimize" for name in self.objectives)
 
     def config(self, values: Mapping[str, float], does: str | None = None) -> RunConfig:
-        """The run of a candidate, with nobody at the stylus yet, or with the first of the panel who does something."""
+        """The run of a candidate, without a person at the stylus or, given a task, with the panel's first user."""
         words: Words = self.run | dict(values) | {"seconds": self.seconds}
         if does is not None:
             words |= {"user": does, "person": participants(replace(self.users, number=1))[0]}
@@ -110,12 +110,12 @@ class TuneConfig:
 
 
 def more_is_better(objective: str) -> bool:
-    """Whether an objective is to be large."""
+    """Whether an objective is to be maximised."""
     return objective == MARGIN or MEASURES[objective].better == "more"
 
 
 def label_of(objective: str) -> str:
-    """An objective, for a person."""
+    """Name and unit of an objective, for display."""
     return "margin of stability, (critical k_r)/k_r − 1" if objective == MARGIN else MEASURES[objective].label
 
 
@@ -138,7 +138,7 @@ def check_tuning(config: TuneConfig) -> None:
     Raises
     ------
     StudyError, ParameterError
-        If it does.
+        If it contradicts itself.
     """
     where = f"tuning {config.name!r}"
     _check_space(config, where)

@@ -1,4 +1,4 @@
-"""A tuning that is run: searched, held against others, certified, and told."""
+"""Runs a tuning: search, comparison with baselines, certificate and report."""
 
 import hashlib
 from collections.abc import Sequence
@@ -35,16 +35,16 @@ RANDOM = "random search"
 
 @dataclass(frozen=True)
 class Comparison:
-    """A contender against what was tuned, on one objective and the held-back users.
+    """A contender compared with the tuned values, on one objective and the held-back users.
 
     Attributes
     ----------
     contender, objective : str
-        Which.
+        Name of the contender and of the objective.
     mean, tuned : float
-        Over the users.
+        Means over the users, of the contender and of the tuned values.
     better_by, low, high : float
-        By how much the tuned one is better, with its 95 % bootstrap interval over users.
+        By how much the tuned values are better, with the 95 % bootstrap interval over users.
     """
 
     contender: str
@@ -58,22 +58,22 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a tuning found.
+    """Result of a tuning.
 
     Attributes
     ----------
     folder : Path
-        That holds journal, database, report and the chosen configuration.
+        Folder of journal, database, report and the chosen configuration.
     values : dict of str to float
-        Chosen.
+        The chosen values, by word of a run.
     candidates : tuple of Candidate
-        All that were proposed.
+        All proposed candidates.
     comparisons : tuple of Comparison
-        On the held-back users.
+        Comparisons with the other contenders, on the held-back users.
     importances : dict of str to dict
-        By objective, share of each number of the space in what differs.
+        Importance of each tuned parameter, by objective.
     sentences : tuple of str
-        What a skimming reader should know.
+        Main results, for a skimming reader.
     """
 
     folder: Path
@@ -87,7 +87,7 @@ class Tuned:
         return "\n".join(self.sentences)
 
     def to_json(self) -> str:
-        """All of it but the folder."""
+        """The result without the folder, as JSON."""
         told = {"values": self.values, "sentences": self.sentences, "importances": self.importances}
         comparisons = [asdict(comparison) for comparison in self.comparisons]
         candidates = [candidate._asdict() for candidate in self.candidates]
@@ -97,16 +97,16 @@ class Tuned:
 def run_tuning(
     config: TuneConfig, out: Path, text: str = "", where: Where | None = None, console: Console | None = None
 ) -> Tuned:
-    """Search, hold what was found against others, certify it, and write a report.
+    """Search, compare the chosen candidate with others, certify it, and write a report.
 
     Parameters
     ----------
     config : TuneConfig
-        What is tuned.
+        The tuning.
     out : Path
-        Folder; one that holds this tuning is continued.
+        Folder; if it holds this tuning, the tuning is continued.
     text : str
-        The tuning's file, as the report shows it.
+        Text of the tuning's file, as the report shows it.
     where : Where, optional
         Where trials run; by default on as many threads as there are processors.
     console : Console, optional
@@ -115,7 +115,7 @@ def run_tuning(
     Raises
     ------
     ModelError, ControllerError, SimError, OSError
-        If it contradicts itself, or cannot go on; what was tried is kept.
+        If it contradicts itself, or cannot go on; completed trials are kept.
     """
     console, text = console or Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
@@ -174,7 +174,7 @@ def _gains(contender: Contender) -> dict[str, float]:
 
 
 def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison]:
-    """Every other contender against the first one, on every objective."""
+    """Comparisons of every other contender with the first one, which is the tuned one, on every objective."""
     made: list[Comparison] = []
     for contender in judged[1:]:
         better = wins(contender, judged[0], config.directions)
@@ -186,7 +186,7 @@ def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison
 
 
 def importances_of(config: TuneConfig, candidates: Sequence[Candidate]) -> dict[str, dict[str, float]]:
-    """Share of each number of the space in what differs between the better candidates and all (optuna's PED-ANOVA)."""
+    """Hyperparameter importances of the tuned parameters, by objective (optuna's PED-ANOVA)."""
     import optuna
 
     tried = [c for c in candidates if c.objectives is not None]

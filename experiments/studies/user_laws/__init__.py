@@ -1,1 +1,1 @@
-"""People against the published laws of human movement, on a device that gives no force."""
+"""Simulated people compared with published laws of human movement, on a device without a field."""

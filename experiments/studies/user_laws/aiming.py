@@ -12,14 +12,14 @@ from sim.users.person import Person
 from sim.users.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
-TIMES = (0.2, 0.3, 0.4)  # [s] of a movement that is timed: less than it takes to see where it ends
-MOVES = 10  # from side to side; the first two are practice
+TIMES = (0.2, 0.3, 0.4)  # [s] imposed movement times, too short for visual feedback on the end
+MOVES = 10  # movements from side to side; the first two are practice
 _PRACTICE = 2
-_SECONDS = 20.0  # in which the slowest have made all moves
+_SECONDS = 20.0  # [s] in which also the slowest people complete all movements
 
 
 def fitts(people: Sequence[Person], seed: int) -> Study:
-    """Time from click to click over the index of difficulty log₂(A/W + 1) (MacKenzie 1992)."""
+    """Fitts' law: time from click to click over the index of difficulty log₂(A/W + 1) (MacKenzie 1992)."""
     difficulty, times = list[float](), list[float]()
     for amplitude, width in _conditions():
         found = np.concatenate([
@@ -43,11 +43,11 @@ def fitts(people: Sequence[Person], seed: int) -> Study:
 
 
 def scatter(people: Sequence[Person], seed: int) -> Study:
-    """Scatter of the end of a first submovement along its way, over A/T, with the time T imposed (time-matched aiming).
+    """Scatter of the end of a first submovement along its direction, over A/T, with the time T imposed (time-matched).
 
-    As in Schmidt et al. 1979, distance and time are given, and how wide the target is follows: it is as wide as she
-    hits it in one submovement of that time. The first submovement ends where its speed along the way first falls to
-    zero (Meyer et al. 1988).
+    As in Schmidt et al. 1979, distance and time are given, and the width of the target follows: it is as wide as the
+    person can hit in one submovement of that time. The first submovement ends where its speed along its direction first
+    falls to zero (Meyer et al. 1988).
     """
     speeds, spreads = list[float](), list[float]()
     for amplitude, seconds in itertools.product(AMPLITUDES, TIMES):
@@ -72,7 +72,7 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
 
 
 def _first_ends(trace: Trace) -> Array:
-    """Where the first submovement of each move ends, as the way beyond its start [m], signed along it."""
+    """End of the first submovement of each movement, as the signed distance from its start along its direction [m]."""
     ends = list[float]()
     for k, (start, end) in enumerate(itertools.pairwise(trace.clicks)):
         if k < _PRACTICE:

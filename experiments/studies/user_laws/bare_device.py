@@ -1,4 +1,4 @@
-"""A person on a Phantom whose motors only carry its weight, or push her as they are told."""
+"""A person on a Phantom without a field: its motors only compensate its weight, or apply given pushes."""
 
 from typing import NamedTuple
 
@@ -23,20 +23,20 @@ from sim.world.plant import Plant, make_plant
 from sim.world.world import World
 
 PERIOD, STEP, CUTOFF = 1e-3, 5e-4, 150.0  # [s], [s], [Hz]
-AFTER = 0.1  # [s] after a click in which a movement may still come to rest
+AFTER = 0.1  # [s] recorded after the last click, in which the movement comes to rest
 
 
 class Trace(NamedTuple):
-    """What happened, tick by tick.
+    """Recording of a trial, tick by tick.
 
     Attributes
     ----------
     t : Array
-        [s], shape (n,).
+        Time [s], shape (n,).
     p, v, force : Array
         True position [m] and velocity [m/s] of the stylus and force of the hand [N], in H, shape (n, 3).
     clicks : Array
-        When the switch was pressed [s].
+        Times at which the switch was pressed [s].
     """
 
     t: Array
@@ -48,9 +48,9 @@ class Trace(NamedTuple):
 
 @entry_point
 def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Array, rows: Array, clicks: int) -> int:
-    """Let the device push a person, a force [N] a tick (n, 3), and write where the stylus is, shape (n, 10).
+    """Let the device push a person with a force per tick (n, 3) [N], and write the state of the stylus, shape (n, 10).
 
-    Returns how many ticks were written: fewer than n if `AFTER` seconds ago she had pressed the switch so many times.
+    Returns the number of ticks written: fewer than n if the run ended `AFTER` [s] after the last of `clicks` clicks.
     """
     pressed, last = 0, rows.shape[0]
     for k in range(rows.shape[0]):
@@ -73,9 +73,9 @@ def trial(
     person: Person, wishes: Wishes, seconds: float, seed: int, start: Array, pushes: Array | None = None,
     clicks: int = -1,
 ) -> Trace:  # fmt: skip
-    """A person with something to do for so long [s], from a place in H [m]; `pushes` (n, 3) are the device's [N].
+    """Trial of a person with given wishes for `seconds` [s], from a start in H [m]; `pushes` (n, 3) of the device [N].
 
-    It ends earlier where she has clicked so often as is asked for.
+    It ends earlier when the person has clicked `clicks` times.
     """
     world = World(SceneConfig(servo_period=PERIOD, physics_step=STEP), "none")
     world.reset(start, rest_pose())

@@ -1,4 +1,4 @@
-"""Holding still: tremor, and what an arm answers to a push of the device."""
+"""Holding still: tremor, and the response of the arm to a push of the device."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,9 +12,9 @@ from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
-PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # [N], [s], and [s]: a swing of the arm
+PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # force [N], period [s], number, window of a response [s]
 GRIPS = (1.0, 2.0, 4.0, 8.0)  # [N]
-STILL = 20.0  # [s]
+STILL = 20.0  # [s] for which the hand holds still
 _HOLD = Wishes(following(np.zeros((2, 3))), 0.02)
 
 
@@ -47,9 +47,9 @@ def tremor(people: Sequence[Person], seed: int) -> Study:
 
 
 def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, float, float]]:
-    """Mean answer [m] to a push along x, its times [s], and mass [kg], damping [N s/m], stiffness [N/m] fitted to it.
+    """Mean response [m] to a push along x, its times [s], and the fitted mass [kg], damping [N s/m], stiffness [N/m].
 
-    She is told, as people are in such studies, not to intervene: she makes up for nothing on purpose.
+    As in such studies, the person is told not to intervene: she does not correct the response voluntarily.
     """
     person = replace(person, correction=0.0)
     n, period = round(REPEATS * EVERY / PERIOD), round(EVERY / PERIOD)
@@ -63,7 +63,7 @@ def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, flo
         for k in range(1, REPEATS)
     ]
     answer, t = np.mean(answers, axis=0), PERIOD * np.arange(1, window + 1, dtype=np.float64)
-    # Integrated twice, F = m a + b v + k x needs no derivative of what is measured.
+    # F = m a + b v + k x is integrated twice, so that no derivative of the measurement is needed.
     once, twice = np.cumsum(answer) * PERIOD, np.cumsum(np.cumsum(answer)) * PERIOD**2
     columns = np.stack([answer, once, twice], axis=1)
     m, b, k = np.linalg.lstsq(columns, 0.5 * PUSH * t**2, rcond=None)[0]
@@ -71,7 +71,7 @@ def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, flo
 
 
 def step_response(people: Sequence[Person], seed: int) -> Study:
-    """What a hand that holds still does when the device pushes it: mass, damping and stiffness."""
+    """Step response of a hand that holds still when the device pushes it: mass, damping and stiffness."""
     found = [impedance(person, seed + i) for i, person in enumerate(people)]
     m, b, k = np.median([values for _, _, values in found], axis=0)
     answers, t = np.mean([answer for answer, _, _ in found], axis=0), found[0][1]

@@ -1,4 +1,4 @@
-"""A published law of movement, and how people of this project hold it."""
+"""A published law of movement, and the measurement of simulated people against it."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,23 +8,23 @@ from controllers.state import Array
 
 @dataclass(frozen=True)
 class Law:
-    """One number of a law, measured, beside its published interval.
+    """One measured parameter of a law, with its published interval.
 
     Attributes
     ----------
     name : str
-        Of the law and its number.
+        Name of the law and the parameter.
     value : float
-        Measured here.
+        Value measured here.
     least, most : float
         Published interval.
     unit : str
-        Of all three.
+        Unit of all three.
     source : str
-        Of the interval; "(a)" marks a paper of which the abstract was read, "(q)" one as it is quoted by who read it,
-        or in its authors' slides, and "(m)" one quoted from memory; see docs/validation/published-numbers.md.
+        Source of the interval; "(a)" marks a paper of which the abstract was read, "(q)" one quoted from another author
+        who read it, or from its authors' slides, and "(m)" one from memory; see docs/validation/published-numbers.md.
     built_in : bool
-        Whether the person is made by this very law, so that only what arm and device leave of it is tested.
+        Whether the person is modelled by this very law, so that the test shows only what arm and device leave of it.
     """
 
     name: str
@@ -43,24 +43,24 @@ class Law:
 
 @dataclass(frozen=True)
 class Study:
-    """What one experiment gave.
+    """Result of one experiment.
 
     Attributes
     ----------
     key, title : str
-        Its short name, and what is over its figure.
+        Short name, and title of the figure.
     laws : tuple of Law
-        Its numbers.
+        Measured parameters.
     x, y : Array
-        What is drawn, shape (n,).
+        Data of the figure, shape (n,).
     labels : tuple of str
-        Of both axes.
+        Labels of both axes.
     line : tuple of (float, float), optional
-        Slope and intercept of the line that is fitted; in logarithms where `log`.
+        Slope and intercept of the fitted line; in logarithms if `log`.
     log : bool
         Whether both axes are logarithmic.
     joined : bool
-        Whether the points are a curve.
+        Whether the points are joined to a curve.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""What repetition and effort do: learning of a force that comes again with every lap, and how long a force is held."""
+"""Practice and fatigue: learning of a force that recurs in every lap, and endurance against a constant force."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,20 +12,20 @@ from experiments.studies.user_laws.law import Law, Study
 from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
-LAPS, LAP, RADIUS, PUSH = 24, 2.0, 0.04, 1.5  # of tracing; [s], [m], and the force that comes with every lap [N]
-LEARNING = 0.15  # share of an error that is learned a repetition, of people who do learn
-LOADS = (0.25, 0.4, 0.6, 0.8)  # of her strength: published models are of 10 to 90 %
-FATIGUE, STRENGTH = 0.6, 6.0  # [1/min] of grip; [N], so that the device can load her
-BEGUN = 2.0  # [s] in which she takes the load up
-SLIPPED = 0.02  # [m] that a hand is moved which cannot hold any more
+LAPS, LAP, RADIUS, PUSH = 24, 2.0, 0.04, 1.5  # laps of tracing; their duration [s], radius [m], recurring force [N]
+LEARNING = 0.15  # share of an error that people who learn correct per repetition
+LOADS = (0.25, 0.4, 0.6, 0.8)  # shares of the person's strength; published models cover 10 to 90 %
+FATIGUE, STRENGTH = 0.6, 6.0  # rate for the grip [1/min]; strength that the device can load [N]
+BEGUN = 2.0  # [s] in which the person takes up the load
+SLIPPED = 0.02  # [m] displacement from which a hand counts as no longer holding
 _SAMPLING = 0.01  # [s] between wishes
 
 
 def practice(people: Sequence[Person], seed: int) -> Study:
     """Error of a lap over repetitions, while the device pushes in the same way in every lap.
 
-    Individual curves of practice are exponential, e = a + b exp(-c n), rather than a power of n (Heathcote, Brown &
-    Mewhort 2000: 475 people, all sets of data that are not averaged).
+    Individual practice curves are exponential, e = a + b exp(-c n), rather than a power of n (Heathcote, Brown &
+    Mewhort 2000: 475 people, in all data sets that are not averaged).
     """
     t = np.arange(0.0, (LAPS + 1) * LAP, _SAMPLING)
     angle, n = 2.0 * np.pi * t / LAP, round(LAPS * LAP / PERIOD)
@@ -56,9 +56,9 @@ def practice(people: Sequence[Person], seed: int) -> Study:
 
 
 def endurance(people: Sequence[Person], seed: int) -> Study:
-    """How long a hand holds against a force of the device, over that force as a share of its strength.
+    """Endurance time of a hand against a force of the device, over that force as a share of its strength.
 
-    Of one person: strength and fatigue are set, and what else differs between people matters little.
+    Measured with one person: strength and fatigue are fixed, and other differences between people matter little.
     """
     times, person = list[float](), people[0]
     weak = replace(person, strength=STRENGTH, fatigue=FATIGUE, tremor=0.0)
@@ -93,7 +93,7 @@ def _power(n: Array, a: float, b: float, c: float) -> Array:
 
 
 def _fitted(n: Array, errors: Array, law: Callable[..., Array]) -> tuple[Array, float]:
-    """Numbers of a law of practice, and the sum of squares that it leaves."""
+    """Fitted parameters of a law of practice, and the residual sum of squares."""
     start = (float(errors[-1]), float(errors[0] - errors[-1]), 0.3)
     found = np.asarray(curve_fit(law, n, errors, start, bounds=((0.0, 0.0, 0.0), (1.0, 1.0, 5.0)))[0], dtype=np.float64)
     return found, float(np.sum((errors - law(n, *found)) ** 2))

@@ -1,4 +1,4 @@
-"""All laws of movement: the table beside what is published, and a figure each."""
+"""Report on all laws of movement: the table with the published intervals, and a figure for each experiment."""
 
 import itertools
 from dataclasses import asdict
@@ -25,12 +25,12 @@ TABLE = "laws.json"
 
 
 def user_laws(people: int, seed: int, names: tuple[str, ...] = ()) -> list[Study]:
-    """Run the experiments with a population of so many people and a seed.
+    """Run the experiments with a population, given by its number of people and its seed.
 
     Raises
     ------
     ParameterError
-        If there is no experiment of a name.
+        If there is no experiment of that name.
     SimError
         If there are no people.
     """
@@ -42,7 +42,7 @@ def user_laws(people: int, seed: int, names: tuple[str, ...] = ()) -> list[Study
 
 
 def young_adults(people: int, seed: int) -> tuple[Person, ...]:
-    """So many people of at most 40 years, in the order of the population of a seed: the published panels are.
+    """The first `people` people of at most 40 years in the population of a seed, as in the published panels.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwri
     Raises
     ------
     ParameterError
-        If the folder holds a table already, or there is no law of a name.
+        If the folder holds a table already, or there is no law of that name.
     SimError
         If there are no people.
     """
@@ -95,7 +95,7 @@ def lines(laws: list[Law]) -> list[str]:
 
 
 def draw(study: Study, path: Path) -> None:
-    """A figure of one experiment."""
+    """Draw the figure of one experiment."""
     figure, axes = plt.subplots(figsize=(6.0, 4.2), layout="constrained")
     axes.plot(study.x, study.y, "-" if study.joined else "o", ms=4.0 if len(study.x) > 40 else 6.0, color="tab:blue")
     if study.line is not None:

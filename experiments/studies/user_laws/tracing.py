@@ -14,24 +14,24 @@ from sim.users.pace import natural_times
 from sim.users.person import Person
 from sim.users.wishes import Wishes, following
 
-LAPS = 7  # of an ellipse, of which the first is practice
+LAPS = 7  # laps of an ellipse, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
-DIFFICULTIES = (10.0, 15.0, 20.0, 30.0, 40.0)  # length over width: 10.7 to 42.7 of Yamanaka et al. 2017
-PACES = (0.6, 1.0, 1.7, 2.8, 4.5)  # of a lap that is practised [s]
+DIFFICULTIES = (10.0, 15.0, 20.0, 30.0, 40.0)  # length over width; 10.7 to 42.7 in Yamanaka et al. 2017
+PACES = (0.6, 1.0, 1.7, 2.8, 4.5)  # durations of a practised lap [s]
 ERRORS = 0.064  # share of passages that touch a wall (Accot & Zhai 1997)
-PRACTISED, PASSED = 9, 9  # laps at a pace, and through a tunnel, of which the first and the last are not judged
-LEAST = 5  # of these that go round, at a pace that she can hold
+PRACTISED, PASSED = 9, 9  # laps per pace in practice, and per tunnel; the first and the last are not evaluated
+LEAST = 5  # fewest of these that go all the way round, at a pace that the person can hold
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
-ELLIPSE_TIMES = (1.5, 2.5)  # of a lap [s]
+ELLIPSE_TIMES = (1.5, 2.5)  # durations of a lap [s]
 _SAMPLING, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
-    """Time to pass a circular tunnel over its length by its width, by the published protocol (Accot & Zhai 1997).
+    """Steering law: time to pass a circular tunnel over its length by its width (protocol of Accot & Zhai 1997).
 
-    A tunnel of a given width is passed as fast as she can without touching its walls. She has practised: of each pace
-    she knows how far her laps go from the middle, and takes the fastest at which no more than `ERRORS` of them touch.
-    Fresh laps at that pace are judged, of which those that touch are errors and left out.
+    A tunnel of a given width is passed as fast as possible without touching its walls. From practice the person knows
+    the deviation of her laps at each pace, and takes the fastest pace at which no more than `ERRORS` of them touch. New
+    laps at that pace are evaluated; those that touch are errors and left out.
     """
     widths = 2.0 * np.pi * RADIUS / np.array(DIFFICULTIES)
     times, touched = np.full((len(people), len(widths)), np.nan), list[Array]()
@@ -60,10 +60,10 @@ def steering(people: Sequence[Person], seed: int) -> Study:
 
 
 def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
-    """Time of a lap [s] at which a share `ERRORS` of her laps touches the walls, of each width [m].
+    """Duration of a lap [s] at which a share `ERRORS` of the laps touches the walls, for each width [m].
 
-    At a pace that she has practised her laps need the width of a normal distribution of how far they go; over paces it
-    falls (isotonic regression), and is linear between. A pace that she cannot hold is none.
+    At each practised pace, the needed width follows from a normal distribution of the laps' deviations; it decreases
+    with the duration (isotonic regression), with linear interpolation. Paces that the person cannot hold are left out.
     """
     held, needed = list[float](), list[float]()
     for pace in PACES:
@@ -76,7 +76,7 @@ def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
 
 
 def _laps(person: Person, pace: float, laps: int, seed: int) -> tuple[Array, Array]:
-    """How far each lap goes from the middle [m], and how long it lasts [s], without the first one."""
+    """Largest deviation of each lap from the middle [m], and its duration [s], without the first lap."""
     angle = 2.0 * np.pi * np.arange(0.0, (laps + 1) * pace, _SAMPLING) / pace
     points = RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     trace = trial(person, _wishes(points, pace), laps * pace, seed, points[0])
@@ -121,7 +121,7 @@ def _wishes(points: Array, lap: float) -> Wishes:
 
 
 def _curvature(trace: Trace, lap: float) -> tuple[Array, Array]:
-    """Curvature [1/m] and speed [m/s] without the first lap and the ends, of the filtered drawing."""
+    """Curvature [1/m] and speed [m/s] of the filtered movement, without the first lap and the ends."""
     sections = butter(2, 2.0 * PERIOD * _CUTOFF, output="sos")
     p = np.asarray(sosfiltfilt(sections, trace.p[:, :2], axis=0))
     v = np.gradient(p, PERIOD, axis=0)

@@ -1,1 +1,1 @@
-"""What the trials of a study say: tables, statistics, plots, and one page."""
+"""Analysis of a study's trials: tables, statistics, plots, and one page."""

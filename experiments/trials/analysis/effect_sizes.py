@@ -1,26 +1,26 @@
-"""Standardised differences."""
+"""Effect sizes: standardised differences of means."""
 
 import numpy as np
 
 from controllers.state import Array
 
-ALIKE = 1e-6  # spread over size of differences that are one number, written many times
+ALIKE = 1e-6  # relative spread below which differences count as equal
 
 
 def spreads(sample: Array) -> bool:
-    """Whether anything is known of a sample's spread."""
+    """Whether the values of a sample differ by more than rounding."""
     return bool(np.ptp(sample) > ALIKE * np.max(np.abs(sample)))
 
 
 def cohen_dz(differences: Array) -> float:
-    """Mean over standard deviation of paired differences (J. Cohen, *Statistical Power Analysis*, 1988)."""
+    """Cohen's d_z: mean over standard deviation of paired differences (Cohen, *Statistical Power Analysis*, 1988)."""
     spread = float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
     mean = float(np.mean(differences)) if len(differences) else 0.0
     return mean / spread if spread > ALIKE * abs(mean) else float("nan")
 
 
 def hedges_g(one: Array, other: Array) -> float:
-    """Difference of means over the pooled standard deviation, corrected for small samples (L. V. Hedges, 1981)."""
+    """Hedges' g: difference of means over pooled standard deviation, corrected for small samples (Hedges, 1981)."""
     freedom = len(one) + len(other) - 2
     if freedom < 1:
         return float("nan")

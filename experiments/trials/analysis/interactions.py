@@ -1,12 +1,12 @@
-"""Interactions: whether what a level does depends on the level of another factor.
+"""Interactions of two factors: whether the effect of a level depends on the level of another factor.
 
-Of a level of one factor and a level of another, each user has a difference of differences,
+For a level a of one factor and a level b of another, with the references a₀ and b₀, each user i has a difference of
+differences of means,
 
-    d_i = (y_i[a, b] − y_i[a₀, b]) − (y_i[a, b₀] − y_i[a₀, b₀]),
+    d_i = (y_i[a, b] − y_i[a₀, b]) − (y_i[a, b₀] − y_i[a₀, b₀]).
 
-of her means in these conditions. It is held against zero by Student's t test, or, where one of the two factors is
-between users, one group's differences against the other's by Welch's (scipy). All of them are corrected together by
-Holm's method.
+Student's t test compares it with zero. If one of the factors is between users, Welch's t test compares the differences
+of the two groups (scipy). All p values are corrected together by Holm's method.
 """
 
 import itertools
@@ -22,16 +22,16 @@ from experiments.trials.analysis.effect_sizes import spreads
 def interactions_of(
     cells_of: Mapping[str, Any], factors: Mapping[str, Sequence[str]], between: Sequence[str]
 ) -> dict[str, float]:
-    """By measure, the least corrected p of its interactions of two factors; measures without any are left out.
+    """Least corrected p of the two-factor interactions of each measure; measures without a test are left out.
 
     Parameters
     ----------
     cells_of : mapping of str to pandas.Series
-        By measure, users' means of every condition, indexed by the factors that vary and the user.
+        By measure, users' means in every condition, indexed by the factors that vary and the user.
     factors : mapping of str to sequence of str
-        Names of levels, the reference first.
+        Names of levels by factor, the reference first.
     between : sequence of str
-        Factors between users.
+        Between-subject factors.
     """
     from statsmodels.stats.multitest import multipletests
 

@@ -1,16 +1,17 @@
-"""The linear mixed model of a contrast: how much a level changes a measure, when users differ in that, too.
+"""Linear mixed model of a contrast: how much a level changes a measure, with users as random effects.
 
-On the trials of a level and of the reference,
+For the trials of a level and of the reference,
 
     y_ij = β₀ + β x_ij + γ[c_ij] + δ[c_ij] x_ij + u_i + v_i x_ij + e_ij,   (u_i, v_i) ~ N(0, Σ),   e_ij ~ N(0, σ²),
 
 with x = 1 at the level and 0 at the reference; c is the condition of the other factors, with Σ_c γ = Σ_c δ = 0, so
-that β is the mean over these conditions, whatever interacts; v_i is for factors within users only: without it a user's
-repetitions would count as if they were other users (D. J. Barr et al., "Random effects structure for confirmatory
-hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by REML (statsmodels). β over
-its standard error is held against Student's t with the users less one, or less their groups, as degrees of freedom
-(between-within: M. D. Schluchter & J. T. Elashoff, 1990); in a balanced design that is the paired t test of the users'
-means, or a wider one where the users' variance comes out as zero.
+that β is the mean over these conditions also if factors interact. The random slope v_i is used for within-subject
+factors only; without it the repetitions of a user would count as independent users (D. J. Barr et al., "Random effects
+structure for confirmatory hypothesis testing: Keep it maximal", *Journal of Memory and Language* 68, 2013). Fitted by
+REML (statsmodels). β over its standard error is compared with Student's t, whose degrees of freedom are the number of
+users less one, or less the number of groups (between-within: M. D. Schluchter & J. T. Elashoff, 1990). In a balanced
+design this is the paired t test of the users' means, or a more conservative one if the users' variance is estimated as
+zero.
 """
 
 import warnings
@@ -20,18 +21,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 LEVEL = 0.95
-_METHODS = ["bfgs", "lbfgs", "cg", "powell"]  # in turn; the last one needs no gradient at a variance of zero
+_METHODS = ["bfgs", "lbfgs", "cg", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
 
 
 class Fit(NamedTuple):
-    """What the model says of a contrast; NaN where it could not be fitted, or the fit did not converge.
+    """Fit of the model to a contrast; NaN if the model could not be fitted or the fit did not converge.
 
     Attributes
     ----------
     estimate, low, high : float
-        β with its 95 % interval.
+        β with its 95 % confidence interval.
     p : float
-        Of β = 0, two-sided.
+        Two-sided p of β = 0.
     doubtful : bool
         Whether the fit did not converge.
     """
@@ -55,15 +56,15 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     rows : pandas.DataFrame
         Trials that have the measure.
     measure, factor : str
-        Columns.
+        Columns of the measure and of the factor.
     levels : tuple of str
-        The level, and the reference.
+        The level and the reference.
     others : sequence of str
         The other factors.
     freedom : int
         Degrees of freedom.
     within : bool
-        Whether the users meet both levels.
+        Whether the factor is within-subject.
     """
     import statsmodels.formula.api as smf
     from scipy.stats import t
@@ -79,7 +80,7 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
     fixed = "_y ~ _x * C(_c, Sum)" if data["_c"].nunique() > 1 else "_y ~ _x"
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a variance at zero, where it belongs for people who are alike
+            warnings.simplefilter("ignore")  # warned: variance at the boundary zero, as expected for identical people
             made = smf.mixedlm(fixed, data, groups="user", re_formula="~_x" if within else "~1")
             model = made.fit(reml=True, method=_METHODS)
             estimate, error = scale * float(model.params["_x"]), scale * float(model.bse["_x"])

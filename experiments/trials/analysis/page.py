@@ -1,4 +1,4 @@
-"""report.html of a study: what it found, in one file that opens from disk."""
+"""report.html of a study: its findings in one self-contained file."""
 
 import html
 import math
@@ -38,28 +38,28 @@ users. Grey: no difference is shown. {interactions}</p>
 
 @dataclass(frozen=True)
 class Report:
-    """What the page of a study is made of.
+    """Content of the page of a study.
 
     Attributes
     ----------
     study : StudyConfig
         The study.
     text : str
-        Its file.
+        Text of its file.
     sentences : sequence of str
-        What a skimming reader should know.
+        Main results, for a skimming reader.
     found : Statistics
         All contrasts.
     plots : mapping of str to Figure
-        By caption.
+        Plots by caption.
     effects : Figure or None
-        Of all measures.
+        Effect sizes of all measures.
     failures : mapping of str to int
-        How often trials failed, by reason.
+        Number of failed trials, by reason.
     replays : sequence of Replay
         Trials that are shown.
     made : str
-        What it was made with.
+        Code, libraries and processors that the study was made with.
     """
 
     study: StudyConfig
@@ -73,7 +73,7 @@ class Report:
     made: str
 
     def page(self) -> str:
-        """The page."""
+        """HTML of the page."""
         names = list(dict.fromkeys(contrast.measure for contrast in self.found.contrasts))
         body = _BODY.format(
             question=html.escape(self.study.question),

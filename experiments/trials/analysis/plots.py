@@ -1,4 +1,4 @@
-"""Plots of a study: users' means by level, and the differences that the report speaks of."""
+"""Plots of a study: users' means by level, and effect sizes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -34,7 +34,7 @@ def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence
 
 
 def effects_figure(found: Statistics, factor: str) -> Figure | None:
-    """Standardised differences of all measures, by level of a factor; None if there is none."""
+    """Effect sizes of all measures, by level of a factor; None if there are none."""
     contrasts = [c for c in found.contrasts if c.factor == factor and np.isfinite(c.effect)]
     if not contrasts:
         return None

@@ -1,4 +1,4 @@
-"""The median and the worst trial of a study, run once more and shown."""
+"""Replays of the median and the worst trial of a study, which are run once more for them."""
 
 import tempfile
 from pathlib import Path
@@ -14,14 +14,14 @@ from sim.viewer.replay_html import replay_html
 
 
 class Replay(NamedTuple):
-    """A trial that is shown.
+    """Replay of a trial.
 
     Attributes
     ----------
     title : str
-        Which it is, and why it is shown.
+        Which trial it is, and why it is shown.
     page : str
-        The replay, a document of its own.
+        The replay, a complete HTML document.
     """
 
     title: str
@@ -29,7 +29,7 @@ class Replay(NamedTuple):
 
 
 def chosen_trials(frame: Any, measure: str) -> dict[str, int]:
-    """Places in the table of the median and the worst trial by a measure; none if none has it."""
+    """Row numbers of the median and the worst trial by a measure; empty if no trial has the measure."""
     values = frame.loc[frame["state"].eq("done"), measure].dropna().sort_values(kind="stable")
     if not len(values):
         return {}
@@ -38,7 +38,7 @@ def chosen_trials(frame: Any, measure: str) -> dict[str, int]:
 
 
 def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay, ...]:
-    """Run these trials again, recorded, and draw them."""
+    """Run the median and the worst trial again, recorded, and make their replays."""
     shown: list[Replay] = []
     for what, place in chosen_trials(frame, measure).items():
         trial, value = trials[place], float(frame[measure].iloc[place])

@@ -1,4 +1,4 @@
-"""The analysis of a study's table, written: contrasts, plots, replays, and the page with all of it."""
+"""Writes the analysis of a study's table: contrasts, plots, replays, and the page that contains them."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -26,15 +26,15 @@ def write_report(
     Parameters
     ----------
     study, text : StudyConfig, str
-        The study, and its file.
+        The study and the text of its file.
     trials : sequence of Trial
-        As planned, in the order of the table.
+        Planned trials, in the order of the table.
     frame : pandas.DataFrame
         The table.
     path : Path
         HTML file; the contrasts are written beside it.
     made : str
-        What it was made with.
+        Code, libraries and processors that the study was made with.
     """
     import pandas as pd
 

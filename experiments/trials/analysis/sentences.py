@@ -1,4 +1,4 @@
-"""What a skimming reader should know of a study, in three sentences."""
+"""The main results of a study in three sentences, for a skimming reader."""
 
 import math
 from collections.abc import Sequence
@@ -11,16 +11,16 @@ from experiments.trials.study_config import StudyConfig
 
 
 def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: int) -> tuple[str, str, str]:
-    """Who did what; whether the first factor made it easier; and what that cost.
+    """Who did what; whether the first factor made the task easier; and what that cost.
 
     Parameters
     ----------
     study, found : StudyConfig, Statistics
-        The study, and its contrasts.
+        The study and its contrasts.
     frame : pandas.DataFrame
-        Of `experiments.trials.analysis.tidy.table`.
+        Table made by `experiments.trials.analysis.tidy.table`.
     failed : int
-        Trials that failed.
+        Number of failed trials.
     """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
@@ -45,7 +45,7 @@ def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, unknown: s
 
 
 def _unknown(frame: Any, measure: str) -> str:
-    """Why nothing is known of a measure of which there is no contrast."""
+    """Why a measure has no contrast, in words."""
     if measure not in frame:
         return f"it needs a {MEASURES[measure].figure} figure"
     values = frame.loc[frame["state"].eq("done"), measure].dropna()

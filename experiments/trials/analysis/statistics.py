@@ -1,12 +1,13 @@
-"""What the factors of a study do to its measures: mixed models, bootstrap intervals, effect sizes, Holm's correction.
+"""Effects of a study's factors on its measures: mixed models, bootstrap intervals, effect sizes, Holm's correction.
 
-The first level of a factor is what the others are held against. For every level of every factor and every measure: the
-difference of users' means with its BCa bootstrap interval over users (scipy); beside it a linear mixed model
-(`experiments.trials.analysis.mixed_model`); and the standardised difference: Cohen's d_z of paired differences within
-users, Hedges' g between them. The p values of all contrasts of all measures together are corrected by Holm's method.
+The first level of a factor is the reference. Each other level is compared with it on every measure by the difference
+of users' means with its BCa bootstrap interval over users (scipy), by a linear mixed model
+(`experiments.trials.analysis.mixed_model`), and by an effect size: Cohen's d_z of paired differences for within-subject
+factors, Hedges' g for between-subject factors. The p values of all contrasts of all measures are corrected together by
+Holm's method.
 
-A user's mean is of the means of the conditions that have both levels, so that a trial that failed does not weigh one
-condition more at one level than at the other.
+A user's mean is the mean over the conditions that have trials at both levels, so that a failed trial does not give a
+condition more weight at one level than at the other.
 """
 
 import warnings
@@ -26,28 +27,28 @@ RESAMPLES = 4999
 
 @dataclass(frozen=True)
 class Contrast:
-    """A level of a factor against its first one, on one measure.
+    """A level of a factor compared with the factor's first level, on one measure.
 
     Attributes
     ----------
     measure, factor, level, reference : str
         What is compared.
     users : int
-        On how many users it rests.
+        Number of users in the comparison.
     mean, reference_mean : float
         Means of users' means.
     difference : float
-        Of these.
+        Difference of these means.
     low, high : float
-        Its bootstrap interval.
+        Bootstrap interval of the difference.
     least, most : float
         Smallest and largest difference among the conditions of the other factors.
     model, model_low, model_high, p, p_holm : float
-        The mixed model's estimate and interval, its p (Student's t), and that corrected; NaN where the model has none.
+        The mixed model's estimate and interval, its p (Student's t), and p corrected by Holm's method; NaN without fit.
     effect : float
-        d_z or g.
+        Effect size, d_z or g.
     agree : int
-        Users whose own difference has the sign of the mean; of a factor between users 0.
+        Number of users whose own difference has the sign of the mean; 0 for a between-subject factor.
     """
 
     measure: str
@@ -72,23 +73,23 @@ class Contrast:
 
     @property
     def shown(self) -> bool:
-        """Whether there is a difference, by the interval and by the corrected p where the model has one."""
+        """Whether a difference is shown, by the interval and, if the model has one, by the corrected p."""
         apart = np.isfinite(self.low) and np.isfinite(self.high) and not self.low <= 0.0 <= self.high
         return bool(apart and not self.p_holm >= 1.0 - LEVEL)
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """All contrasts, and what is to be said of how they were found.
+    """All contrasts, with remarks on how they were found.
 
     Attributes
     ----------
     contrasts : tuple of Contrast
-        By measure, factor and level.
+        Contrasts, ordered by measure, factor and level.
     interactions : dict of str to float
         By measure, the least corrected p of an interaction; see `experiments.trials.analysis.interactions`.
     remarks : tuple of str
-        Where a model did not converge, and the like.
+        Remarks, such as on models that did not converge.
     """
 
     contrasts: tuple[Contrast, ...]
@@ -108,15 +109,15 @@ def statistics(
     Parameters
     ----------
     frame : pandas.DataFrame
-        Of `experiments.trials.analysis.tidy.table`; trials that failed are left out.
+        Table made by `experiments.trials.analysis.tidy.table`; failed trials are left out.
     factors : mapping of str to sequence of str
-        Names of levels, the reference first.
+        Names of levels by factor, the reference first.
     between : sequence of str
-        Factors between users.
+        Between-subject factors.
     measures : sequence of str
         Columns.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
     """
     found: list[Contrast] = []
     cells_of: dict[str, Any] = {}
@@ -146,7 +147,7 @@ _DOUBTFUL = "the mixed model did not converge; the bootstrap interval stands alo
 def _modelled(
     c: Contrast, rows: Any, varied: Sequence[str], between: Sequence[str], remarks: dict[str, list[str]]
 ) -> Contrast:
-    """A contrast with what the mixed model says of it."""
+    """The contrast with the results of the mixed model added."""
     groups = rows.groupby([name for name in varied if name in between]).ngroups if c.factor in between else 1
     others = [name for name in varied if name != c.factor]
     fit: Fit = fitted(
@@ -159,7 +160,7 @@ def _modelled(
 
 
 def _contrast(cells: Any, of: tuple[str, str, str, str], between: bool, rng: np.random.Generator) -> Contrast | None:
-    """Difference, interval and effect size, from users' means of every condition."""
+    """Difference, interval and effect size, from users' means in every condition; None if a level has no users."""
     measure, factor, level, reference = of
     table = cells.unstack(factor)
     if level not in table or reference not in table:
@@ -196,13 +197,13 @@ def _bootstrapped(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple
     if not (all(len(sample) > 2 for sample in samples) and any(map(spreads, samples))):
         return float("nan"), float("nan")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a degenerate sample, whose interval is then NaN and shown as such
+        warnings.simplefilter("ignore")  # warned: a degenerate sample; its interval is NaN and shown as such
         ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
     return float(ends.confidence_interval.low), float(ends.confidence_interval.high)
 
 
 def _difference(*samples: Array, axis: int = -1) -> Array:
-    """Of the means of two samples, or the mean of one of paired differences."""
+    """Difference of the means of two samples, or mean of one sample of paired differences."""
     means = [np.mean(sample, axis=axis) for sample in samples]
     return means[0] if len(means) == 1 else means[0] - means[1]
 

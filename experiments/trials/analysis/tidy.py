@@ -1,4 +1,4 @@
-"""The trials of a study as one table: a row a trial, a column a factor or a measure."""
+"""The trials of a study as one tidy table: a row per trial, a column per factor and per measure."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,14 +16,14 @@ _MISSING = "studies are analysed with pandas, pyarrow and statsmodels: pip insta
 def table(
     trials: Sequence[Trial], rows: Mapping[str, Row], measures: Sequence[str], margins: Mapping[int, float]
 ) -> Any:
-    """A data frame of pandas, in the order of the plan; whoever ran a trial, and when, is no part of it.
+    """The table as a pandas data frame, in the order of the plan; worker and time of a trial are not in it.
 
     Parameters
     ----------
     trials : sequence of Trial
-        As planned.
+        Planned trials.
     rows : mapping of str to Row
-        Of those that have run, by key.
+        Rows of the trials that have run, by key.
     measures : sequence of str
         Names of the columns.
     margins : mapping of int to float
@@ -64,5 +64,5 @@ def write_table(frame: Any, folder: Path) -> None:
 
 
 def measured_columns(frame: Any) -> list[str]:
-    """Measures of a table that have a number somewhere."""
+    """Measures of a table that have a value in some trial."""
     return [name for name in MEASURES if name in frame and frame[name].notna().any()]
